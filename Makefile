@@ -93,7 +93,7 @@ demo: build
 	$(BIN)/taxel demo
 
 test: released $(VENV)/.for-test
-	cargo test --release --workspace --quiet
+	cargo test --release --workspace --quiet --no-fail-fast
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
 
 slow: released $(VENV)/.for-test dist bridge
@@ -136,7 +136,7 @@ $(RTL)/.installed: rtl/requirements.txt
 	@$(RTL)/bin/python -m pip install --quiet --disable-pip-version-check -r rtl/requirements.txt
 	@touch $@
 
-.PHONY: rtl-tools rtl-registers rtl-lint rtl-quick rtl-test rtl-slow rtl-timing
+.PHONY: rtl-tools rtl-registers rtl-lint rtl-quick rtl-test rtl-slow rtl-timing rtl-bitstream
 rtl-tools: $(RTL)/.installed
 
 # The RTL's package of registers, from the registers' one source.
@@ -161,10 +161,14 @@ rtl-slow: released $(VENV)/.for-test
 	$(BIN)/python rtl/tools/prove.py
 slow: rtl-slow
 
-# The core is placed for an ECP5 with five seeds, of which four must meet every clock.
+# The core, and a board, are placed for an ECP5 with five seeds, of which four must meet every clock.
 rtl-timing: $(RTL)/.installed $(VENV)/.installed
 	$(BIN)/python rtl/tools/timing.py
 slow: rtl-timing
+
+# The bitstream of the Colorlight i9, to rtl/build/colorlight_i9.bit.
+rtl-bitstream: $(RTL)/.installed
+	$(RTL)/bin/python rtl/tools/bitstream.py
 
 # Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
 PEERS := .venv-peers

@@ -1,4 +1,5 @@
-// Which taxels of a read changed: counts become values, each is compared with the value that its taxel holds.
+// Which taxels of a read changed: counts become values, each is compared with the value that its taxel holds, or each taxel
+// is an afferent that may fire.
 //
 // The counts of a read are loaded at once and taken one a clock, channel after channel. What `PREVIOUS_SAMPLE` and `INTENSITY`
 // choose is as `previous` and `intensity` of the emulated board. The initial frame sets every taxel's value to 0.
@@ -62,11 +63,11 @@ module taxel_change_detector
   read_t ended, now;
   trip_t [CHANNELS-1:0] counts;
   logic [CHANNEL_BITS-1:0] channel;
-  logic counting, busy, of_frame, flushes, first_read, after_sent;
+  logic counting, of_frame, flushes, first_read, after_sent;
+  logic busy;  // taxels come: counting, and nothing goes before them
   logic [2:0] markers;
   logic [MARKERS-1:0] starts;
 
-  assign busy = counting && !of_frame && markers == 0 && !flushes;
   assign first_read = ended.frame_first && !ended.initial_frame;
   assign after_sent = first_read && !ended.ended.initial_frame;  // of a frame that was sent
 
@@ -80,26 +81,37 @@ module taxel_change_detector
       markers  <= first_read ? ended.markers : 3'd0;
       starts   <= ended.starts;
       flushes  <= HOLDS && after_sent && ended.ended.format.version_2 && ended.ended.changed;
-      for (int c = 0; c < CHANNELS; c++) counts[c] <= '{tripped: tripped[c], first: first[c], at: at[c]};
+      busy     <= !(after_sent && ended.ended.format.version_2) && !(first_read && ended.markers != 0);
     end else if (of_frame) begin
       of_frame <= 1'b0;
+      busy     <= counting && markers == 0 && !flushes;
     end else if (markers != 0) begin
       markers <= markers - 3'd1;
       starts  <= starts >> 1;
+      busy    <= counting && markers == 3'd1 && !flushes;
     end else if (flushes) begin
       flushes <= 1'b0;
+      busy    <= counting;
     end else if (counting) begin
-      counts  <= counts >> $bits(trip_t);
       channel <= channel + CHANNEL_BITS'(1);
+      busy    <= channel != CHANNEL_BITS'(CHANNELS - 1);
       if (channel == CHANNEL_BITS'(CHANNELS - 1)) counting <= 1'b0;
+    end else begin
+      busy <= 1'b0;
+    end
+    // A thousand registers hang on these two.
+    if (read_done) begin
+      for (int c = 0; c < CHANNELS; c++) counts[c] <= '{tripped: tripped[c], first: first[c], at: at[c]};
+    end else if (busy) begin
+      counts <= counts >> $bits(trip_t);
     end
     if (reset) begin
-      {counting, of_frame, flushes} <= '0;
+      {counting, busy, of_frame, flushes} <= '0;
       markers  <= '0;
     end
   end
 
-  // Six stages, one taxel a clock.
+  // Seven stages, one taxel a clock.
   typedef struct packed {
     logic valid;
     logic last;    // of its frame
@@ -111,13 +123,15 @@ module taxel_change_detector
     logic [15:0] value;
   } sample_t;
 
-  sample_t counted, valued, fetched, compared, judged;
+  sample_t counted, valued, fetched, compared, weighed, judged;
   logic [15:0] tick;
   logic [15:0] held, previous;
-  logic [15:0] moved, moved_by;
-  logic more, polarity, beyond, changed;
+  logic [15:0] moved, moved_of, moved_by;
+  logic more, more_of, polarity, beyond, changed;
+  // Of what is judged, known a clock before: a taxel that may have changed, an entry that is no taxel's, a frame's end.
+  logic counts_now, other, frame_ends;
   logic [ROW_BITS-1:0] row;
-  read_t of_counted, of_valued, of_fetched, of_compared, of_judged;
+  read_t of_counted, of_valued, of_fetched, of_compared, of_weighed, of_judged;
 
   if (STEPS == 1) begin : g_one
     assign row = channel;
@@ -155,26 +169,43 @@ module taxel_change_detector
     of_compared          <= of_fetched;
     more                 <= fetched.value >= previous;
     moved                <= fetched.value >= previous ? fetched.value - previous : previous - fetched.value;
+    // An afferent takes a clock more.
+    weighed              <= compared;
+    of_weighed           <= of_compared;
+    more_of              <= more;
+    moved_of             <= moved;
     // Whether that is an event.
-    judged               <= compared;
-    of_judged            <= of_compared;
-    polarity             <= more;
-    moved_by             <= moved;
-    beyond               <= moved > 16'(of_compared.noise_floor);
+    judged               <= weighed;
+    of_judged            <= of_weighed;
+    polarity             <= more_of;
+    moved_by             <= moved_of;
+    beyond               <= moved_of > 16'(of_weighed.noise_floor);
+    counts_now           <= weighed.valid && weighed.exists && !weighed.not_returned && !of_weighed.initial_frame;
+    other                <= weighed.valid && weighed.kind != ENTRY_EVENT;
+    frame_ends           <= weighed.valid && weighed.kind == ENTRY_FRAME;
     if (store) values[judged.address] <= stored;
-    if (reset) {counted.valid, valued.valid, fetched.valid, compared.valid, judged.valid} <= '0;
+    if (reset) {counted.valid, valued.valid, fetched.valid, compared.valid, weighed.valid, judged.valid} <= '0;
+    if (reset) {counts_now, other, frame_ends} <= '0;
   end
 
-  logic other;  // than a taxel's
-  assign other = judged.valid && judged.kind != ENTRY_EVENT;
-  assign changed = judged.valid && judged.exists && !judged.not_returned && !of_judged.initial_frame && beyond;
+  logic spikes, fires, fires_more;
+  logic [15:0] integral;
+  assign spikes = of_judged.format.spikes;
+
+  taxel_afferents #(.COLUMNS(COLUMNS), .STEPS(STEPS), .ADDRESS_BITS(ADDRESS_BITS)) receptors (
+      .clk, .begins(read_done), .read(ended), .address(counted.address), .ticks(valued.value),
+      .threshold(of_compared.threshold), .sampled(judged.valid && judged.kind == ENTRY_EVENT && spikes),
+      .returned(!judged.not_returned), .stored_at(judged.address), .fires, .more(fires_more), .intensity(integral)
+  );
+
+  assign changed = counts_now && (spikes ? fires : beyond);
   assign push = (changed || other) && !full;
   assign sent = changed && !full;
   assign frame_over = judged.valid && judged.last && !of_judged.initial_frame;
   assign lost = (changed || (other && judged.kind == ENTRY_MARKER)) && full;
   assign not_returned = judged.valid && judged.exists && judged.not_returned && !of_judged.initial_frame;
   assign store = judged.valid && judged.exists
-      && (of_judged.initial_frame || (PREVIOUS_SAMPLE ? !judged.not_returned : changed && !full));
+      && (of_judged.initial_frame || (!spikes && (PREVIOUS_SAMPLE ? !judged.not_returned : changed && !full)));
   assign stored = of_judged.initial_frame ? 16'd0 : judged.value;
 
   assign counted_first = fetched.valid && fetched.exists && of_fetched.initial_frame;
@@ -194,8 +225,8 @@ module taxel_change_detector
       ENTRY_EVENT: begin
         found.x     = of_judged.line;
         found.y     = 7'(judged.address[ROW_BITS-1:0]);
-        found.more  = polarity;
-        found.value = DIFFERENCE ? moved_by : judged.value;
+        found.more  = spikes ? fires_more : polarity;
+        found.value = spikes ? integral : DIFFERENCE ? moved_by : judged.value;
       end
       ENTRY_FRAME: begin
         {found.x, found.y, found.more, found.value} = of_judged.ended.micros;
@@ -209,7 +240,7 @@ module taxel_change_detector
   // What is due to be repeated goes with the next frame's end that finds room, where what was repeated last has been sent. The
   // copy of a line begins before that is known, two clocks ahead of the frame's first event, and stays ahead of all.
   logic line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, ends;
-  logic [6:0] line_next, line_now;
+  logic [6:0] line_next, line_due, line_now;
   logic [ROW_BITS-1:0] place, row_copied, row_written;
   logic [15:0] again[2**ADDRESS_BITS];  // the same values, for the copy to read
   logic [15:0] line_values[2**ROW_BITS];
@@ -222,7 +253,13 @@ module taxel_change_detector
     assign row_copied = {place[CHANNEL_BITS-1:0], place[ROW_BITS-1:CHANNEL_BITS]};
   end
 
-  assign ends       = push && judged.kind == ENTRY_FRAME;
+  // The line that comes after one; lines are counted less one.
+  function automatic logic [6:0] line_after(logic [6:0] line, logic [7:0] lines);
+    return 8'(line) == lines ? 7'd0 : line + 7'd1;
+  endfunction
+
+  assign line_due   = 8'(line_next) > of_fetched.ended.lines ? 7'd0 : line_next;
+  assign ends       = frame_ends && !full;
   assign states_now = copies;
   assign totals_now = totals_pending && !totals_busy;
   assign states_ready = states_busy && !copying && !copied;
@@ -232,20 +269,24 @@ module taxel_change_detector
       line_pending   <= line_pending || (REPEATS && ended.ended.line_due);
       totals_pending <= totals_pending || ended.ended.totals_due;
     end
-    if (fetched.valid && fetched.kind == ENTRY_FRAME && line_pending && !states_busy) begin
+    if (fetched.valid && fetched.kind == ENTRY_FRAME && line_pending && of_fetched.ended.format.spikes) begin
+      // Afferents have no values: the line's turn passes.
+      line_pending <= 1'b0;
+      line_next    <= line_after(line_due, of_fetched.ended.lines);
+    end else if (fetched.valid && fetched.kind == ENTRY_FRAME && line_pending && !states_busy) begin
       copies   <= 1'b1;
       copying  <= 1'b1;
       place    <= '0;
-      line_now <= 8'(line_next) > of_fetched.ended.lines ? 7'd0 : line_next;
+      line_now <= line_due;
     end else if (copying) begin
       place <= place + ROW_BITS'(1);
       if (&place) copying <= 1'b0;
     end
-    if (judged.valid && judged.kind == ENTRY_FRAME) copies <= 1'b0;
+    if (frame_ends) copies <= 1'b0;
     if (ends && copies) begin
       states_busy  <= 1'b1;
       line_pending <= 1'b0;
-      line_next    <= 8'(line_now) == of_judged.ended.lines ? 7'd0 : line_now + 7'd1;
+      line_next    <= line_after(line_now, of_judged.ended.lines);
     end else if (states_sent) begin
       states_busy <= 1'b0;
     end

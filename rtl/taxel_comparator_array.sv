@@ -22,6 +22,8 @@ module taxel_comparator_array #(
     output logic [1:0]               ramp
 );
 
+  localparam int BANK = 8;  // channels
+
   // On the scan's clock: the number of the read that began last, and of the one that ended last, modulo 2.
   logic began, ended, done, done_before;
 
@@ -36,9 +38,8 @@ module taxel_comparator_array #(
 
   // On the fast clock.
   logic reset_fast, began_fast, ended_fast, began_before, number, copied, over, copy;
-  logic start, begins, begun, open, inverted_next, inverted_now, done_fast;
-  logic [14:0] pair;
-  logic [CHANNELS-1:0][1:0] sampled;
+  logic start, nears, begins, begun, open, closing, inverted_next, inverted_now, done_fast;
+  logic [CHANNELS-1:0][1:0] sampled, brought;
   logic [CHANNELS-1:0] tripped_now, first_now;
   logic [CHANNELS-1:0][14:0] at_now;
 
@@ -55,16 +56,13 @@ module taxel_comparator_array #(
     began_before <= began_fast;
     start        <= began_fast != began_before;
     if (start) inverted_next <= inverted;
-    if (begins) inverted_now <= inverted_next;
+    // Pins lie all around a part: samples have a clock to come from there, and one more to spread.
+    if (nears) inverted_now <= inverted_next;
     sampled <= comparators;
+    brought <= sampled ^ {2 * CHANNELS{inverted_now}};
     copy    <= over;
     if (over) copied <= 1'b1;
-    if (copy) begin
-      tripped   <= tripped_now;
-      first     <= first_now;
-      at        <= at_now;
-      done_fast <= !done_fast;
-    end
+    if (copy) done_fast <= !done_fast;
     if (begins) begin
       number <= !number;
       copied <= 1'b0;
@@ -75,29 +73,51 @@ module taxel_comparator_array #(
     end
   end
 
-  taxel_ramp_counter #(.DELAY(DELAY)) counter (
+  taxel_ramp_counter #(.DELAY(DELAY + 1)) counter (
       .clk_fast,
       .reset(reset_fast),
       .start,
       .length,
       .ramp,
+      .nears,
       .begins,
       .begun,
       .open,
-      .pair
+      .closing
   );
 
-  for (genvar c = 0; c < CHANNELS; c++) begin : g_column
-    taxel_comparator_column column (
-        .clk_fast,
-        .begun,
-        .open,
-        .pair,
-        .sample(sampled[c] ^ {2{inverted_now}}),
-        .tripped(tripped_now[c]),
-        .first(first_now[c]),
-        .at(at_now[c])
-    );
+  // Channels lie far apart, so each bank of them has its own count of pairs, and its own registers for what all do at
+  // once. That these wait for their own fall changes nothing, as they stand for one clock; it keeps synthesis from
+  // merging them.
+  for (genvar b = 0; b < CHANNELS / BANK; b++) begin : g_bank
+    logic begins_here, closes_here, copies_here;
+    logic [14:0] pair;
+
+    always_ff @(posedge clk_fast) begin
+      begins_here <= nears && !begins_here;
+      closes_here <= closing && !closes_here;
+      copies_here <= over && !copies_here;
+      pair        <= begins_here ? '0 : pair + 15'd1;
+      if (copies_here) begin
+        tripped[b*BANK+:BANK] <= tripped_now[b*BANK+:BANK];
+        first[b*BANK+:BANK]   <= first_now[b*BANK+:BANK];
+        at[b*BANK+:BANK]      <= at_now[b*BANK+:BANK];
+      end
+      if (reset_fast) {begins_here, closes_here, copies_here} <= '0;
+    end
+
+    for (genvar c = b * BANK; c < (b + 1) * BANK; c++) begin : g_column
+      taxel_comparator_column column (
+          .clk_fast,
+          .begins(begins_here),
+          .closes(closes_here),
+          .pair,
+          .sample(brought[c]),
+          .tripped(tripped_now[c]),
+          .first(first_now[c]),
+          .at(at_now[c])
+      );
+    end
   end
 
 endmodule

@@ -14,7 +14,7 @@ module taxel_datagram_sender
     input  logic [15:0] unit,
     input  logic        send,      // one clock, where not sending
     input  datagram_t   datagram,
-    output logic        sending,
+    output logic        sending,   // from the clock after `send` on
     output logic [7:0]  tdata,
     output logic        tvalid,
     input  logic        tready,
@@ -22,52 +22,68 @@ module taxel_datagram_sender
 );
 
   localparam logic [4:0] STRIDE = 5'(ROWS > 1 ? $clog2(ROWS) : 0);
-  localparam int HEADER = 18;
+  localparam int HEADER = 18;  // bytes
   localparam int SPAN = 2;
   localparam int CHECKSUM = 4;
 
   logic [15:0] buffer[2048];
-  logic [15:0] fetched;
   datagram_t now;
-  logic [10:0] at, at_next;  // byte of the datagram
-  logic [10:0] body_end, length;
-  logic [9:0] unit_next;
-  logic busy, load, high;
-  logic [31:0] crc;
   logic [143:0] head;
-  logic [7:0] next;
+  logic moves;
 
-  assign sending  = busy || tvalid;
-  assign body_end = 11'(HEADER) + {now.units, 1'b0};
-  assign length   = body_end + 11'(SPAN + CHECKSUM);
-  assign head     = {
+  // Four stages, which move together: what is fetched stands in a register as memory answers late, the byte is chosen,
+  // and its CRC follows.
+  typedef enum logic [1:0] {HEAD, BODY, PROMISE, SUM} part_t;
+
+  typedef struct packed {
+    logic        valid;
+    logic        last;
+    part_t       part;
+    logic [10:0] at;    // byte of the datagram
+  } place_t;
+
+  logic busy;
+  logic [10:0] at, body_end, promise_end, last_at;
+  place_t fetched, read, chosen;
+  logic [15:0] unit_fetched, unit_read;
+  logic [7:0] data;
+  logic [31:0] crc;
+
+  assign moves   = !tvalid || tready;
+  assign head    = {
       {now.line[6:3], 1'b0, now.dropped, now.differences, now.frame_sync}, {now.line[2:0], STRIDE}, session, now.base,
       now.sequence_number, BOARD, {4'd2, now.kind}, 8'h54
   };
-  assign load      = busy && (!tvalid || tready);
-  assign at_next   = load ? at + 11'd1 : at;
-  // The unit of the next byte is fetched in the clock before.
-  assign unit_next = 10'((at_next - 11'(HEADER)) >> 1);
-  assign high      = at[0] ^ HEADER[0];
-
-  always_comb begin
-    if (at < 11'(HEADER)) next = 8'(head >> {at[4:0], 3'd0});
-    else if (at < body_end) next = high ? fetched[15:8] : fetched[7:0];
-    else if (at < body_end + 11'(SPAN)) next = high ? now.span[15:8] : now.span[7:0];
-    else next = 8'(~crc >> {2'(at - body_end - 11'(SPAN)), 3'd0});
-  end
 
   always_ff @(posedge clk) begin
     if (write) buffer[{bank, place}] <= unit;
-    fetched <= buffer[{now.bank, unit_next}];
-    if (tvalid && tready) tvalid <= 1'b0;
-    if (load) begin
-      at     <= at_next;
-      tdata  <= next;
-      tvalid <= 1'b1;
-      tlast  <= at == length - 11'd1;
-      if (at < body_end + 11'(SPAN)) crc <= crc_32c(crc, next);
-      if (at == length - 11'd1) busy <= 1'b0;
+    // They stand before the header has gone.
+    body_end    <= 11'(HEADER) + {now.units, 1'b0};
+    promise_end <= body_end + 11'(SPAN);
+    last_at     <= promise_end + 11'(CHECKSUM - 1);
+    sending     <= send || busy || fetched.valid || read.valid || chosen.valid || tvalid;
+    if (moves) begin
+      fetched <= '{
+          valid: busy,
+          last: at == last_at && at >= 11'(HEADER),
+          part: at < 11'(HEADER) ? HEAD : at < body_end ? BODY : at < promise_end ? PROMISE : SUM,
+          at: at
+      };
+      unit_fetched <= buffer[{now.bank, 10'((at - 11'(HEADER)) >> 1)}];
+      read         <= fetched;
+      unit_read    <= unit_fetched;
+      chosen       <= read;
+      case (read.part)
+        HEAD: data <= 8'(head >> {read.at[4:0], 3'd0});
+        BODY: data <= read.at[0] ^ HEADER[0] ? unit_read[15:8] : unit_read[7:0];
+        default: data <= read.at[0] ^ HEADER[0] ? now.span[15:8] : now.span[7:0];
+      endcase
+      tvalid <= chosen.valid;
+      tlast  <= chosen.last;
+      tdata  <= chosen.part == SUM ? ~crc[7:0] : data;
+      if (chosen.valid) crc <= chosen.part == SUM ? crc >> 8 : crc_32c(crc, data);
+      at <= at + 11'd1;
+      if (at == last_at && at >= 11'(HEADER)) busy <= 1'b0;
     end
     if (send) begin
       now  <= datagram;
@@ -76,8 +92,8 @@ module taxel_datagram_sender
       crc  <= '1;
     end
     if (reset) begin
-      busy   <= 1'b0;
-      tvalid <= 1'b0;
+      {busy, tvalid, sending} <= '0;
+      {fetched.valid, read.valid, chosen.valid} <= '0;
     end
   end
 

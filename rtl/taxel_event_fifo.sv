@@ -1,4 +1,6 @@
 // The queue of events: a ring in block memory, with two registers behind it as its output comes late.
+//
+// It gives one every other clock at most: nothing but `ready` waits for `pop`, which is known late in a clock.
 module taxel_event_fifo #(
     parameter int DEPTH = 4096,
     parameter int BITS = 47
@@ -24,7 +26,7 @@ module taxel_event_fifo #(
   logic none;  // waits
 
   assign empty = none && !fetched_valid && !ready;
-  assign move  = fetched_valid && (!ready || pop);
+  assign move  = fetched_valid && !ready;
   assign fetch = !none && (!fetched_valid || move);
 
   always_ff @(posedge clk) begin

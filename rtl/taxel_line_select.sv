@@ -1,7 +1,7 @@
 // Drives one line at a time through a chain of shift registers (74HC164): a single one stands at the place of the line.
 //
 // A later line is reached by shifting on. For an earlier one the old one is shifted out beyond the last line, and a new one in.
-// After reset, and where there are more lines than before, the whole chain is shifted through, as nobody knows what it holds.
+// After reset, and where there are more lines than before, the whole chain is shifted through, as what it holds is not known.
 // A pulse takes 2 x HALF clocks, so a jump over n lines settles n pulses later.
 module taxel_line_select #(
     parameter int COLUMNS = 64,

@@ -30,30 +30,46 @@ module taxel_line_sorter
   held_t held[256];
   logic [1:0][GROUPS-1:0][GROUP-1:0] changed;
   event_t gathering, line;  // what the events of a line have in common: of the one that is gathered, or handed on
-  logic gathered, handing, bank, sorts, belongs, free, passes;
+  logic gathered, handing, bank, sorts, same, weighed, belongs, free, passes;
+  // The row of the entry at the queue's output, a clock after it came there.
+  logic [GROUPS-1:0] group_of;
+  logic [GROUP-1:0] row_of;
+  // The line that is handed on: a group's rows, of them the first one, what is held of it.
   logic [$clog2(GROUPS+1)-1:0] group;
+  logic [GROUP-1:0] rows;
+  logic [6:0] base, y, y_fetched;
   logic [2:0] row;
-  logic [6:0] y;
+  logic chosen, fetched, chooses, fetches;
+  held_t held_of;
 
   assign idle    = !gathered && !handing && !valid;
-  assign sorts   = oldest.kind == ENTRY_EVENT && oldest.format.frame_sync;
-  assign belongs = sorts && (!gathered || (oldest.x == gathering.x && oldest.at == gathering.at));
-  assign free    = !valid || taken;
+  // What an entry is, and whether it is of the line, is found a clock before that is used.
+  assign belongs = sorts && (!gathered || same);
+  // What is taken makes room a clock later: the packer's next entry is at least three clocks away.
+  assign free    = !valid;
   assign passes  = !sorts && !gathered && !handing && free;
-  assign pop     = ready && (belongs || passes);
+  assign pop     = ready && weighed && (belongs || passes);
+  assign fetches = chosen && (!fetched || free);
+  assign chooses = rows != '0 && (!chosen || fetches);
 
-  // The first row that changed of a group, of the bank that is not gathered in.
+  // The first row of a group's.
   always_comb begin
     row = '0;
-    for (int k = GROUP - 1; k >= 0; k--) if (changed[!bank][group][k]) row = 3'(k);
+    for (int k = GROUP - 1; k >= 0; k--) if (rows[k]) row = 3'(k);
   end
-  assign y = 7'({group, row});
 
   always_ff @(posedge clk) begin
+    weighed <= ready && !pop;
+    same    <= oldest.x == gathering.x && oldest.at == gathering.at;
+    sorts   <= oldest.kind == ENTRY_EVENT && oldest.format.frame_sync;
+    row_of  <= GROUP'(1) << oldest.y[2:0];
+    for (int g = 0; g < GROUPS; g++) group_of[g] <= oldest.y[6:3] == 4'(g);
     if (taken) valid <= 1'b0;
     if (pop && sorts) begin
       held[{bank, oldest.y}] <= '{more: oldest.more, value: oldest.value};
-      changed[bank][oldest.y[6:3]][oldest.y[2:0]] <= 1'b1;
+      for (int g = 0; g < GROUPS; g++) begin
+        if (group_of[g]) changed[bank][g] <= changed[bank][g] | row_of;
+      end
       gathering      <= oldest;
       gathering.lost <= oldest.lost || (gathered && gathering.lost);
       gathered       <= 1'b1;
@@ -61,29 +77,47 @@ module taxel_line_sorter
       valid <= 1'b1;
       entry <= oldest;
     end
-    if (gathered && !handing && (leaving || (ready && !belongs))) begin
+    if (gathered && !handing && (leaving || (ready && weighed && !belongs))) begin
       handing  <= 1'b1;
       gathered <= 1'b0;
       bank     <= !bank;
       line     <= gathering;
       group    <= '0;
     end
-    if (handing && free) begin
-      if (changed[!bank][group] == '0) begin
-        group <= group + 1'b1;
-        if (32'(group) == GROUPS - 1) handing <= 1'b0;
-      end else begin
-        valid       <= 1'b1;
-        entry       <= line;
-        entry.y     <= y;
-        entry.more  <= held[{!bank, y}].more;
-        entry.value <= held[{!bank, y}].value;
-        line.lost   <= 1'b0;
-        changed[!bank][group][row] <= 1'b0;
+    // Row by row: it is chosen, what is held of it is fetched, and it is handed on.
+    if (handing && rows == '0) begin
+      if (32'(group) != GROUPS) begin
+        rows                  <= changed[!bank][group];
+        changed[!bank][group] <= '0;
+        base                  <= {4'(group), 3'd0};
+        group                 <= group + 1'b1;
+      end else if (!chosen && !fetched) begin
+        handing <= 1'b0;
       end
     end
+    if (chooses) begin
+      y    <= base | 7'(row);
+      rows <= rows & (rows - GROUP'(1));
+    end
+    if (chooses) chosen <= 1'b1;
+    else if (fetches) chosen <= 1'b0;
+    if (fetches) begin
+      held_of   <= held[{!bank, y}];
+      y_fetched <= y;
+    end
+    if (fetches) fetched <= 1'b1;
+    else if (free) fetched <= 1'b0;
+    if (fetched && free) begin
+      valid       <= 1'b1;
+      entry       <= line;
+      entry.y     <= y_fetched;
+      entry.more  <= held_of.more;
+      entry.value <= held_of.value;
+      line.lost   <= 1'b0;
+    end
     if (reset) begin
-      {valid, gathered, handing, bank} <= '0;
+      {valid, gathered, handing, bank, weighed, chosen, fetched} <= '0;
+      rows    <= '0;
       changed <= '0;
     end
   end

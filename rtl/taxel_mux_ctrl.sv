@@ -48,18 +48,20 @@ module taxel_mux_ctrl
   logic [2:0] step;
   logic line_start, last_line, stepping, early, early_line;
   logic initial_frame, initial_begun;
-  logic line_over, step_over;
+  logic line_over, frame_over, step_over;
   logic [7:0] next_lines;
   registers_t ended_registers;  // of the frame before
   logic next_random;
 
   assign markers_taken = early && last_line;
-  assign line_over = line_left == 32'd1;
-  assign step_over = stepping && step_left == 16'd1;
 
   always_ff @(posedge clk) begin
     // Whether this is the last line is known from its second clock on.
     last_line     <= place == active.lines;
+    // The last clock of a line, of a frame's last line, of a step: known a clock before, as much hangs on them.
+    line_over     <= line_left == 32'd2;
+    frame_over    <= line_left == 32'd2 && last_line;
+    step_over     <= stepping && step_left == 16'd2;
     early         <= line_left == 32'(EARLY + 1);
     frame_start   <= 1'b0;
     line_start    <= 1'b0;
@@ -89,7 +91,7 @@ module taxel_mux_ctrl
       stepping   <= 1'b1;
       step       <= '0;
       line       <= next_line;
-      if (last_line) begin
+      if (frame_over) begin
         frame_start   <= 1'b1;
         zero          <= initial_frame && initial_begun;
         initial_frame <= initial_frame && !initial_begun;
@@ -115,6 +117,7 @@ module taxel_mux_ctrl
       step           <= '0;
       line           <= '0;
       step_left      <= 16'd0;
+      {line_over, frame_over, step_over} <= '0;
       initial_frame  <= 1'b1;
       initial_begun <= 1'b0;
     end
@@ -135,7 +138,12 @@ module taxel_mux_ctrl
   end
 
   function automatic format_t format_of(registers_t r);
-    return '{version_2: r.wire_version == 2'd1, wide_values: r.ramp > 16'd255, frame_sync: r.frame_sync};
+    return '{
+        version_2: r.wire_version == 2'd1,
+        wide_values: r.mechanoreceptor || r.ramp > 16'd255,
+        frame_sync: r.frame_sync,
+        spikes: r.mechanoreceptor
+    };
   endfunction
 
   // What holds for a step is latched when it starts: its conversion ends when the scan has moved on.
@@ -160,6 +168,7 @@ module taxel_mux_ctrl
       };
       read.ramp          <= active.ramp;
       read.noise_floor   <= active.noise_floor;
+      read.threshold     <= '{rest: active.threshold_rest, jump: active.threshold_jump, decay: active.threshold_decay};
       read.markers       <= committed_markers;
       read.starts        <= committed_starts;
     end

@@ -5,7 +5,7 @@
 module taxel_packer_v1
   import taxel_types::*;
 #(
-    parameter bit VALUED = 1'b1,  // a change is followed by its intensity
+    parameter bit VALUED = 1'b1,  // a change is followed by its intensity, as a spike always is
     parameter int MOST = 280      // words of a datagram
 ) (
     input  logic       clk,
@@ -24,18 +24,21 @@ module taxel_packer_v1
 );
 
   event_t now;
-  logic marker, second, advance, word_over, event_over, known, single, fits, ends, over;
+  logic marker, second, advance, valued, word_over, known, single, fits, ends, over;
+  logic event_over;           // this is an event's last byte
+  logic [1:0] room;           // for an event of two words, of one
+  logic [1:0][8:0] more;      // words with it
   logic [2:0] at;             // which byte of the word
   logic [8:0] words;          // of the datagram, with this event's
   logic [15:0] field;
 
   // Whether the oldest event goes into the datagram too.
-  assign single = oldest.kind == ENTRY_MARKER || !VALUED;
-  assign fits = allowed && oldest.frame == now.frame && words <= 9'(single ? MOST - 1 : MOST - 2);
+  assign single = oldest.kind == ENTRY_MARKER || !(VALUED || oldest.format.spikes);
+  assign fits = allowed && oldest.frame == now.frame && room[single];
 
   assign word_over  = at == 3'd4;
   assign marker     = now.kind == ENTRY_MARKER;
-  assign event_over = word_over && (marker || !VALUED || second);
+  assign valued     = VALUED || now.format.spikes;
   // Once it is known that its frame has no more, that stays so: what waits is not withdrawn.
   assign known      = ready || over || (empty && frame != now.frame);
   assign ends       = !(ready && fits);
@@ -59,8 +62,14 @@ module taxel_packer_v1
 
   always_ff @(posedge clk) begin
     if (empty && frame != now.frame) over <= 1'b1;
+    // They stand long before an event's last byte.
+    for (int k = 0; k < 2; k++) begin
+      room[k] <= words <= 9'(k == 1 ? MOST - 1 : MOST - 2);
+      more[k] <= words + 9'(2 - k);
+    end
     if (advance) begin
-      at <= word_over ? 3'd0 : at + 3'd1;
+      at         <= word_over ? 3'd0 : at + 3'd1;
+      event_over <= at == 3'd3 && (marker || !valued || second);
       if (word_over) second <= !event_over;
       if (event_over) busy <= 1'b0;
     end
@@ -68,12 +77,13 @@ module taxel_packer_v1
       now   <= oldest;
       busy  <= 1'b1;
       over  <= 1'b0;
-      words <= (busy && fits ? words : 9'd0) + (single ? 9'd1 : 9'd2);
+      words <= busy && fits ? more[single] : single ? 9'd1 : 9'd2;
     end
     if (reset) begin
-      busy   <= 1'b0;
-      at     <= '0;
-      second <= 1'b0;
+      busy       <= 1'b0;
+      at         <= '0;
+      second     <= 1'b0;
+      event_over <= 1'b0;
     end
   end
 

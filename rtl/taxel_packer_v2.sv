@@ -9,7 +9,8 @@ module taxel_packer_v2
     parameter bit VALUED = 1'b1,
     parameter bit DIFFERENCE = 1'b0,
     parameter int HOLD_US = 0,          // for how long an event may wait for others
-    parameter int HEARTBEAT_US = 10_000 // between promises that nothing has happened
+    parameter int HEARTBEAT_US = 10_000, // between promises that nothing has happened
+    parameter int MOST = 688             // units of a body: 1376 bytes
 ) (
     input  logic        clk,
     input  logic        reset,
@@ -37,7 +38,6 @@ module taxel_packer_v2
 );
 
   localparam int STRIDE = ROWS > 1 ? $clog2(ROWS) : 0;
-  localparam int MOST = 688;         // units of a body: 1376 bytes
   localparam micros_t LATEST = 48'd32_511;
   localparam micros_t RESTLESS = 48'd100_000;
   localparam micros_t LONGEST = 48'd65_535;
@@ -56,47 +56,57 @@ module taxel_packer_v2
     REPEAT,   // a line's values
     TOTALS,   // the board's totals
     SEND,     // a datagram without events
-    NEXT      // what else an entry asks for
+    NEXT,     // what else an entry asks for
+    AGE       // how long ago things were, and whether that is long
   } state_t;
 
   state_t state, after;
   event_t now;
   format_t format;
-  logic gathered, flag, lost, any, again, late;
+  logic gathered, flag, lost, any, again, late, newer, differs;
+  logic moved, behind, far, far_ahead;  // an event's time and place against those of the one before
+  logic since_long, quiet_long, silent, restless, ripe;
   logic [9:0] units;
-  micros_t base, at, promised, last, since, span, quiet;
+  micros_t base, at, promised, last, since, quiet, since_last, long_ago;
+  logic [15:0] span, since_16, quiet_16;
   logic [6:0] line;
-  logic signed [15:0] position, reached;
-  logic [14:0] gap;
+  logic signed [15:0] position, reached, entry_position, ahead;
+  logic [14:0] gap, gap_ahead;
   logic [31:0] sequence_number;
   logic states, totals_due;
   logic [7:0] row;
-  logic [4:0] word;
+  logic [4:0] word, word_ahead;
+  logic [15:0] total;  // the unit of totals that is next
+  logic words_over, rows_over;
   logic fetching;
 
   // Units that wait to be written, the first in the lowest bits.
   logic [6:0][15:0] waiting;
   logic [2:0] left;
+  logic [7:0] fits;  // whether so many more do
 
-  function automatic logic [47:0] at_most(micros_t t);
-    return t < LONGEST ? t : LONGEST;
+  function automatic logic [15:0] at_most(micros_t t);
+    return t < LONGEST ? t[15:0] : LONGEST[15:0];
   endfunction
 
   assign position = 16'(now.x) << STRIDE | 16'(now.y);
+  assign entry_position = 16'(entry.x) << STRIDE | 16'(entry.y);
+  assign ahead = entry_position - reached - 16'sd1;
   assign taken = state == IDLE && valid;
   assign idle  = state == IDLE && !gathered && !valid && !send && !sending;
   assign row_repeated = row[6:0];
 
   // An event as units.
-  logic narrow, jumps;
+  logic valued, narrow, jumps;
   logic [6:0][15:0] units_of;
   logic [2:0] count_of;
   logic [7:0] value_8;
   logic [15:0] gap_16;
   logic [14:0] rest;
 
-  assign narrow   = VALUED && !format.wide_values;
-  assign jumps   = narrow && gap >= 15'(NEAR);
+  assign valued  = VALUED || format.spikes;
+  assign narrow  = valued && !format.wide_values;
+  assign jumps   = narrow && far;
   assign rest    = jumps ? 15'(gap[5:0]) : gap;
   assign value_8 = now.value > 16'd255 ? 8'd255 : now.value[7:0];
   assign gap_16  = {now.more, rest};
@@ -114,7 +124,7 @@ module taxel_packer_v2
         units_of = {units_of[4:0], 16'(now.at - base), {1'b1, NEAR, 8'd0}};
         count_of = count_of + 3'd2;
       end
-    end else if (VALUED) begin
+    end else if (valued) begin
       units_of[1:0] = {gap_16, now.value};
       count_of = 3'd2;
       if (again) begin
@@ -137,23 +147,11 @@ module taxel_packer_v2
                        16'd0, totals.frames};
 
   logic [3:0] kind;  // of events
-  assign kind = !VALUED ? 4'd0 : narrow ? 4'd1 : 4'd2;
+  assign kind = !valued ? 4'd0 : narrow ? 4'd1 : 4'd2;
 
-  task automatic header(logic [3:0] of_kind, micros_t from, logic [6:0] from_line, logic [15:0] promise,
-                        logic [9:0] length, logic dropped);
-    send     <= 1'b1;
-    datagram <= '{
-        kind: of_kind,
-        frame_sync: format.frame_sync,
-        differences: DIFFERENCE && of_kind < 4'd6,
-        dropped: dropped,
-        sequence_number: sequence_number,
-        base: from,
-        line: from_line,
-        span: promise,
-        units: length,
-        bank: bank
-    };
+  // What a datagram's header says stands before it is known whether the one before has gone.
+  task automatic go();
+    send            <= 1'b1;
     sequence_number <= sequence_number + 32'd1;
     bank            <= !bank;
     units           <= '0;
@@ -165,13 +163,44 @@ module taxel_packer_v2
     states_sent <= 1'b0;
     totals_sent <= 1'b0;
     // Of the clock before: they stand while they are used.
-    since <= now.at - base;
-    quiet <= now.at - promised;
-    late  <= now.at - base > LATEST;
+    since      <= now.at - base;
+    quiet      <= now.at - promised;
+    since_last <= now.at - last;
+    late       <= now.at - base > LATEST;
+    newer      <= now.at > promised;
+    long_ago   <= now.at - LONGEST;
+    // And of two clocks before.
+    since_16   <= at_most(since);
+    since_long <= since > LONGEST;
+    quiet_16   <= at_most(quiet);
+    quiet_long <= quiet > LONGEST;
+    silent     <= quiet >= micros_t'(HEARTBEAT_US);
+    restless   <= any && since_last <= RESTLESS;
+    ripe       <= HOLD_US == 0 || since + micros_t'(length_of(now)) > micros_t'(HOLD_US);
+    for (int k = 0; k < 8; k++) fits[k] <= units <= 10'(MOST - k);
+    rows_over <= 32'(row) == ROWS;
+    place <= units;
+    total <= 16'(all_totals >> (16 * word_ahead));
+    datagram <= '{
+        kind: kind,
+        frame_sync: format.frame_sync,
+        differences: DIFFERENCE && !format.spikes,
+        dropped: lost,
+        sequence_number: sequence_number,
+        base: now.at,
+        line: 7'd0,
+        span: 16'd0,
+        units: units,
+        bank: bank
+    };
     case (state)
       IDLE: begin
         if (valid) begin
           now        <= entry;
+          moved      <= entry.at != at;
+          behind     <= entry_position <= reached;
+          gap_ahead  <= 15'(ahead);
+          far_ahead  <= 15'(ahead) >= 15'(NEAR);
           lost       <= lost || entry.lost;
           states     <= entry.states;
           totals_due <= entry.totals;
@@ -185,21 +214,27 @@ module taxel_packer_v2
         end
       end
       WEIGH: begin
-        again <= gathered && (now.at != at || position <= reached);
-        if (!gathered) gap <= 15'(now.y);
-        else if (now.at != at || position <= reached) gap <= 15'(position);
-        else gap <= 15'(position - reached - 16'sd1);
-        state <= PLACE;
-        if (gathered && now.format != format) begin
-          // What waits has its own format: it is sent first.
-          state <= CLOSE;
-          after <= WEIGH;
-        end else begin
+        again <= gathered && (moved || behind);
+        if (!gathered) begin
+          gap    <= 15'(now.y);
+          far    <= 15'(now.y) >= 15'(NEAR);
           format <= now.format;
+        end else if (moved || behind) begin
+          gap <= 15'(position);
+          far <= 15'(position) >= 15'(NEAR);
+        end else begin
+          gap <= gap_ahead;
+          far <= far_ahead;
         end
+        // What waits has its own format: it is sent first.
+        differs <= now.format != format;
+        state   <= PLACE;
       end
       PLACE: begin
-        if (gathered && (late || units + 10'(count_of) > 10'(MOST))) begin
+        unit    <= units_of[0];
+        waiting <= units_of >> 16;
+        left    <= count_of - 3'd1;
+        if (gathered && (differs || late || !fits[count_of])) begin
           state <= CLOSE;
           after <= WEIGH;
         end else begin
@@ -215,18 +250,13 @@ module taxel_packer_v2
           last    <= now.at;
           any     <= 1'b1;
           write   <= 1'b1;
-          place   <= units;
-          unit    <= units_of[0];
           units   <= units + 10'd1;
-          waiting <= units_of >> 16;
-          left    <= count_of - 3'd1;
           state   <= count_of == 3'd1 ? IDLE : WRITE;
           after   <= IDLE;
         end
       end
       WRITE: begin
         write   <= 1'b1;
-        place   <= units;
         unit    <= waiting[0];
         units   <= units + 10'd1;
         waiting <= waiting >> 16;
@@ -234,39 +264,44 @@ module taxel_packer_v2
         if (left == 3'd1) state <= after;
       end
       OVER: begin
-        // The clock in which `since` and `quiet` are computed.
         after <= NEXT;
-        state <= BEAT;
+        state <= AGE;
       end
+      AGE: state <= BEAT;
       BEAT: begin
         state <= NEXT;
         if (gathered) begin
-          if (now.kind != ENTRY_FRAME || HOLD_US == 0 || since + micros_t'(length_of(now)) > micros_t'(HOLD_US)
-              || states || totals_due) state <= CLOSE;
-        end else if (now.kind == ENTRY_FRAME && now.at > promised
-            && ((any && now.at - last <= RESTLESS) || quiet >= micros_t'(HEARTBEAT_US))) begin
-          base  <= now.at - at_most(quiet);
-          span  <= at_most(quiet);
+          if (now.kind != ENTRY_FRAME || ripe || states || totals_due) state <= CLOSE;
+        end else if (now.kind == ENTRY_FRAME && newer && (restless || silent)) begin
+          base  <= quiet_long ? long_ago : promised;
+          span  <= quiet_16;
           state <= SEND;
         end
       end
       SEND: begin
+        datagram.base <= base;
+        datagram.span <= span;
         if (!sending && !send) begin
-          header(kind, base, 7'd0, 16'(span), 10'd0, lost);
+          go();
           lost     <= 1'b0;
           promised <= now.at;
           state    <= after;
         end
       end
       CLOSE: begin
+        datagram.dropped <= flag;
+        datagram.base    <= base;
+        datagram.line    <= line;
+        datagram.span    <= since_16;
         if (!sending && !send) begin
-          header(kind, base, line, 16'(at_most(since)), units, flag);
+          go();
           gathered <= 1'b0;
-          if (base + at_most(since) > promised) promised <= base + at_most(since);
+          // Of what lies further ahead the empty datagram that follows promises the rest.
+          if (newer) promised <= now.at;
           state <= after;
-          if (since > LONGEST) begin
-            base  <= now.at - LONGEST;
-            span  <= LONGEST;
+          if (since_long) begin
+            base  <= long_ago;
+            span  <= LONGEST[15:0];
             state <= SEND;
           end
         end
@@ -274,6 +309,10 @@ module taxel_packer_v2
       NEXT: begin
         row  <= '0;
         word <= '0;
+        word_ahead <= 5'd1;
+        words_over <= 1'b0;
+        rows_over  <= 1'b0;
+        total      <= all_totals[15:0];
         fetching <= 1'b1;
         if (now.kind == ENTRY_MARKER) begin
           waiting  <= {48'd0, 16'd0, now.more ? 16'd1 : 16'd2, 16'd0, 16'd0};
@@ -291,8 +330,9 @@ module taxel_packer_v2
       end
       BEYOND: begin
         // A marker has been written.
+        datagram.kind <= 4'd3;
         if (!sending && !send) begin
-          header(4'd3, now.at, 7'd0, 16'd0, units, lost);
+          go();
           lost  <= 1'b0;
           state <= IDLE;
         end
@@ -300,9 +340,12 @@ module taxel_packer_v2
       REPEAT: begin
         // A value comes a clock after its row is asked for.
         fetching <= 1'b0;
-        if (32'(row) == ROWS) begin
+        datagram.kind        <= narrow ? 4'd6 : 4'd7;
+        datagram.differences <= 1'b0;
+        datagram.line        <= repeated_line;
+        if (rows_over) begin
           if (!sending && !send) begin
-            header(narrow ? 4'd6 : 4'd7, now.at, repeated_line, 16'd0, units, lost);
+            go();
             lost        <= 1'b0;
             states      <= 1'b0;
             states_sent <= 1'b1;
@@ -319,9 +362,10 @@ module taxel_packer_v2
         end
       end
       default: begin  // TOTALS
-        if (word == 5'd20) begin
+        datagram.kind <= 4'd4;
+        if (words_over) begin
           if (!sending && !send) begin
-            header(4'd4, now.at, 7'd0, 16'd0, units, lost);
+            go();
             lost        <= 1'b0;
             totals_due  <= 1'b0;
             totals_sent <= 1'b1;
@@ -329,10 +373,11 @@ module taxel_packer_v2
           end
         end else begin
           write <= 1'b1;
-          place <= units;
-          unit  <= 16'(all_totals >> (16 * word));
+          unit  <= total;
+          word_ahead <= word_ahead + 5'd1;
           units <= units + 10'd1;
           word  <= word + 5'd1;
+          words_over <= word == 5'd19;
         end
       end
     endcase

@@ -1,29 +1,33 @@
-// The converter's timer, on the fast clock: it raises the ramp, and counts the pairs of samples that are taken meanwhile.
+// The converter's timer, on the fast clock: it raises the ramp, and tells when the first and last of its samples are
+// taken.
 //
 // A tick is half a clock, 1/300 us: the ramp is given, and the comparators are sampled, at both edges. Of each pair the first
 // sample, and the first half of the ramp, is in bit 0. `DELAY` clocks pass from the ramp's pair to the pair of samples that
 // were taken during it.
 module taxel_ramp_counter #(
-    parameter int DELAY = 2
+    parameter int DELAY = 3
 ) (
     input  logic        clk_fast,
     input  logic        reset,
     input  logic        start,   // of the ramp
     input  logic [15:0] length,  // of the ramp, in ticks
     output logic [1:0]  ramp,
+    output logic        nears,   // a clock before `begins`
     output logic        begins,  // a clock before `begun`
     output logic        begun,   // in this clock pair 0 is sampled
     output logic        open,    // the ramp rose in the pair that is sampled, or ended as it began
-    output logic [14:0] pair
+    output logic        closing  // the pair that is sampled next is the last of them
 );
 
-  // Counters count down, and what ends with them is known a clock before, as the clock is fast.
+  // Counters count down, and what ends with them is known clocks before, as the clock is fast.
   logic [14:0] full, ramp_left, pairs, pairs_left;  // pairs of the ramp that are high in both halves
   logic odd;                                        // whether half a pair follows
-  logic rising, ramp_last, pairs_last;
+  logic rising, ramp_last, pairs_last, none, single, one_left;
   logic [DELAY-1:0] delayed;
 
+  assign nears  = delayed[DELAY-2];
   assign begins = delayed[DELAY-1];
+  assign closing = begins ? none : one_left;
   assign full   = length[15:1];
 
   always_ff @(posedge clk_fast) begin
@@ -45,17 +49,18 @@ module taxel_ramp_counter #(
     // The samples of it: up to the one at its end.
     delayed <= {delayed[DELAY-2:0], start};
     if (start) pairs <= full;
-    begun <= begins;
+    none   <= pairs == 15'd0;
+    single <= pairs == 15'd1;
+    begun  <= begins;
+    pairs_last <= closing;
     if (begins) begin
       open       <= 1'b1;
-      pair       <= '0;
       pairs_left <= pairs;
-      pairs_last <= pairs == 15'd0;
+      one_left   <= single;
     end else begin
       if (pairs_last) open <= 1'b0;
-      pair       <= pair + 15'd1;
       pairs_left <= pairs_left - 15'd1;
-      pairs_last <= pairs_left == 15'd1;
+      one_left   <= pairs_left == 15'd2;
     end
     if (reset) begin
       ramp    <= '0;

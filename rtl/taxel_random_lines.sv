@@ -6,7 +6,7 @@
 module taxel_random_lines (
     input  logic       clk,
     input  logic       reset,
-    input  logic       next,    // asks for the next line; it stands in `line` 6 clocks later
+    input  logic       next,    // asks for the next line; it stands in `line` 7 clocks later
     input  logic       first,   // which is the first of a frame
     input  logic       random,
     input  logic [7:0] lines,   // of the frame, less one
@@ -24,18 +24,23 @@ module taxel_random_lines (
   logic [127:0] swapped;  // where the order differs from the line's own number
   logic [15:0] word;
   logic [23:0] product;
-  logic [6:0] k, place, at_place, at_k;
-  logic [4:0] stage;
+  logic [6:0] k, place, of_place, of_k, at_place, at_k;
+  logic swapped_place, swapped_k;
+  logic [5:0] stage;
   logic shuffles;
   logic [7:0] left;  // places from k on
 
   always_ff @(posedge clk) begin
-    stage   <= {stage[3:0], next};
+    stage   <= {stage[4:0], next};
     left    <= lines + 8'd1 - 8'(k);
     product <= 24'(word) * 24'(left);
     place   <= shuffles ? k + 7'(product[23:16]) : k;
-    at_place <= swapped[place] ? places[place] : place;
-    at_k     <= swapped[k] ? places[k] : k;
+    of_place      <= places[place];
+    of_k          <= places[k];
+    swapped_place <= swapped[place];
+    swapped_k     <= swapped[k];
+    at_place      <= swapped_place ? of_place : place;
+    at_k          <= swapped_k ? of_k : k;
     if (next) begin
       k <= first ? 7'd0 : k + 7'd1;
       if (first) swapped <= '0;
@@ -44,9 +49,9 @@ module taxel_random_lines (
       // In the meantime k stands; the last line of a frame has no choice.
       shuffles <= random && 8'(k) != lines;
     end
-    if (stage[3] && shuffles) swapped[place] <= 1'b1;
-    if (stage[4] && shuffles) places[place] <= at_k;
-    if (stage[4]) line <= at_place;
+    if (stage[4] && shuffles) swapped[place] <= 1'b1;
+    if (stage[5] && shuffles) places[place] <= at_k;
+    if (stage[5]) line <= at_place;
     if (reset) begin
       word  <= 16'hACE1;
       stage <= '0;

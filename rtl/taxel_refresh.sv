@@ -18,18 +18,20 @@ module taxel_refresh #(
   end else begin : g_every
     localparam int BITS = $clog2(EVERY + 257);
 
-    logic [BITS-1:0] since_line, since_totals, line_next, totals_next, line_start, totals_start;
+    logic [BITS-1:0] since_line, since_totals, line_next, totals_next;
+    logic line_over, totals_over;
 
-    assign line_start   = zero ? '0 : since_line;
-    assign totals_start = zero ? '0 : since_totals;
-    assign line_next    = line_start + BITS'(lines) + BITS'(1);
-    assign totals_next  = totals_start + BITS'(1);
+    assign line_next   = since_line + BITS'(lines) + BITS'(1);
+    assign totals_next = since_totals + BITS'(1);
+    assign line_over   = line_next >= BITS'(EVERY);
+    assign totals_over = totals_next >= BITS'(EVERY);
 
+    // As if since 0 at time 0, when nothing is due: EVERY is more than the lines.
     always_ff @(posedge clk) begin
-      since_line   <= line_next >= BITS'(EVERY) ? line_next - BITS'(EVERY) : line_next;
-      since_totals <= totals_next >= BITS'(EVERY) ? totals_next - BITS'(EVERY) : totals_next;
-      line_due     <= (line_due && !frame_start) || line_next >= BITS'(EVERY);
-      totals_due   <= (totals_due && !frame_start) || totals_next >= BITS'(EVERY);
+      since_line   <= zero ? BITS'(lines) + BITS'(1) : line_over ? line_next - BITS'(EVERY) : line_next;
+      since_totals <= zero ? BITS'(1) : totals_over ? totals_next - BITS'(EVERY) : totals_next;
+      line_due     <= (line_due && !frame_start) || (line_over && !zero);
+      totals_due   <= (totals_due && !frame_start) || (totals_over && !zero);
     end
   end
 

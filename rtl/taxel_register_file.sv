@@ -35,7 +35,7 @@ module taxel_register_file
   logic reserved;
   logic [RULES-1:0] which;
   logic [3:0] rule;
-  logic reads, greets, totals, lacks;
+  logic reads, greets, totals;
 
   logic writes, marks;
   // REG6 has no field, so a read changes nothing.
@@ -57,9 +57,8 @@ module taxel_register_file
     // What is wrong with them; which of that comes first.
     judged  <= begun;
     which   <= broken(changed, STEPS, COLUMNS, ROWS, CHANNELS);
-    lacks   <= reserved || changed.mechanoreceptor;  // this build has no FA-1
     checked <= judged;
-    rule    <= lacks ? 4'd4 : refused(which);
+    rule    <= reserved ? 4'd4 : refused(which);
     // The answer.
     answer            <= checked;
     answered.number <= n;

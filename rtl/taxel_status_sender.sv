@@ -29,16 +29,18 @@ module taxel_status_sender
   logic [2:0] differs;  // from what was given, a clock ago
   assign counts = '{lost, faults, commands};
 
-  typedef enum logic [1:0] {
+  typedef enum logic [2:0] {
     IDLE,
     DIGITS,   // a count becomes digits, a bit a clock
-    LETTER,   // a character is looked up
+    LOOK,     // a character is looked up for each kind of line
+    LETTER,   // that of this kind is taken
     SENDING   // and waits for the serial line
   } state_t;
 
   state_t state;
   logic counting;        // the line is of counts
   logic greeted;
+  logic waits;           // an answer does, since a clock
   logic [2:0] part;      // a name and a count
   logic [2:0] look;      // which faults are still to be looked at
   answer_t line;
@@ -62,86 +64,87 @@ module taxel_status_sender
   endfunction
 
   // A number of at most three digits, of the array or its channels: its digits from the left.
-  function automatic logic [7:0] numeral(int number, logic [5:0] k);
-    int digits_of;
-    digits_of = number >= 100 ? 3 : number >= 10 ? 2 : 1;
-    if (32'(k) >= digits_of) return 8'd0;
-    case (digits_of - 1 - 32'(k))
-      0: return 8'h30 + 8'(number % 10);
-      1: return 8'h30 + 8'(number / 10 % 10);
-      default: return 8'h30 + 8'(number / 100);
-    endcase
+  function automatic logic [23:0] numerals(int number);
+    logic [23:0] three;
+    three = {8'h30 + 8'(number / 100), 8'h30 + 8'(number / 10 % 10), 8'h30 + 8'(number % 10)};
+    return number >= 100 ? three : number >= 10 ? three << 8 : three << 16;
   endfunction
 
   // The characters of each line; 0 is none, and is left out.
-  localparam logic [0:12][7:0] BOARD = "taxel-board v";
-  localparam logic [0:2][7:0] OK = "ok ";
-  localparam logic [0:3][7:0] BAD = "bad ";
-  localparam logic [0:2][7:0] REG = "REG";
-  localparam logic [0:5][7:0] RULE = " rule ";
   localparam int NAME = 17;
   localparam logic [0:7][0:NAME-1][7:0] NAMES = {
     {"fault queue ", 40'd0}, "fault comparator ", {"fault command ", 24'd0},
     {"status frames=", 24'd0}, {" events=", 72'd0}, {" dropped=", 64'd0}, {" datagrams=", 48'd0}, {" faults=", 72'd0}
   };
-  logic [7:0] character, letter;
-  logic last, letter_last;
-  logic zeros;  // only zeros so far
+  typedef struct packed {
+    logic last;
+    logic [7:0] character;
+  } symbol_t;
+
+  localparam symbol_t END = '{last: 1'b1, character: 8'h0A};
+
+  function automatic symbol_t plain(logic [7:0] character);
+    return '{last: 1'b0, character: character};
+  endfunction
+
+  typedef symbol_t [0:63] text_t;
+
+  // A text of so many characters, which its end follows.
+  function automatic text_t ended(logic [0:31][7:0] characters, int length);
+    text_t text;
+    for (int k = 0; k < 64; k++) text[k] = k < length ? plain(characters[k[4:0]]) : END;
+    return text;
+  endfunction
+
+  // The texts of a greeting and of answers: what differs from line to line is put in where 0 stands.
+  localparam text_t GREETING = ended({"taxel-board v", 8'd0, " ", numerals(ROWS), "x", numerals(COLUMNS), " ",
+                                      numerals(CHANNELS), "ch", 32'd0}, 28);
+  localparam text_t OK = ended({"ok REG", 8'd0, "=0x", 176'd0}, 18);
+  localparam text_t BAD = ended({"bad REG", 8'd0, " rule ", 144'd0}, 15);
+
+  symbol_t of_counts, of_greeting, of_ok, of_bad, symbol;
+  logic [7:0] letter;
+  logic letter_last;
+  logic zeros;    // only zeros so far
+  logic further;  // a count of the line follows
+
+  always_ff @(posedge clk) begin
+    if (at < 6'(NAME)) of_counts <= plain(NAMES[part][5'(at)]);
+    else if (at == 6'(NAME + COUNT_DIGITS)) of_counts <= END;
+    else if (digits[COUNT_DIGITS-1] != 0 || !zeros || at == 6'(NAME + COUNT_DIGITS - 1))
+      of_counts <= plain(hex(digits[COUNT_DIGITS-1]));
+    else of_counts <= plain(8'd0);
+
+    of_greeting <= GREETING[at];
+    if (at == 6'd13) of_greeting.character <= 8'h31 + 8'(version);
+
+    of_ok <= OK[at];
+    if (at == 6'd6) of_ok.character <= hex({1'b0, line.number});
+    else if (at >= 6'd10 && at < 6'd18) of_ok.character <= hex(line.value[31:28]);
+
+    of_bad <= BAD[at];
+    if (at == 6'd7) of_bad.character <= hex({1'b0, line.number});
+    else if (at == 6'd14) of_bad.character <= hex(line.value[3:0]);
+  end
 
   always_comb begin
-    character = 8'd0;
-    last = 1'b0;
-    if (counting) begin
-      if (at < 6'(NAME)) character = NAMES[part][5'(at)];
-      else if (at < 6'(NAME + COUNT_DIGITS)) begin
-        if (digits[COUNT_DIGITS-1] != 0 || !zeros || at == 6'(NAME + COUNT_DIGITS - 1))
-          character = hex(digits[COUNT_DIGITS-1]);
-      end else last = 1'b1;
-    end else begin
-      case (line.kind)
-        ANSWER_GREETING: begin
-          if (at < 6'd13) character = BOARD[at[3:0]];
-          else if (at == 6'd13) character = 8'h31 + 8'(version);
-          else if (at == 6'd14) character = " ";
-          else if (at < 6'd18) character = numeral(ROWS, at - 6'd15);
-          else if (at == 6'd18) character = "x";
-          else if (at < 6'd22) character = numeral(COLUMNS, at - 6'd19);
-          else if (at == 6'd22) character = " ";
-          else if (at < 6'd26) character = numeral(CHANNELS, at - 6'd23);
-          else if (at == 6'd26) character = "c";
-          else if (at == 6'd27) character = "h";
-          else last = 1'b1;
-        end
-        ANSWER_OK: begin
-          if (at < 6'd3) character = OK[at[1:0]];
-          else if (at < 6'd6) character = REG[2'(at - 6'd3)];
-          else if (at == 6'd6) character = hex({1'b0, line.number});
-          else if (at == 6'd7) character = "=";
-          else if (at == 6'd8) character = "0";
-          else if (at == 6'd9) character = "x";
-          else if (at < 6'd18) character = hex(line.value[31:28]);
-          else last = 1'b1;
-        end
-        default: begin
-          if (at < 6'd4) character = BAD[at[1:0]];
-          else if (at < 6'd7) character = REG[2'(at - 6'd4)];
-          else if (at == 6'd7) character = hex({1'b0, line.number});
-          else if (at < 6'd14) character = RULE[3'(at - 6'd8)];
-          else if (at == 6'd14) character = hex(line.value[3:0]);
-          else last = 1'b1;
-        end
-      endcase
-    end
-    if (last) character = 8'h0A;
+    case (line.kind)
+      ANSWER_GREETING: symbol = of_greeting;
+      ANSWER_OK: symbol = of_ok;
+      default: symbol = of_bad;
+    endcase
+    if (counting) symbol = of_counts;
   end
 
   assign valid = state == SENDING && letter != 8'd0;
   assign data  = letter;
-  assign pop   = state == IDLE && greeted && ready;
+  assign pop   = state == IDLE && greeted && waits;
 
   always_ff @(posedge clk) begin
+    waits <= ready;  // it is not popped before many clocks later
     if (look_again) look <= 3'b111;
     for (int k = 0; k < 3; k++) differs[k] <= counts[k] != given[k];
+    further <= part >= 3'd3 && part != 3'd7;
     case (state)
       IDLE: begin
         at        <= '0;
@@ -150,10 +153,10 @@ module taxel_status_sender
         if (!greeted) begin
           greeted   <= 1'b1;
           line.kind <= ANSWER_GREETING;
-          state     <= LETTER;
-        end else if (ready) begin
+          state     <= LOOK;
+        end else if (waits) begin
           line  <= oldest;
-          state <= LETTER;
+          state <= LOOK;
           if (oldest.kind == ANSWER_STATUS) begin
             counting     <= 1'b1;
             part         <= 3'd3;
@@ -179,25 +182,26 @@ module taxel_status_sender
         digits    <= doubled(bits_left == 6'(COUNT_BITS) ? '0 : digits, bits[COUNT_BITS-1]);
         bits      <= bits << 1;
         bits_left <= bits_left - 6'd1;
-        if (bits_left == 6'd1) state <= LETTER;
+        if (bits_left == 6'd1) state <= LOOK;
       end
+      LOOK: state <= LETTER;
       LETTER: begin
-        letter      <= character;
-        letter_last <= last;
+        letter      <= symbol.character;
+        letter_last <= symbol.last;
         state       <= SENDING;
-        if (counting && last && part >= 3'd3 && part != 3'd7) begin
+        if (counting && symbol.last && further) begin
           // The line's next count.
           at           <= '0;
           bits_left    <= 6'(COUNT_BITS);
           part         <= part + 3'd1;
-          {bits, rest} <= {rest, count_t'(0)};
+          {bits, rest} <= {rest, rest[0]};
           state        <= DIGITS;
         end
       end
       default: begin
         if (taken || letter == 8'd0) begin
           at    <= at + 6'd1;
-          state <= letter_last ? IDLE : LETTER;
+          state <= letter_last ? IDLE : LOOK;
           if (!counting && line.kind == ANSWER_OK && at >= 6'd10) line.value <= line.value << 4;
           if (counting && at >= 6'(NAME)) begin
             if (letter != 8'd0) zeros <= 1'b0;

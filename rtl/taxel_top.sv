@@ -162,7 +162,7 @@ module taxel_top
 
   // Datagrams: each version waits until the other one's have gone.
   logic pop_v1, pop_v2, busy_v1, sorted, entry_taken, idle_sorter, idle_v2, tvalid_v1, tvalid_v2, tlast_v1, tlast_v2;
-  logic write, bank, send, sending, leaving;
+  logic write, bank, send, sending, leaving, room_link;
   logic [7:0] tdata_v1, tdata_v2;
   logic [9:0] place;
   logic [15:0] unit;
@@ -171,13 +171,19 @@ module taxel_top
 
   assign pop     = pop_v1 || pop_v2;
   assign leaving = ready && !oldest.format.version_2;
-  assign tdata   = busy_v1 ? tdata_v1 : tdata_v2;
-  assign tvalid  = tvalid_v1 || tvalid_v2;
-  assign tlast   = busy_v1 ? tlast_v1 : tlast_v2;
+
+  logic of_v1;  // nothing of version 2 is gathered, waits or leaves: known a clock later, in which no event can follow
+  always_ff @(posedge clk) of_v1 <= idle_sorter && idle_v2;
+
+  taxel_stream_register #(.BITS(9)) link (
+      .clk, .reset, .valid_in(tvalid_v1 || tvalid_v2), .ready_in(room_link),
+      .data_in(busy_v1 ? {tlast_v1, tdata_v1} : {tlast_v2, tdata_v2}),
+      .valid_out(tvalid), .ready_out(tready), .data_out({tlast, tdata})
+  );
 
   taxel_packer_v1 #(.VALUED(VALUED)) packer_v1 (
-      .clk, .reset, .ready, .oldest, .allowed(leaving && idle_sorter && idle_v2), .busy(busy_v1), .pop(pop_v1), .empty,
-      .frame, .tdata(tdata_v1), .tvalid(tvalid_v1), .tready, .tlast(tlast_v1)
+      .clk, .reset, .ready, .oldest, .allowed(leaving && of_v1), .busy(busy_v1), .pop(pop_v1), .empty,
+      .frame, .tdata(tdata_v1), .tvalid(tvalid_v1), .tready(room_link), .tlast(tlast_v1)
   );
 
   taxel_line_sorter #(.ROWS(ROWS)) sorter (
@@ -199,7 +205,7 @@ module taxel_top
 
   taxel_datagram_sender #(.ROWS(ROWS), .BOARD(16'(BOARD))) sender (
       .clk, .reset, .session, .write, .bank, .place, .unit, .send, .datagram, .sending,
-      .tdata(tdata_v2), .tvalid(tvalid_v2), .tready, .tlast(tlast_v2)
+      .tdata(tdata_v2), .tvalid(tvalid_v2), .tready(room_link), .tlast(tlast_v2)
   );
 
   // Status lines.

@@ -7,12 +7,21 @@ package taxel_types;
   // Time since time 0, us: as many bits as the base time of a datagram of version 2 has.
   typedef logic [47:0] micros_t;
 
-  // How events of a frame are sent: the version of the wire, whether values may exceed 255, whether all carry the frame's time.
+  // How events of a frame are sent: the version of the wire, whether values may exceed 255, whether all carry the frame's time,
+  // whether they are spikes.
   typedef struct packed {
     logic version_2;
     logic wide_values;
     logic frame_sync;
+    logic spikes;
   } format_t;
+
+  // What an afferent's threshold moves by.
+  typedef struct packed {
+    logic [15:0] rest;   // 1/1024
+    logic [15:0] jump;   // 1/256 of it
+    logic [7:0]  decay;  // 1/1024 of it
+  } threshold_t;
 
   // What a frame's start says of the frame that ends there.
   typedef struct packed {
@@ -38,6 +47,7 @@ package taxel_types;
     ended_t      ended;          // the frame before
     logic [15:0] ramp;           // ticks
     logic [7:0]  noise_floor;    // ticks
+    threshold_t  threshold;      // of afferents
     logic [2:0]  markers;        // how many go before this frame
     logic [MARKERS-1:0] starts;  // what they mark, the oldest in bit 0: a start of a recording, or a stop
   } read_t;
@@ -69,12 +79,31 @@ package taxel_types;
     return {e.x, e.y, e.more, e.value};
   endfunction
 
-  // CRC-32C (of reflected bits) with one more byte.
-  function automatic logic [31:0] crc_32c(logic [31:0] crc, logic [7:0] data);
+  // What a byte becomes in a CRC of reflected bits.
+  function automatic logic [31:0] crc_of_byte(logic [31:0] polynomial, logic [7:0] data);
     logic [31:0] c;
-    c = crc ^ 32'(data);
-    for (int k = 0; k < 8; k++) c = c[0] ? (c >> 1) ^ 32'h82F63B78 : c >> 1;
+    c = 32'(data);
+    for (int k = 0; k < 8; k++) c = c[0] ? (c >> 1) ^ polynomial : c >> 1;
     return c;
+  endfunction
+
+  // A CRC with one more byte: the sum of what its bits become, each of which is a constant.
+  function automatic logic [31:0] crc_reflected(logic [31:0] polynomial, logic [31:0] crc, logic [7:0] data);
+    logic [31:0] c;
+    logic [7:0] x;
+    c = crc >> 8;
+    x = crc[7:0] ^ data;
+    for (int k = 0; k < 8; k++) c ^= {32{x[k]}} & crc_of_byte(polynomial, 8'(1 << k));
+    return c;
+  endfunction
+
+  // Of datagrams of version 2: CRC-32C; of Ethernet's frames: CRC-32.
+  function automatic logic [31:0] crc_32c(logic [31:0] crc, logic [7:0] data);
+    return crc_reflected(32'h82F63B78, crc, data);
+  endfunction
+
+  function automatic logic [31:0] crc_32(logic [31:0] crc, logic [7:0] data);
+    return crc_reflected(32'hEDB88320, crc, data);
   endfunction
 
   // A datagram of version 2 without its body.

@@ -1,7 +1,9 @@
 """Settings of all tests: random examples are the same each time, and a slow machine is no failure."""
 
 import signal
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("taxel", deadline=None, derandomize=True)
@@ -12,3 +14,11 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 #: Scripts that made kept data or that other programs run: not tests, and they need packages that are not installed.
 collect_ignore_glob = ["data/*", "simulate/press_by_*.py"]
+
+
+@pytest.fixture(autouse=True, scope="session")
+def no_progress_on_a_slow_machine() -> Iterator[None]:
+    """Let commands run long before a line of progress, which tests of stderr do not expect."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("taxel.cli._recordings._SAY_S", (600.0,))
+        yield

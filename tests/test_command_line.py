@@ -14,6 +14,7 @@ import pytest
 from shell import call
 
 import taxel
+from taxel.cli._added import ADDED, OWN
 from taxel.live import send
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -47,10 +48,14 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("record", "--array", "8", "a.mcap"), "--array 8: must be rows x columns, as 64x64"),
         (
             ("record", "--port", "70000", "a.mcap"),
-            "--port: must be less than or equal to 65535; see taxel record --help",
+            "--port 70000: must be less than or equal to 65535; see taxel record --help",
         ),
-        (("record", "--port", "x", "a.mcap"), "--port: must be a whole number; see taxel record --help"),
-        (("record", "--seconds", "x", "a.mcap"), "--seconds: must be a number; see taxel record --help"),
+        (("record", "--port", "x", "a.mcap"), "--port x: must be a whole number; see taxel record --help"),
+        (("record", "--seconds", "x", "a.mcap"), "--seconds x: must be a number; see taxel record --help"),
+        (("record", "--port=", "a.mcap"), "--port '': must be a whole number; see taxel record --help"),
+        (("record", "--port"), "--port: needs a value; see taxel"),
+        (("demo", "--scenes", "-3"), "--scenes -3: must be greater than or equal to 1; see taxel demo --help"),
+        (("cut", "walk.npz", "-o", "b.npz", "--from", "40000000.5", "--to", "2"), "--from 40000000.5 --to 2: the part"),
         (("record", "--port", "0", "nowhere/a.mcap"), "nowhere: no such folder"),
         (("emulate", "--truth", "nowhere/x.csv"), "nowhere: no such folder"),
         (("emulate", "--speed", "2"), "--speed without --replay"),
@@ -195,3 +200,33 @@ def _maps(pid: int) -> str:
         return Path(f"/proc/{pid}/maps").read_text()
     except OSError:
         return ""
+
+
+def test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work(capsys) -> None:
+    code, out, _ = call(capsys, "--help")
+    lines = dict(line.split(maxsplit=1) for line in out.partition("Commands:\n")[2].splitlines())
+    assert code == 0
+    assert {*lines} == {*OWN, *ADDED}
+    assert {name: text for name, text in lines.items() if len(text) > 60 or not text.endswith(".")} == {}
+    order = [*lines]
+    way = ("record", "info", "train", "detect", "bench")
+    assert sorted(way, key=order.index) == [*way]
+    assert "..." not in call(capsys, "device", "--help")[1].partition("Commands:")[2]
+
+
+def test_labels_of_a_recording_that_is_not_there_are_left_out_with_one_warning(here: Path, capsys) -> None:
+    taxel.detect.PlainRule("area", 3).save("rule.json")
+    command = ("detect", "walk.npz", "--readout", "rule.json", "--tare", "0.1", "--truth", "labels.csv")
+    for names, said in (
+        (("walk", "walk"), None),
+        (("walk", "wlak", "wlak"), "left out 2 events of wlak, which is not here; there is walk.npz"),
+        (
+            ("walk", *(f"a{k}" for k in range(7))),
+            "left out 7 events of a0, a1, a2, a3, a4 and 2 more, which are not here",
+        ),
+    ):
+        Path("labels.csv").write_text("recording,label,t_us\n" + "".join(f"{name},contact,500000\n" for name in names))
+        code, _, error = call(capsys, *command)
+        assert code == 0
+        assert error.count("left out") == (said is not None), error
+        assert said is None or said in error

@@ -76,7 +76,7 @@ class Shell:
         self.folder, self.port = folder, free_port()
 
     def arguments(self, line: str) -> list[str]:
-        words = shlex.split(line.replace("--port 5208", f"--port {self.port}"))[1:]
+        words = shlex.split(line.replace("--port 5208", f"--port {self.port}"), comments=True)[1:]
         here = ["--host", LOOPBACK] if words[0] in ("record", "live") else []
         return [sys.executable, "-m", "taxel", *words, *here]
 

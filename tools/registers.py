@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from registers_source import OPERATOR, Table, parsed, read
+from registers_source import OPERATOR, Table, parsed, power_law, read
 
 HEAD = "Made from registers.toml by tools/registers.py (`make registers`): edit that."
 OPPOSITE = {ast.LtE: ">", ast.Lt: ">=", ast.GtE: "<", ast.Gt: "<=", ast.Eq: "!=", ast.NotEq: "=="}
@@ -136,12 +136,6 @@ def rust_values(source: Table, *, warns: bool) -> str:
         origin = f"registers.{name}" if name in fields else f"scanned.{name}"
         lines.append(f"    let {name} = i64::from({origin});")
     return "\n".join(lines)
-
-
-def power_law(source: Table) -> list[int]:
-    """Return ticks to the power of alpha, rounded, in fixed point."""
-    law = source["power_law"]
-    return [round(tick ** law["exponent"] * 2 ** law["fraction_bits"]) for tick in range(law["entries"])]
 
 
 def rust_field(f: Table) -> str:
@@ -469,8 +463,9 @@ writing 8 makes the board identify itself as at reset. Writing 9 requests its to
 ## Rules
 
 The logic, the emulated board and the host check these rules before a write; a write that breaks one changes nothing. `steps` is the number of
-multiplexer steps for each line, `driven_lines` and `sense_lines` are the array's columns and rows. Rule 4 also says that every value is
-within its range.
+multiplexer steps for each line: the array's rows, at least 64, divided by the channels and rounded up; `driven_lines` and `sense_lines` are the
+array's columns and rows. Rule 4 also says that every value is within its range and reserved bits are 0. A refusal names the first
+broken rule: rule 4 is checked first, the others follow in the order of their numbers.
 
 | rule | if broken | what must hold |
 |---|---|---|
@@ -482,17 +477,20 @@ within its range.
 |---|{"---|" * (len(keys) + 2)}
 {newline.join(presets)}
 
-A board of up to 64 lines resets to the first preset. A larger one resets to wire version 2 and *128 x 128, 1 kHz*, or with 16 channels to
-*128 x 128, 1.3 kHz*, with lines and steps fitted to the array. *wire* is the version of a board that starts with the preset. Applying a preset
-to a running board by its name (`taxel device apply`, the panel) changes neither its version nor its channels, which are fixed in hardware.
+A board of up to 64 lines resets to the first preset of as many channels (*5.2 kHz* or *20.8 kHz*), with the lines of its array. A larger
+one resets to wire version 2 and *128 x 128, 1 kHz*, or with 16 channels to *128 x 128, 1.3 kHz*, with the lines of its array, and line
+times no shorter than its steps. *wire* is the version of a board that starts with the preset. Applying a preset to a running board by
+its name (`taxel device apply`, the panel) changes neither its version nor its channels, which are fixed in hardware.
 
 ## FA-1 on the board
 
 With `mechanoreceptor` set each taxel is the FA-1 afferent of 5.4.2, in whole numbers of 2^-{law["fraction_bits"]}. The compression 5.1
 is a table of {law["entries"]} entries, `round(ticks ** {law["exponent"]} * 2 ** {law["fraction_bits"]})`; larger values use the
 last entry. theta_0 is `threshold_rest` 1/1024; a spike raises the threshold by `threshold_jump * theta_0 / 256`, a quiet frame lowers
-it by `threshold_decay * theta_0 / 1024` while it lies above theta_0, else sets it to theta_0; both are rounded down. The first
-frame in this mode counts as the state at all earlier times, so it has no event. An event is a spike: `Pol` is its sign, the intensity word the size of the
+it by `threshold_decay * theta_0 / 1024` while it lies above theta_0, else sets it to theta_0; both are rounded down. The integral is the
+compressed value less that at the taxel's last spike; a spike fires where its size exceeds the threshold. A taxel's first
+frame in this mode in which its comparator had returned counts as the state at all earlier times, so it has no event. A frame in which it
+had not returned changes nothing. An event is a spike: `Pol` is its sign, the intensity word the size of the
 integral in 1/1024, 65535 at most. If the queue is full, the spike is dropped and counted, and the afferent is
 reset as after any spike.
 """

@@ -25,6 +25,12 @@ def read(path: Path) -> Table:
     return source
 
 
+def power_law(source: Table) -> list[int]:
+    """Return ticks to the power of alpha, rounded, in fixed point."""
+    law = source["power_law"]
+    return [round(tick ** law["exponent"] * 2 ** law["fraction_bits"]) for tick in range(law["entries"])]
+
+
 def parsed(text: str) -> ast.expr:
     """Read one expression."""
     return ast.parse(text, mode="eval").body

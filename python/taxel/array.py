@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, number, numbers, shown, text, whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 
 __all__ = ["Array", "Places"]
 
-#: The pitch, mm, that a file states where nobody knew it, from before a pitch could be unknown.
+#: The pitch, mm, that a file states where it was unknown, from before a pitch could be unknown.
 _UNKNOWN_MM = 1.0
 
 
@@ -136,7 +137,7 @@ class Array:
     >>> Array(48, 32, pitch_mm=(7.62, 5.08), name="plate")
     Array(plate: 48 rows x 32 columns, 1536 taxels, rows 7.62 mm and columns 5.08 mm apart)
     >>> Array(1, 8, name="foot")
-    Array(foot: 1 rows x 8 columns, 8 taxels, of unknown pitch)
+    Array(foot: 1 row x 8 columns, 8 taxels, of unknown pitch)
     """
 
     rows: int
@@ -182,6 +183,11 @@ class Array:
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
         return self.rows, self.columns
+
+    @property
+    def _has_neighbours(self) -> bool:
+        """Whether taxels are known to lie side by side: a single row or column without a pitch is channels."""
+        return self.pitch_mm is not None or 1 not in self.shape or self.shape == (1, 1)
 
     @property
     def taxels(self) -> int:
@@ -362,8 +368,13 @@ class Array:
         if not known or (self.pitch_mm, self.places) == (other.pitch_mm, other.places):
             return False
         own, its = self._apart(), other._apart()
-        differ = f"its taxels {its}, not {own}" if own != its else "its taxels at other places"
-        warnings.warn(f"{what}: {other.name} has {differ} as {self.name}", stacklevel=stacklevel + 1)
+        if own != its:
+            differ = f"{other.name} has its taxels {its}, {self.name} {own}"
+        elif other.name == self.name:
+            differ = f"two sensors named {self.name} have their taxels at different places"
+        else:
+            differ = f"{other.name} has its taxels at other places than {self.name}"
+        warnings.warn(f"{what}: {differ}", stacklevel=stacklevel + 1)
         return True
 
     def _part(self, x: slice, y: slice) -> Array:
@@ -441,7 +452,7 @@ class Array:
         return hash((self.rows, self.columns, self.pitch_mm, self.name))
 
     def __repr__(self) -> str:
-        size = f"{self.rows} rows x {self.columns} columns, {self.taxels} taxels"
+        size = f"{counted(self.rows, 'row')} x {counted(self.columns, 'column')}, {counted(self.taxels, 'taxel')}"
         return f"Array({self.name}: {size}, {self._apart()})"
 
 

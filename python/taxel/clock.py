@@ -15,32 +15,19 @@ from taxel._core import ProblemError
 
 __all__ = ["Clock", "doubt"]
 
-#: Reading: no two clocks differ by more (crystals by 0.01 %, the worst oscillators by 1 %) ...
-DRIFT_PPM = 10_000.0
-#: ... and no datagram on a local network is later than this, us.
-DELAY_US = 1_000_000.0
 
-
-def doubt(drift_ppm: float, delay_us: float) -> str | None:
-    """Return why a drift between two clocks, or a delay of datagrams, cannot be; None if they can.
+def doubt(drift_ppm: float, delay_us: float, median_us: float = 0.0) -> str | None:
+    """Return why a drift between two clocks, or delays, cannot be, with the likely cause; None if they can.
 
     Parameters
     ----------
     drift_ppm : float, parts per million
     delay_us : float, us
         That of 99 in 100 datagrams at most.
+    median_us : float, us
+        That of one in two at most.
     """
-    wrong = []
-    if abs(drift_ppm) > DRIFT_PPM:
-        wrong.append(f"a drift of {drift_ppm:+.0f} ppm (clocks differ by less than {DRIFT_PPM:.0f})")
-    if delay_us > DELAY_US:
-        wrong.append(f"a delay of {delay_us / 1e6:.1f} s")
-    if not wrong:
-        return None
-    return (
-        f"{' and '.join(wrong)} cannot be: the sender did not keep pace with its own clock, as an emulator on a busy "
-        "machine does, or paused; its times hold, but not when they were on this computer's clock"
-    )
+    return _core.clock_doubt(drift_ppm, delay_us, median_us)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,6 +67,11 @@ class Clock:
         of = [lines[0], *lines, lines[-1]]
         host = [_at(line, place) for line, place in zip(of, places, strict=True)]
         return np.array(places, np.int64), np.array(host, np.int64)
+
+    @cached_property
+    def _arrived(self) -> NDArray[np.int64]:
+        """Arrival times in order, which a step of the host's clock back may have broken."""
+        return np.maximum.accumulate(self.arrived_ns)
 
     @property
     def drift_ppm(self) -> float:
@@ -155,6 +147,20 @@ class Clock:
             # Each iteration multiplies the error by the drift, 1e-4 or less.
             t = t + np.rint((target - self.host_ns(t)) / 1000.0).astype(np.int64)
         return t if np.ndim(target) else int(t)
+
+    def _about_us(self, host_ns: int) -> int:
+        """Return the source's time at a time of the host, between the arrivals beside it.
+
+        Late by the delays of these two, but right to that where no line fits, as of a sender that is too busy for its
+        own clock.
+        """
+        own, arrived = self.board_us, self._arrived
+        k = int(np.searchsorted(arrived, host_ns))
+        if 0 < k < len(own):
+            before, after = int(arrived[k - 1]), int(arrived[k])
+            return int(own[k - 1]) + (int(own[k] - own[k - 1]) * (host_ns - before)) // max(after - before, 1)
+        edge = 0 if k == 0 else len(own) - 1
+        return int(own[edge]) + (host_ns - int(arrived[edge])) // 1000
 
     @property
     def delay_us(self) -> NDArray[np.float64]:

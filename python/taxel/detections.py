@@ -43,7 +43,8 @@ class Detection(NamedTuple):
     known : int, us
         Earliest time of detection: the end of the board's frame in which the potential crosses the threshold.
     slope : float, mV/ms
-        Slope of the potential at its threshold, a measure of certainty; NaN if unknown.
+        Slope of the potential as it comes to the threshold; on a grid its mean over the last step. The steeper,
+        the less noise moves `t`. NaN if unknown.
     said : int, us, optional
         Time of the report, by the host's clock less the estimated offset between the clocks.
     said_ns : int, ns since 1970, optional
@@ -84,8 +85,8 @@ class Detections(Columns):
     known : int64, shape (n,), us
         Earliest time of detection: the end of the frame in which the potential crosses the threshold.
     slope : float, shape (n,), mV/ms, optional
-        Slope of the potential at its threshold, a measure of certainty; None for a detection without one, which reads
-        back as NaN. Default: NaN for all.
+        Slope of the potential, as in `Detection`; None for a detection without one, which reads back as NaN. Default:
+        NaN for all.
     said : int64, shape (n,), us, optional
         Time of the report, by the host's clock less the estimated offset.
     repaired : bool, shape (n,), optional

@@ -222,9 +222,9 @@ class Cable:
         >>> import os, pty, threading
         >>> from taxel.simulate import Board
         >>> board, (end, line) = Board(), pty.openpty()
-        >>> def answer():
-        ...     while data := os.read(end, 5):
-        ...         os.write(end, board.command(data).encode())
+        >>> def answer(read=os.read, write=os.write):
+        ...     while data := read(end, 5):
+        ...         write(end, board.command(data).encode())
         >>> threading.Thread(target=answer, daemon=True).start()
         >>> with Cable(os.ttyname(line), timeout=30) as cable:
         ...     cable.command(Command(4, 140)), cable.read(4)
@@ -520,9 +520,9 @@ class Device:
         >>> import os, pty, threading
         >>> from taxel.simulate import Board
         >>> board, (end, line) = Board(), pty.openpty()
-        >>> def answer():
-        ...     while data := os.read(end, 5):
-        ...         os.write(end, board.command(data).encode())
+        >>> def answer(read=os.read, write=os.write):
+        ...     while data := read(end, 5):
+        ...         write(end, board.command(data).encode())
         >>> threading.Thread(target=answer, daemon=True).start()
         >>> with Device(os.ttyname(line), timeout=30) as device:
         ...     device.apply("2 kHz").noise_floor, device.set(noise_floor=7).noise_floor

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,7 +59,8 @@ class Frames(Columns):
         self.values: NDArray[np.float32] = own_numbers("values", values, np.float32)
         self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
         if self.values.ndim != 3:
-            raise ProblemError(f"values have {self.values.ndim} dimensions: must have three (n, rows, columns)")
+            found = counted(self.values.ndim, "dimension")
+            raise ProblemError(f"values have {found}: must have three (n, rows, columns)")
         if len(self.t) != len(self.values):
             raise ProblemError(f"t has shape {self.t.shape}: must be ({len(self.values)},), one time a picture")
         back = np.flatnonzero(np.diff(self.t) <= 0)
@@ -181,6 +183,44 @@ class Frames(Columns):
         if 0 in values.shape[1:]:
             raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} lies in it")
         return Frames(values, self.t, unit=self.unit, array=self.array._part(x, y))
+
+    @cached_property
+    def missing(self) -> int:
+        """The number of missing values (NaN)."""
+        # The least value is NaN if any is, and takes no memory to find.
+        if not self.values.size or not np.isnan(self.values.min()):
+            return 0
+        return int(np.count_nonzero(np.isnan(self.values)))
+
+    def held(self) -> Frames:
+        """Return the pictures with each missing value (NaN) filled by the last one that the taxel read.
+
+        No news is no change, as of a board that sends only changes. Before its first value a taxel reads that one; a
+        taxel without any reads 0. Encoders, trainings, readouts and tares of a `Recording` do this themselves, with a
+        warning that counts the values; from pictures they need it done.
+
+        Returns
+        -------
+        Frames
+            The same, if no value is missing.
+
+        Examples
+        --------
+        >>> frames = Frames([[[np.nan, 1.0]], [[5.0, np.nan]], [[np.nan, 3.0]]], [0, 100, 200])
+        >>> frames.missing, frames.held().values[:, 0].tolist()
+        (3, [[5.0, 1.0], [5.0, 1.0], [5.0, 3.0]])
+        """
+        return self._held if self.missing else self
+
+    @cached_property
+    def _held(self) -> Frames:
+        values = self.values.reshape(len(self), -1).copy()
+        for taxel in np.flatnonzero(np.isnan(values).any(axis=0)):
+            known = np.flatnonzero(~np.isnan(values[:, taxel]))
+            # The place of the last known value up to each picture; before the first one that one's.
+            last = np.searchsorted(known, np.arange(len(self)), side="right") - 1
+            values[:, taxel] = values[known[np.maximum(last, 0)], taxel] if len(known) else 0
+        return Frames(frozen(values.reshape(self.values.shape)), self.t, unit=self.unit, array=self.array)
 
     def area(self, above: float = 0.0) -> NDArray[np.float64]:
         """Return the contact area of each picture, mm2: that of each taxel that reads more than `above`.

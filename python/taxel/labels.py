@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 import warnings
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import path as checked_path
-from taxel._base.arguments import shown
+from taxel._base.arguments import shown, text
 from taxel._base.files import whole_file
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import counted
@@ -22,13 +23,16 @@ from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
 
-__all__ = ["TURN_US", "Labels", "Note", "ahead_us", "beside", "write_labels"]
+__all__ = ["TURN_US", "Labels", "Note", "ahead_us", "beside", "source_of", "trial_of", "write_labels"]
 
 #: The period after which the board's 16-bit clock of 100 us wraps, us.
 TURN_US = 6_553_600
 
 #: The columns of a table, as an error lists them; those in brackets are optional.
-_WANTED, _OTHERS = ("label", "t_us"), ("recording", "source", "host_ns")
+_WANTED, _OTHERS = ("label", "t_us"), ("recording", "source", "host_ns", "replaces_us")
+
+#: The columns of times by the board's clock, us.
+_TIMES = ("t_us", "replaces_us")
 
 
 @dataclass(frozen=True)
@@ -44,9 +48,12 @@ class Note:
     at_ns : int, ns since 1970
         Time by the host's clock; 0 if unknown.
     recording : str
-        In a table of several recordings (`Labels`) the path, name or stem of the file; else "".
+        In a table of several recordings (`Labels`) the path, name or stem of the file, or the name of a trial of a file
+        with several; else "".
     source : str
         The source of the recording that it is of, as "left"; "" for all of them.
+    replaces : int, us, optional
+        Time of the recording's own note that a label replaces, which then counts no more.
 
     Examples
     --------
@@ -59,6 +66,7 @@ class Note:
     at_ns: int = 0
     recording: str = ""
     source: str = ""
+    replaces: int | None = field(default=None, repr=False)
 
     def __getattr__(self, name: str) -> Any:
         """Return a field by its old name in `taxel.Label`; this is removed in the next version."""
@@ -88,13 +96,17 @@ class Labels:
     Parameters
     ----------
     path : path
-        A CSV ``recording,source,label,t_us,host_ns``, its columns in any order; `recording`, `source` and `host_ns` may
-        be absent. A label without a source is of all sources of its recording.
+        A CSV ``recording,source,label,t_us,host_ns,replaces_us``, its columns in any order; all but `label` and `t_us`
+        may be absent. A label without a source is of all sources of its recording; a source that was a topic of a ROS
+        bag may have the topic's name. A row with `replaces_us` stands for
+        the recording's own note of that time; one without a label says that this note is none.
 
     Attributes
     ----------
     path : Path
     rows : tuple of Note
+    removed : tuple of Note
+        The rows without a label, each with the time of a note that counts no more.
 
     Raises
     ------
@@ -116,27 +128,36 @@ class Labels:
         table = HeaderTable.read(place, text_of(place))
         table.has(_WANTED, _OTHERS)
         rows = [_row(f"{place}, line {line}", cells) for line, cells in table]
-        self.path, self.rows = place, tuple(rows)
+        self.path, self.rows = place, tuple(row for row in rows if row.text)
+        self.removed = tuple(row for row in rows if not row.text)
 
     @property
     def recordings(self) -> tuple[str, ...]:
         """The names of the recordings, in order; empty if the table is of one recording."""
         return tuple(sorted({row.recording for row in self.rows} - {""}))
 
-    def named(self, recording: str | os.PathLike[str]) -> str | None:
+    def named(self, recording: str | os.PathLike[str], trial: str = "", source: str = "") -> str | None:
         """Return the table's name of a recording: its path, file name or stem; None if the table does not name it.
 
         Parameters
         ----------
         recording : path
+        trial : str
+            Of a file with several trials the name of one, which the table may have instead.
+        source : str
+            Of a recording with several sources the name of one, which the table may have behind any of these.
 
         Raises
         ------
-        ProblemError : `recording` is not a path
+        ProblemError : `recording` is not a path, or `trial` or `source` no text
         """
+        text("trial", trial)
+        text("source", source)
         place = Path(checked_path("recording", recording))
-        names = {row.recording for row in self.rows}
-        return next((name for name in ("", str(recording), place.name, place.stem) if name in names), None)
+        names = {row.recording for row in (*self.rows, *self.removed)}
+        own = (trial, "", str(recording), place.name, place.stem)
+        of_source = [f"{name} {source}" for name in own if name] if source else []
+        return next((name for name in (*of_source, *own) if name in names), None)
 
     def of(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
         """Return the events of a `taxel.Recording` by label, us on its own clock; empty if the table does not name it.
@@ -159,12 +180,15 @@ class Labels:
         # The class is checked, not the attribute: reading the clock may take long.
         if isinstance(recording, type) or not (hasattr(recording, "path") and hasattr(type(recording), "clock")):
             raise ProblemError(f"recording is {shown(recording)}: must be a taxel.Recording")
-        return self._of(recording.path, lambda: recording.clock, getattr(recording, "label", ""))
+        source = getattr(recording, "label", "")
+        trial = trial_of(getattr(recording, "name", ""), source)
+        return self._of(recording.path, lambda: recording.clock, source, trial)
 
-    def _of(self, path: Path, clock_of: Callable[[], Clock | None], source: str) -> dict[str, NDArray[np.int64]]:
+    def _of(
+        self, path: Path, clock_of: Callable[[], Clock | None], source: str, trial: str = ""
+    ) -> dict[str, NDArray[np.int64]]:
         """Return the events of a source of the recording at this path; its clock is read only if it is needed."""
-        name = self.named(path)
-        rows = [row for row in self.rows if row.recording == name and row.source in ("", source)]
+        rows = self._rows(path, source, trial)
         clock = clock_of() if any(row.at_ns for row in rows) else None
         by_label: dict[str, list[int]] = {}
         for row in rows:
@@ -172,9 +196,37 @@ class Labels:
             by_label.setdefault(row.text, []).append((row.t or 0) - ahead)
         return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
 
+    def _rows(self, path: Path, source: str, trial: str, among: Sequence[Note] | None = None) -> list[Note]:
+        """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own."""
+        every = self.rows if among is None else among
+        own = trial in ("", path.name, path.stem)
+        names = {self.named(path), self.named(path, "" if own else trial, source), None if own else trial} - {None}
+        return [row for row in every if row.recording in names and row.source in ("", source)]
+
+    def _replaced(self, path: Path, source: str, trial: str) -> set[int | None]:
+        """Return the times of the notes of a source of a recording that its labels replace."""
+        return {row.replaces for row in self._rows(path, source, trial, (*self.rows, *self.removed))} - {None}
+
     def __repr__(self) -> str:
         recordings = ", ".join(self.recordings) or "one recording"
         return f"Labels({counted(len(self.rows), 'event')} of {recordings}, {self.path})"
+
+
+def trial_of(name: str, source: str) -> str:
+    """Return the name of a trial from that of its recording, which ends with its source where it is of one foot."""
+    return name.removesuffix(f" {source}") if source else name
+
+
+def source_of(topic: str) -> str:
+    """Return the name of the source that a topic of a ROS bag becomes.
+
+    Examples
+    --------
+    >>> source_of("/palm/left")
+    'palm_left'
+    """
+    # What the name of a source in a .mcap may be.
+    return re.sub("[^A-Za-z0-9_-]", "_", topic.strip("/"))[-64:]
 
 
 def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> int:
@@ -186,7 +238,7 @@ def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> in
     """
     if not row.at_ns or row.t is None or clock is None or not len(clock.board_us):
         return 0
-    turns = (row.t - clock.board_us_at(row.at_ns)) / TURN_US
+    turns = (row.t - clock._about_us(row.at_ns)) / TURN_US
     if abs(turns - round(turns)) > 0.25:
         raise ProblemError(
             f"{table}: {row.text} at {row.t} us and {row.at_ns} ns is of another run than "
@@ -207,14 +259,18 @@ def beside(recording: str | os.PathLike[str]) -> Path:
     return place.with_name(f"{place.stem}.notes.csv")
 
 
-def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int] | tuple[str, int, str]]) -> None:
+def write_labels(
+    path: str | os.PathLike[str],
+    labels: Iterable[tuple[Any, ...]],
+) -> None:
     r"""Write a table `label,t_us` in the order of time; an existing one is replaced atomically.
 
     Parameters
     ----------
     path : path
-    labels : iterable of (label, us) or (label, us, source)
-        The table has a column `source` if any label has one that is not "".
+    labels : iterable of (label, us), and behind them the source, the trial, the time of the note that it replaces (us)
+        The table has a column `source`, and one `recording` with the trials of a file that holds several, if any label
+        has one that is not "", and `replaces_us` if any replaces a note of the recording.
 
     Raises
     ------
@@ -229,28 +285,30 @@ def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int] 
     'label,t_us\ncontact,400\nlift,900\n'
     """
     rows: list[tuple[Any, ...]] = sorted(labels, key=lambda row: row[1])
-    of_sources = any(row[2:] > ("",) for row in rows)
-    columns = (*_WANTED, "source") if of_sources else _WANTED
+    more = {"source": 2, "recording": 3, "replaces_us": 4}
+    kept = {name: k for name, k in more.items() if any(row[k:] and row[k] not in ("", None) for row in rows)}
     with whole_file(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(columns)
-        table.writerows([(*row, "")[: len(columns)] for row in rows])
+        table.writerow([*_WANTED, *kept])
+        table.writerows([[*row[:2], *((*row, "", "", "")[k] for k in kept.values())] for row in rows])
 
 
 def _row(place: str, cells: Mapping[str, str]) -> Note:
     values = {name: cell.strip() for name, cell in cells.items()}
     times: dict[str, int] = {}
-    for name in ("t_us", "host_ns"):
+    for name in ("t_us", "host_ns", "replaces_us"):
         written = values.get(name, "")
-        if not written and name == "host_ns":
+        if not written and name != "t_us":
             continue
         try:
             times[name] = int(written)
         except ValueError:
             raise FormatError(f"{place}: {name} is {shown(written)}; must be whole {name[-2:]}") from None
-    if not values["label"] or not -(2**52) <= times["t_us"] <= 2**52:
+    replaces = times.get("replaces_us")
+    if not (values["label"] or replaces is not None) or any(abs(times.get(name, 0)) > 2**52 for name in _TIMES):
         raise FormatError(f"{place}: must name a label, and a time within 2^52 us")
     if not 0 <= times.get("host_ns", 0) < 2**63:
         raise FormatError(f"{place}: host_ns must be ns since 1970")
-    named = values.get("recording", ""), values.get("source", "")
-    return Note(values["label"], times["t_us"], times.get("host_ns", 0), *named)
+    source = values.get("source", "")
+    named = values.get("recording", ""), source_of(source) if source.startswith("/") else source
+    return Note(values["label"], times["t_us"], times.get("host_ns", 0), *named, replaces)

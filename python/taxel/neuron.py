@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, number, numbers
+from taxel._base.messages import counted
 from taxel._base.parameters import Value, defaults
 from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
@@ -167,7 +168,9 @@ class Neuron(Value):
         if matrix.ndim != 2:
             raise ProblemError(f"weights has {matrix.ndim} dimensions: must have two, neurons and trains")
         if matrix.shape[1] != len(_trains(trains)):
-            raise ProblemError(f"weights: {matrix.shape[1]} a neuron for {len(trains)} trains, must be one a train")
+            raise ProblemError(
+                f"weights: {matrix.shape[1]} a neuron for {counted(len(trains), 'train')}, must be one a train"
+            )
         factor = number("threshold", threshold)
         return SpikeTrains._from_parts(
             _core.neuron_run_many(self._json(), matrix.reshape(-1), len(matrix), trains._parts(), factor)

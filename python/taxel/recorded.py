@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -9,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.clock import Clock
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 
-__all__ = ["Recorded", "recorded"]
+__all__ = ["Recorded", "recorded", "refuse_numbered"]
 
 T = TypeVar("T")
 
@@ -57,8 +59,11 @@ class Recorded(Protocol):
         ...
 
 
-def recorded(x: Events | Frames | Recorded | T) -> Events | Frames | T:
+def recorded(x: Events | Frames | Recorded | T, *, hold: bool = True) -> Events | Frames | T:
     """Return a recording's events, preceded by the values held at its beginning, or its pictures; else `x` itself.
+
+    Missing values of a recording's pictures are filled (`Frames.held`), with a warning that counts them, unless `hold`
+    is false.
 
     Raises
     ------
@@ -66,14 +71,36 @@ def recorded(x: Events | Frames | Recorded | T) -> Events | Frames | T:
     """
     if isinstance(x, type) or not all(hasattr(x, name) for name in ("has_events", "frames")):
         return x  # type: ignore[return-value]
-    if not getattr(x, "timed", True):
+    refuse_numbered(x)  # type: ignore[arg-type]
+    if not x.has_events:  # type: ignore[union-attr]
+        frames = x.frames()  # type: ignore[union-attr]
+        return _filled(frames, x.path) if hold and frames.missing else frames  # type: ignore[union-attr]
+    return _begun(x.events, getattr(x, "held", None))  # type: ignore[union-attr]
+
+
+def _filled(frames: Frames, path: Path) -> Frames:
+    """Return pictures without missing values; say how many were filled."""
+    never = int(np.count_nonzero(np.isnan(frames.values).all(axis=0)))
+    warnings.warn(
+        f"{path}: {frames.missing} of {frames.values.size} values are missing (NaN): each is held at the taxel's last "
+        "value" + f"; {counted(never, 'taxel')} without any value {'reads' if never == 1 else 'read'} 0" * bool(never),
+        stacklevel=3,
+    )
+    return frames.held()
+
+
+def refuse_numbered(recording: Recorded) -> None:
+    """Refuse a recording whose pictures are numbered (`Recording.timed`), where times are needed.
+
+    Raises
+    ------
+    ProblemError : pictures without times
+    """
+    if not recording.timed:
         raise ProblemError(
-            f"{x.path}: its pictures have no times; say how many there are a second: --rate-hz HZ, or "  # type: ignore[union-attr]
+            f"{recording.path}: its pictures have no times; say how many there are a second: --rate-hz HZ, or "
             "recording.at_rate(HZ)"
         )
-    if not x.has_events:  # type: ignore[union-attr]
-        return x.frames()  # type: ignore[union-attr]
-    return _begun(x.events, getattr(x, "held", None))  # type: ignore[union-attr]
 
 
 def _begun(events: Events, held: NDArray[np.float32] | None) -> Events:

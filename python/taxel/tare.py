@@ -15,6 +15,7 @@ from taxel._base.arguments import instance, shown, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
+from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -48,7 +49,7 @@ class Tare:
     >>> frames = Frames([[[50.0]], [[53.0]], [[53.0]]], [0, 1000, 3000], unit="ticks")
     >>> tare = Tare.take(frames)
     >>> tare
-    Tare(1 of 1 taxels, 0 to 3000 us)
+    Tare(1 of 1 taxel, 0 to 3000 us)
     >>> tare.rest
     array([[52.]])
     >>> tare.noise.round(3)
@@ -91,7 +92,12 @@ class Tare:
             None if start_us is None else whole("start_us", start_us, unit="us"),
             None if stop_us is None else whole("stop_us", stop_us, unit="us"),
         )
-        x = recorded(x)
+        given, x = x, recorded(x)
+        if isinstance(x, Events | Frames) and not len(x.t):
+            what, why = ("event" if isinstance(x, Events) else "picture"), getattr(given, "_why_empty", str)()
+            raise ProblemError(f"tare: there is no {what}{why}")
+        if isinstance(x, Events | Frames) and window[1] is not None and x.t.min() >= window[1]:
+            raise ProblemError(f"tare to {stop_us} us: nothing came before it, but from {x.t.min()} to {x.t.max()} us")
         if isinstance(x, Events):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
         if isinstance(x, Frames):
@@ -201,7 +207,7 @@ class Tare:
     def __repr__(self) -> str:
         known = int(np.count_nonzero(~np.isnan(self.rest)))
         note = f", {self.note}" if self.note else ""
-        return f"Tare({known} of {self.array.taxels} taxels, {self.start_us} to {self.stop_us} us{note})"
+        return f"Tare({known} of {counted(self.array.taxels, 'taxel')}, {self.start_us} to {self.stop_us} us{note})"
 
 
 def _of_taxels(values: list[float | None], array: Array) -> NDArray[np.float64]:

@@ -111,9 +111,10 @@ struct Bench {
     }
 
     void after_fast() {
-        // The ramp of the clock that begins now, and the samples of its two halves.
+        // The ramp of the clock that begins now, and the samples of its two halves. Comparators see no other ramp
+        // than one that fell for a clock before it.
         const bool rises = (top.ramp & 1) && !ramp_before;
-        ramp_before = top.ramp & 2;
+        ramp_before = top.ramp != 0;
         if (rises) {
             select();
             tick = 0;

@@ -20,15 +20,17 @@ RTL = Path(__file__).parents[1]
 PACKAGES = ("taxel_types.sv", "taxel_registers.sv")
 #: Warnings that say nothing here: fields of a struct that one of its users does not read, and text from left to right.
 QUIET = ("-Wno-UNUSEDSIGNAL", "-Wno-ASCRANGE")
-#: How the logic is compiled. Registers without a reset begin with random bits, as nobody knows what a chip holds. The
+#: How the logic is compiled. Registers without a reset begin with random bits, as what a chip holds is not known. The
 #: wheel's makefile leaves out how g++ is given a header that is compiled before.
 OPTIONS = (
-    *("-j", "1", "-O3", "--x-assign", "unique", "--x-initial", "unique", "-CFLAGS", "-fPIC -O1"),
+    *("-j", "1", "-O3", "--x-assign", "unique", "--x-initial", "unique"),
     *("-MAKEFLAGS", "CFG_CXXFLAGS_PCH_I=-include"),
 )
 LINKED = ("-std=c++20", "-O2", "-shared", "-fPIC")
 #: A write acts in the frame whose edge comes so many clocks or more after the middle of its last stop bit.
 WRITE_CLOCKS = 23
+#: Bytes that are fetched at once.
+ROOM = 1 << 22
 
 
 def verilator() -> Path | None:
@@ -58,10 +60,22 @@ def run(*command: str | Path) -> None:
         raise RuntimeError(f"{command[0]} failed:\n{result.stdout[-4000:]}{result.stderr[-4000:]}")
 
 
-def built(source: Path, parameters: dict[str, int]) -> Path:
-    """Return the shared object of the logic in `source` with these parameters, made where it is not there yet."""
-    files = [*sorted(source.glob("*.sv")), RTL / "bench" / "bench.cpp"]
-    digest = hashlib.sha256(repr((OPTIONS, LINKED, sorted(parameters.items()))).encode())
+def built(
+    source: Path = RTL,
+    *,
+    parameters: dict[str, int],
+    top: str = "taxel_top",
+    bench: str = "bench",
+    long: bool = False,
+) -> Path:
+    """Return the shared object of a module in `source` with its bench, made where it is not there yet.
+
+    One that is to simulate for `long` takes twice as long to compile, and two thirds of the time to run.
+    """
+    compiled = ("-CFLAGS", f"-fPIC -O{3 if long else 1}")
+    code = RTL / "bench" / f"{bench}.cpp"
+    files = [*sorted(source.glob("*.sv")), *sorted((RTL / "bench").glob("*.sv")), code]
+    digest = hashlib.sha256(repr((OPTIONS, compiled, LINKED, top, sorted(parameters.items()))).encode())
     for file in files:
         digest.update(file.read_bytes())
     folder = RTL / "build" / digest.hexdigest()[:16]
@@ -72,10 +86,10 @@ def built(source: Path, parameters: dict[str, int]) -> Path:
     making.mkdir(parents=True, exist_ok=True)
     options = [f"-G{name}={value}" for name, value in parameters.items()]
     run(
-        *("verilator", "--cc", "--build", *OPTIONS, *QUIET, "--Mdir", making),
-        *(f"-I{source}", "--top-module", "taxel_top", *options),
+        *("verilator", "--cc", "--build", *OPTIONS, *compiled, *QUIET, "--Mdir", making),
+        *(f"-I{source}", f"-I{RTL / 'bench'}", "--top-module", top, *options),
         *(source / package for package in PACKAGES),
-        source / "taxel_top.sv",
+        source / f"{top}.sv",
     )
     root = verilator()
     run(
@@ -89,8 +103,8 @@ def built(source: Path, parameters: dict[str, int]) -> Path:
             f"-I{root}/include",
             f"-I{root}/include/vltstd",
         ),
-        *("-o", making / "bench.so", RTL / "bench" / "bench.cpp"),
-        *(making / "libVtaxel_top.a", making / "libverilated.a", "-lpthread"),
+        *("-o", making / "bench.so", code),
+        *(making / f"libV{top}.a", making / "libverilated.a", "-lpthread"),
     )
     if not folder.exists():
         making.rename(folder)
@@ -111,6 +125,8 @@ class Logic:
         Of what registers without a reset hold at first.
     source : path, optional
         A folder of other sources than `rtl`: the tests' planted faults.
+    long : bool
+        Compile for long simulations.
     **parameters : int
         Others of `taxel_top`.
     """
@@ -124,15 +140,17 @@ class Logic:
         baud_clocks: int = 8,
         seed: int = 1,
         source: Path = RTL,
+        long: bool = False,
         **parameters: int,
     ) -> None:
         self.shape = (rows, columns)
         steps = -(-max(rows, 64) // channels)
         of_top = {"COLUMNS": columns, "ROWS": rows, "CHANNELS": channels, "BAUD_CLOCKS": baud_clocks} | parameters
-        self._library = ctypes.CDLL(str(built(source, of_top)))
+        self._library = ctypes.CDLL(str(built(source, parameters=of_top, long=long)))
         for name, result in (("new", ctypes.c_void_p), ("sent_at", ctypes.c_uint64), ("clock", ctypes.c_uint64)):
             getattr(self._library, f"bench_{name}").restype = result
         self._library.bench_edge.restype = ctypes.c_uint64
+        self._data, self._ends = (ctypes.create_string_buffer(ROOM) for _ in range(2))
         self._bench = ctypes.c_void_p(self._library.bench_new(columns, rows, channels, steps, baud_clocks, seed))
         self.reset()
 
@@ -169,18 +187,16 @@ class Logic:
 
     def serial(self) -> str:
         """Return what came over the serial line since this was last asked."""
-        room = ctypes.create_string_buffer(1 << 16)
-        count = self.call("serial", room, len(room))
-        return room.raw[:count].decode()
+        count = self.call("serial", self._data, ROOM)
+        return ctypes.string_at(self._data, count).decode()
 
     def datagrams(self) -> list[bytes]:
         """Return the datagrams that ended since this was last asked."""
-        room = 1 << 22
-        data, ends = ctypes.create_string_buffer(room), ctypes.create_string_buffer(room)
-        count = self.call("payload", data, ends, room)
+        count = self.call("payload", self._data, self._ends, ROOM)
+        data = ctypes.string_at(self._data, count)
         whole, start = [], 0
-        for place in np.flatnonzero(np.frombuffer(ends.raw[:count], np.uint8)):
-            whole.append(self._bytes + data.raw[start : place + 1])
+        for place in np.flatnonzero(np.frombuffer(self._ends, np.uint8, count)):
+            whole.append(self._bytes + data[start : place + 1])
             self._bytes, start = b"", int(place) + 1
-        self._bytes += data.raw[start:count]
+        self._bytes += data[start:]
         return whole

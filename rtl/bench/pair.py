@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from logic import WRITE_CLOCKS, Logic
 from taxel import Array
 from taxel.simulate import NOT_RETURNED, Board, Version2
-from taxel.wire import Registers
+from taxel.wire import Command, Registers
 
 #: Values of `previous` and `intensity` of the emulated board as parameters of the logic.
 PREVIOUS = {"last_sent": {}, "last_sample": {"PREVIOUS_SAMPLE": 1}}
@@ -115,6 +116,14 @@ class Pair:
         self.logic.edge()
         self.received += self.logic.datagrams()
         self.serial += self.logic.serial()
+
+    def write(self, commands: Iterable[Command]) -> None:
+        """Write registers of both, one after the other, in quiet frames."""
+        still = np.zeros(self.array.shape, np.uint16)
+        for command in commands:
+            self.frame(still, command.to_bytes())
+            while not self.answered:
+                self.frame(still)
 
     @property
     def answered(self) -> bool:

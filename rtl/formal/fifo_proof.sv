@@ -45,8 +45,8 @@ module fifo_proof (
       assert (empty == (level == 0));
       assert (!ready || level != 0);
       assert (level <= 4'(DEPTH + 2));
-      // It refuses only where it is full, and what it holds comes out.
-      assert (!full || level == 4'(DEPTH + 2));
+      // It refuses only where it is full, or was until the clock before, and what it holds comes out.
+      assert (!full || level == 4'(DEPTH + 2) || (level == 4'(DEPTH + 1) && !ready));
       assert (idle <= 2'd2);
       // Order and value.
       if (marked && !gone) assert (ahead < level);

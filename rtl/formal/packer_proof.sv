@@ -21,10 +21,12 @@ module packer_proof
   logic pushed;
 
   always_comb begin
-    entered = given;
-    entered.frame = frame;
-    entered.at[0] = frame;
+    // What this version does not send is 0.
+    entered = '0;
     entered.kind = entry_kind_t'({1'b0, given.kind[0]});
+    entered.frame = frame;
+    entered.at[15:0] = {given.at[15:1], frame};
+    {entered.x, entered.y, entered.more, entered.value} = length_of(given);
   end
 
   assign push = begun && wants && !full;

@@ -28,18 +28,9 @@ def built(columns: int, rows: int, channels: int, previous: str, intensity: str,
     return Pair(columns, rows, channels, previous=previous, intensity=intensity, first=first, version_2=options)
 
 
-def written(pair: Pair, commands: list[Command]) -> None:
-    """Write registers of both boards, each before the next."""
-    still = np.zeros(pair.array.shape, np.uint16)
-    for command in commands:
-        pair.frame(still, command.to_bytes())
-        while not pair.answered:
-            pair.frame(still)
-
-
 def in_version_2(pair: Pair) -> None:
     """Let both boards send version 2."""
-    written(pair, [Command(0, 0b11000)])
+    pair.write([Command(0, 0b11000)])
     assert pair.board.registers.wire_version == 2
 
 
@@ -91,7 +82,7 @@ def test_random_pressures_and_writes_in_both_versions(columns, rows, channels, p
     if rows <= 64:
         # Time for ramps of more than 255 ticks.
         held = pair.board.registers
-        written(pair, held.commands_to(held.with_preset("2 kHz")))
+        pair.write(held.commands_to(held.with_preset("2 kHz")))
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(250):
         ticks = pressures(rng, pair, ticks)

@@ -1,6 +1,6 @@
-"""Write the RTL's package of registers, `rtl/taxel_registers.sv`, from registers.toml.
+"""Write what the RTL has of registers.toml: the package of registers, and the table of FA-1's power law.
 
-Usage: python rtl/tools/registers.py [TO]. A test compares the file with what this makes.
+Usage: python rtl/tools/registers.py [FOLDER]. A test compares the files with what this makes.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "tools"))
 
-from registers_source import OPERATOR, Table, parsed, read  # noqa: E402
+from registers_source import OPERATOR, Table, parsed, power_law, read  # noqa: E402
 
 HEAD = "// Made from registers.toml by rtl/tools/registers.py (`make rtl-registers`): edit that.\n"
 #: Bits of the arithmetic in rules: 8 steps of 16 bits, and counts of 32 bits, fit.
@@ -198,10 +198,45 @@ def package(source: Table) -> str:
     )
 
 
+def compression(source: Table) -> str:
+    """Write the module that looks up the power law."""
+    law = power_law(source)
+    bits, places = max(law).bit_length(), (len(law) - 1).bit_length()
+    if len(law) != 1 << places:
+        raise ValueError(
+            f"registers.toml: power_law has {len(law)} entries, the logic's table must have a power of two"
+        )
+    entries = [f"{bits}'d{entry}" for entry in law]
+    rows = ",\n".join("    " + ", ".join(entries[k : k + 8]) for k in range(0, len(entries), 8))
+    return f"""{HEAD}// Ticks to the power of {source["power_law"]["exponent"]} (5.1), a clock later; larger ticks use the last entry.
+module taxel_power_law (
+    input  logic        clk,
+    input  logic [15:0] ticks,
+    output logic [{bits - 1}:0] pressure
+);
+
+  localparam logic [0:{len(law) - 1}][{bits - 1}:0] ENTRIES = {{
+{rows}
+  }};
+
+  logic [{bits - 1}:0] entries[{len(law)}];
+  initial for (int k = 0; k < {len(law)}; k++) entries[k] = ENTRIES[k];
+
+  always_ff @(posedge clk) pressure <= entries[ticks > 16'd{len(law) - 1} ? {places}'d{len(law) - 1} : ticks[{places - 1}:0]];
+
+endmodule
+"""
+
+
+MADE = {"taxel_registers.sv": package, "taxel_power_law.sv": compression}
+
+
 def main() -> None:
-    """Write the package."""
-    to = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "rtl" / "taxel_registers.sv"
-    to.write_text(package(read(ROOT / "registers.toml")))
+    """Write every file."""
+    to = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "rtl"
+    source = read(ROOT / "registers.toml")
+    for name, make in MADE.items():
+        (to / name).write_text(make(source))
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
 
 def satisfied(cone: ConeX) -> bool:
     """Return whether a fit found weights; where rounding forbids a proof, rows satisfied to 1e-9 mV decide."""
-    return bool(cone.status_ == "solved" or (cone.status_ == "stopped" and cone.violation_ <= MET_TO))
+    return bool(cone.status_ in ("solved", "feasible") or (cone.status_ == "stopped" and cone.violation_ <= MET_TO))
 
 
 def largest(holds: Callable[[int], bool], start: int, step: int, most: int | None = None) -> int:

@@ -95,7 +95,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     if params["asks"] == "weights":
         count = max(round(params["share"] * inputs / step), 1) * step
         cone = fit(params, count, seed, (1.0, 0.0, 0.0))
-        if cone.status_ != "solved":
+        if cone.status_ not in ("solved", "feasible"):
             return {"p": count, "solved": False}
         chosen = (np.abs(cone.weights_) > NONE).reshape(-1, inputs)
         return {"p": count, "solved": True, "weights": int(chosen.sum()), "heard": int(chosen.any(axis=0).sum())}

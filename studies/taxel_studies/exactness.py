@@ -86,7 +86,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     margins = dict.fromkeys(("margin", "slope"), params["margin"])
     cone = ConeX(neuron=Neuron(**options), **LEARN, lambdas=(0.0, 1.0, 0.0), kappa=1.0, **margins)
     cone.fit([trains], [targets])
-    if cone.status_ != "solved":
+    if cone.status_ not in ("solved", "feasible"):
         return {"status": cone.status_, "runs": []}
     exact = cone.neuron_.run(cone.weights_, trains)
     runs = []

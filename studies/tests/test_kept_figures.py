@@ -107,6 +107,29 @@ def test_a_figure_whose_coarse_result_is_another_one_stays_stale(figure: Path) -
     assert kept.stale_figures(figure) == {"fig6.1": ["taxel.neuron"]}
 
 
+def test_a_result_that_is_rounded_otherwise_is_the_same(figure: Path) -> None:
+    def moved(part: float) -> Callable[[dict[str, Any]], Any]:
+        def change(result: dict[str, Any]) -> None:
+            result["said"] = scaled(result["said"], 1.0 + part)
+
+        return change
+
+    spoil(figure / "coarse" / "fig6.1.json", moved(1e-13))
+    assert kept.confirm("fig6.1", figure) == "confirmed"
+    spoil(figure / "coarse" / "fig6.1.json", moved(1e-7))
+    with pytest.raises(ProblemError, match="its coarse result is another one"):
+        kept.confirm("fig6.1", figure)
+
+
+def scaled(value: Any, by: float) -> Any:
+    """Return a result with each float of it scaled."""
+    if isinstance(value, dict):
+        return {key: scaled(inner, by) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [scaled(inner, by) for inner in value]
+    return value * by if isinstance(value, float) else value
+
+
 def test_all_stale_figures_are_tried_and_those_that_moved_named(figure: Path) -> None:
     for name in ("fig6.2", "fig6.1"):
         section = json.loads((figure / "fig6.1.json").read_text()) | {

@@ -1,6 +1,8 @@
 """The commands encode, train and detect: from a recording to scored detections, and what they refuse."""
 
 import json
+import re
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from test_readout import ARRAY, recipe, tare, touches
 import taxel
 from taxel import _core
 from taxel.cli import main
+from taxel.cli._recordings import references
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +86,16 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
 def test_the_command_and_the_function_train_the_same(trained: Path) -> None:
     examples = [taxel.detect.Example(*touches(seed), tare()) for seed in (1, 2)]
     assert taxel.Readout.load(trained) == taxel.detect.train(examples, recipe())
+
+
+def test_the_recording_of_a_folder_that_does_not_fit_is_named(tmp_path: Path, trained: Path, capsys) -> None:
+    for name, array in (("small", taxel.Array(4, 4)), ("smaller", taxel.Array(3, 3))):
+        taxel.convert(taxel.Events([0, 1000], [0, 1], [0, 1], [1, 1], array=array), tmp_path / f"{name}.npz")
+    code, _, error = call(capsys, "detect", tmp_path, "--readout", trained)
+    assert code == 2
+    assert "small.npz: an array of 4 x 4 taxels" in error
+    code, _, error = call(capsys, "detect", tmp_path / "smaller.npz", "--readout", trained)
+    assert (code, "an array of 3 x 3 taxels" in error) == (2, True)
 
 
 def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:
@@ -305,6 +318,33 @@ def test_labels_that_lie_outside_are_left_out_and_said(folder: Path, trained: Pa
     assert "holds 1 event, none within" in call(capsys, *arguments, late)[2]
 
 
+@pytest.mark.parametrize(
+    ("late_us", "how"), [(0, None), (50_000, None), (50_001, "behind"), (1_000_000, "behind"), (1_000_001, "outside")]
+)
+def test_labels_behind_the_last_event_are_named(
+    folder: Path, trained: Path, capsys, tmp_path: Path, late_us: int, how: str | None
+) -> None:
+    last = int(taxel.open(folder / "9.npz").events.t[-1])
+    late = tmp_path / "late.csv"
+    late.write_text((folder / "truth.csv").read_text() + f"contact,{last + late_us}\n")
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--truth")
+    code, out, error = call(capsys, *arguments, late, "--json")
+    assert (code, json.loads(out)["score"]["missed"]) == (0, 0 if how == "outside" else 1)
+    behind = f"1 of the 13 events of {late} are behind the last that was recorded, at {last / 1e6:.3f} s (contact at "
+    assert (behind in error) == (how == "behind")
+    assert ("left out: outside" in error) == (how == "outside")
+
+
+@pytest.mark.parametrize(("late_us", "left_out"), [(9_999, False), (10_000, False), (10_001, True)])
+def test_a_note_behind_the_last_picture_is_left_out_and_said(tmp_path: Path, late_us: int, left_out: bool) -> None:
+    frames = taxel.Frames(np.zeros((100, 2, 2)), np.arange(100) * 10_000, unit="N", array=taxel.Array(2, 2))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    (tmp_path / "mat.notes.csv").write_text(f"label,t_us\ntouch,400000\ntouch,{990_000 + late_us}\n")
+    with pytest.warns(UserWarning, match="1 of the 2 events of the notes of ") if left_out else nullcontext():
+        [events] = references("notes", "--labels", [taxel.open(tmp_path / "mat.npz")])
+    assert len(events["touch"]) == 1 + (not left_out)
+
+
 def test_a_name_that_no_recording_has_is_listed(folder: Path, capsys, tmp_path: Path) -> None:
     labels = tmp_path / "labels.csv"
     labels.write_text((folder / "labels.csv").read_text().replace("2.npz", "two.npz"))
@@ -358,7 +398,7 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     code, out, _ = call(capsys, *arguments, *point, "--search", "--folds", 3, "-o", tmp_path / "c.json", *report)
     assert code == 0
     page = (tmp_path / "r" / "report.html").read_text()
-    held, own = page.index("On held-out data"), page.index("On its own training data")
+    held, own = page.index("On held-out data: this counts"), page.index("On its own training data: does not count")
     assert page.count("9.npz</td>", held, own) == page.count("9.npz</td>", own, page.index("The worst")) == 2
     assert out.startswith("held out: whole recordings, 3 folds (window 50 ms)\n")
     assert "contact, chosen: tau 1.5" in out
@@ -472,3 +512,36 @@ def test_an_example_may_be_a_recording(folder: Path) -> None:
         taxel.ProblemError, match=r"example 0 is .*: must be an Example of a Recording, Events, Frames or SpikeTrains"
     ):
         train([Example("1.npz", labels)], taxel.detect.Recipe.load(folder / "recipe.toml"))
+
+
+def test_times_since_1970_are_written_from_the_beginning_on(folder: Path, trained: Path, capsys, tmp_path: Path):
+    events, truth = touches(9)
+    since = 1_700_000_000_000_000 - int(events.t[0])
+    moved = taxel.Events(events.t + since, events.x, events.y, events.p, array=ARRAY, intensity=events.intensity)
+    walk = tmp_path / "walk.npz"
+    taxel.convert(moved, walk)
+    rows = [f"{label},{t + since + 9000 * (label == 'lift')}" for label, times in truth.items() for t in times]
+    (tmp_path / "truth.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
+    truths = ("--truth", tmp_path / "truth.csv")
+    arguments = ("detect", walk, "--readout", trained, "--tare", folder / "tare.json", *truths)
+    code, out, _ = call(capsys, *arguments, "--report", tmp_path / "page")
+    assert (code, out.count("times are from 2023-11-14 22:13:20.000 UTC on")) == (0, 1)
+    assert "17000000" not in out
+    found = json.loads(call(capsys, *arguments, "--json")[1])["detections"]
+    assert len(found) == 12
+    assert all(one["t_us"] > 1_700_000_000_000_000 for one in found)
+    written = [line.split()[1:3] for line in out.splitlines() if line.startswith(("contact  ", "lift  "))]
+    of = [[one[name] - 1_700_000_000_000_000 for name in ("t_us", "known_us")] for one in found]
+    assert written[: len(found)] == [[f"{us / 1000:.3f}" for us in each] for each in of]
+    page = (tmp_path / "page" / "report.html").read_text()
+    assert "Times of " in page
+    assert "2023-11-14 22:13:20.000 UTC" in page
+    assert not re.search(r"17000000\d\d\.", page)
+    assert any(f"<td>{(t + 9000 - int(events.t[0])) / 1e6:.4f}</td>" in page for t in truth["lift"]), "the worst"
+    code, out, _ = call(capsys, "info", walk, "--picture", tmp_path / "walk.svg")
+    assert re.search(r"board time +0 to \d{1,8} us", out)
+    assert "2023-11-14 22:13:20.000 UTC, 1700000000000000 us since 1970" in out
+    assert re.search(r"peak +at most \S+ ticks, at \d{1,8} us", out)
+    drawn = (tmp_path / "walk.svg").read_text()
+    assert drawn.count("time from 2023-11-14 22:13:20.000 UTC (s)") == 2
+    assert "log10 (1 + changes)" in drawn

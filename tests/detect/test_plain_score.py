@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from shell import call
 from test_plain_rule import played
 
 import taxel
-from taxel.detect import Example, Fold, Part, Recipe, judge, run, score, tune
+from taxel.cli._trained import Result
+from taxel.detect import Example, Fold, Part, PlainRule, Recipe, judge, run, score, tune
 from taxel.encode import ContactArea
 
 RECIPE = Recipe(
@@ -95,6 +97,68 @@ def test_training_says_which_is_better_and_why_there_is_no_rule(examples, tmp_pa
     result = json.loads(call(capsys, *arguments, "-o", tmp_path / "r.json", "--json")[1])
     assert result["plain_rule"]["rules"]["odd"] is None
     assert result["plain_rule"]["score"]["by_label"]["hit"]["found"] == 6
+    # What it prints of a rule is its file.
+    rule = taxel.detect.PlainRule.from_json(json.dumps(result["plain_rule"]["rules"]["hit"]))
+    detect = ("detect", tmp_path / "one.npz", "--readout", rule.save(tmp_path / "rule.json"), "--json")
+    detect += ("--tare", tmp_path / "tare.json", "--truth", tmp_path / "labels.csv", "--window-ms", "2")
+    assert json.loads(call(capsys, *detect)[1])["score"]["by_label"]["hit"]["found"] == 6
     better = result["plain_rule"]["better"]
     for label in better:
         assert f"{label}: the plain rule is better" in call(capsys, *arguments, "-o", tmp_path / "r.json")[1]
+
+
+def test_channels_have_no_plain_rule_and_training_says_so() -> None:
+    line, values = taxel.Array(1, 4), np.zeros((400, 1, 4))
+    values[100:200] = values[250:300] = 20.0
+    frames = taxel.Frames(values, np.arange(400) * 1000, unit="N", array=line)
+    tare = taxel.Tare.take(frames, stop_us=50_000)
+    example = Example(frames, {"contact": [100_000, 250_000]}, tare)
+    for quantity in ("area", "total", "local_load"):
+        name = quantity.replace("_", " ")
+        with pytest.raises(taxel.ProblemError, match=f"a plain rule by {name} needs neighbours on a grid; .* 1 x 4"):
+            run(PlainRule(quantity, 2), frames, tare=tare)
+    with pytest.raises(taxel.ProblemError, match="a plain rule by area needs neighbours on a grid"):
+        tune([example])
+    recipe = Recipe(taxel.encode.LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
+    judged = judge([example], recipe, [Fold([Part(0, stop=225_000)], [Part(0, start=225_000)])])
+    assert judged.plain.lacks == "plain rules need neighbours on a grid, and these are channels"
+    assert judged.plain.rules == {"contact": None}
+    assert judged.together.found == 1
+    assert (
+        run(
+            PlainRule("area", 2),
+            taxel.Frames(values, frames.t, array=taxel.Array(1, 4, pitch_mm=5.0)),
+            tare=taxel.Tare.take(taxel.Frames(values[:50], frames.t[:50], array=taxel.Array(1, 4, pitch_mm=5.0))),
+        ).label.tolist()
+        == ["contact", "lift"] * 2
+    )
+
+
+def test_a_rule_that_is_as_good_and_knows_sooner_is_named() -> None:
+    true = {"hit": [1000], "gone": [5000]}
+    rule = taxel.detect.PlainRule("area", 2)
+
+    def scored(known):
+        return taxel.detect.score(taxel.Detections(["hit", "gone"], [1000, 5000], known), true)
+
+    plain = taxel.detect.PlainScore({"hit": rule, "gone": None}, scored([1200, 5200]))
+    # Of "gone" there is no rule; a neuron that knows as soon, or earlier, is not named.
+    assert plain.sooner(scored([1500, 5500])) == ("hit",)
+    assert plain.sooner(scored([1200, 5500])) == plain.sooner(scored([1100, 5500])) == ()
+    assert plain.to_dict(scored([1500, 5500]))["sooner"] == ["hit"]
+    # A neuron that misses is worse, not later.
+    missed = taxel.detect.score(taxel.Detections([], [], []), true)
+    assert plain.sooner(missed) == ()
+    assert plain.better(missed) == ("hit",)
+
+
+def test_the_page_of_training_says_that_the_rule_knows_sooner() -> None:
+    true = {"hit": [1000]}
+    neuron, mine = (taxel.detect.score(taxel.Detections(["hit"], [1000], [known]), true) for known in (1500, 1200))
+    plain = taxel.detect.PlainScore({"hit": taxel.detect.PlainRule("area", 2)}, mine)
+    result = Result((), None, SimpleNamespace(plain=plain, together=neuron), "", {}, 50.0, searched=False)
+    (line,) = result._better()
+    assert line.startswith(
+        "hit: the plain rule is as good and knows sooner: 0 missed and false, as the neuron, known +0.2 ms after the "
+        "label (median), the neuron +0.5 ms; "
+    )

@@ -242,7 +242,7 @@ def test_a_missing_tare_is_said_and_taken_when_given(readout: Readout) -> None:
 
 def test_another_array_is_refused(readout: Readout) -> None:
     other = taxel.Events([1], [1], [1], [True], array=taxel.Array(9, 8), intensity=[5])
-    with pytest.raises(taxel.ProblemError, match="9 x 8 taxels: the readout was trained on small, 8 x 8"):
+    with pytest.raises(taxel.ProblemError, match="9 x 8 taxels: the readout was trained on 8 x 8"):
         run(readout, other, tare=tare())
     stream = readout.stream(tare=tare())
     with pytest.raises(taxel.ProblemError, match="input from 9 x 8 taxels"):
@@ -264,7 +264,7 @@ def test_neurons_trained_otherwise_are_refused() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"encoder": None}, "encoder is None: must be a taxel.Encoder"),
+        ({"encoder": None}, "encoder is None: must be a taxel.encode.Encoder"),
         ({"neurons": {}}, "must be trained neurons by label"),
         ({"neurons": None}, "must be trained neurons by label"),
         ({"neurons": {3: (taxel.Neuron(), [1.0] * 6)}}, "label is 3"),

@@ -73,6 +73,22 @@ def test_for_events_contact_and_lift_have_their_own_neurons_and_any_other_label_
     assert said(recipe, "Lift") == said(Recipe.load("touch"), "lift")
 
 
+@pytest.mark.parametrize(
+    ("labels", "inputs"),
+    [
+        (["grasp_begin", "Grasp end"], {"area"}),
+        (["soft_press", "hard_press"], {"moments"}),
+        (["contact", "heel contact"], {"area", "moments"}),
+        (["soft", "hard"], {"moments"}),
+    ],
+)
+def test_the_last_word_of_a_label_counts_where_one_label_alone_has_it(labels: list[str], inputs: set[str]) -> None:
+    recipe = Recipe.load("touch", labels=labels)
+    assert {recipe.inputs_of(label)[0] for label in labels} == inputs
+    if labels[0] == "grasp_begin":
+        assert said(recipe, "Grasp end") == said(Recipe.load("touch"), "lift")
+
+
 def test_a_recipe_for_certain_labels_refuses_others(tmp_path: Path) -> None:
     (tmp_path / "certain.toml").write_text('fits = ["events"]\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
     with pytest.raises(ProblemError, match=r"it is for contact, not for 'ball': .* there are gait_channel, "):

@@ -85,7 +85,7 @@ def test_the_order_in_which_parts_are_given_says_nothing() -> None:
     [
         ({}, "parts is empty"),
         (None, "parts is None: must be encoders by name"),
-        ({"a": 3}, r"parts\['a'\] is 3: must be a taxel.Encoder"),
+        ({"a": 3}, r"parts\['a'\] is 3: must be a taxel.encode.Encoder"),
         ({" ": FA1()}, "a part without a name"),
         ({3: FA1()}, "a name in parts is 3"),
         ({"a": Composite({"b": FA1()})}, "a is a composite itself"),

@@ -120,8 +120,8 @@ def test_renewals_go_on_over_a_gap_longer_than_the_window():
         (lambda: LevelCrossing([1.0], running_range=RunningRange(low=95, high=10)), "running_range from 95 to 10"),
         (lambda: LevelCrossing([1.0], running_range=RunningRange(high=101)), "high is 101 %: must be from 0 to 100"),
         (lambda: LevelCrossing([1.0], running_range=RunningRange(renew_s=-1)), "renew_s is -1 s"),
-        (lambda: LevelCrossing([1.0], running_range={"low": 1}), "running_range is .*: must be a taxel.RunningRange"),
-        (lambda: LevelCrossing([1.0], running_range=5), "running_range is 5: must be a taxel.RunningRange"),
+        (lambda: LevelCrossing([1.0], running_range={"low": 1}), "running_range is .*: must be a taxel.encode.Run"),
+        (lambda: LevelCrossing([1.0], running_range=5), "running_range is 5: must be a taxel.encode.RunningRange"),
     ],
 )
 def test_nonsense_gets_one_clear_line(call, said):

@@ -13,7 +13,7 @@ from taxel import Array, Frames, Tare
 from taxel.encode import LocalLoad
 
 from . import scenes
-from .scenes import rest, touch
+from .scenes import rest, spikes_of, touch
 
 REPAIRED = "read"
 #: Examples for the laws of all encoders (test_laws.py).
@@ -22,12 +22,16 @@ EXAMPLES = {
     "local load, of running means": LocalLoad(
         rest="tare", local_ms=(50, 300.5), noise_floor=1.0, least_noise=2.0, period_ms=0.3, tare=rest(scenes.ARRAY)
     ),
+    "local load, levels": LocalLoad(
+        levels=(0.5, 1.5, 3), release=0.6, local_ms=(20,), least_noise=1.0, tare=rest(scenes.ARRAY)
+    ),
 }
+GRADED = {label: encoder for label, encoder in EXAMPLES.items() if not len(encoder.levels)}
 
 
 def turned(encoder):
     """The trains as they stand on an array that is turned by half a turn: no quantity depends on the position."""
-    return np.arange(len(encoder.quantities))
+    return np.arange(encoder.trains(scenes.ARRAY))
 
 
 def around(values):
@@ -179,7 +183,7 @@ def test_names_and_their_order():
 
 def test_spikes_are_the_logarithm_of_the_quantities():
     events = touch(np.random.default_rng(3), scenes.ARRAY, repaired=0.1)
-    for encoder in EXAMPLES.values():
+    for encoder in GRADED.values():
         values, spikes = encoder.values(events), encoder.encode(events)
         times, trains = spikes.to_numpy()
         samples = np.rint((times - spikes.start) / encoder.period_ms).astype(int)
@@ -189,6 +193,43 @@ def test_spikes_are_the_logarithm_of_the_quantities():
         assert len(times) == np.count_nonzero(values)
         assert (values[:, -1] == 1).all()
         assert np.isfinite(values).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    local_ms=st.sampled_from([(), (50.0,), (20, 300)]),
+    levels=st.sampled_from([(4.0,), (0.5, 1.0, 3.0), (3.0, 4.0, 5.0, 6.0, 8.0)]),
+    release=st.sampled_from([1.0, 0.8, 0.5, 0.01]),
+)
+def test_levels_are_crossed_where_the_largest_sums_of_numpy_cross_them(seed, local_ms, levels, release):
+    rng = np.random.default_rng(seed)
+    array = Array(5, 7)
+    t = 5 + 192 * np.arange(150)
+    pictures = np.rint(rng.normal(55, rng.choice([0.0, 0.5, 2.0]), (150, 5, 7)))
+    for _ in range(4):
+        first, last = sorted(rng.integers(0, 150, 2))
+        y, x = rng.integers(0, 5), rng.integers(0, 7)
+        pictures[first:last, max(0, y - 1) : y + 2, max(0, x - 1) : x + 2] += rng.choice([-40, 3, 6, 15])
+    frames = Frames(pictures, t, unit="ticks", array=array)
+    graded = LocalLoad(local_ms=local_ms, tare=rest(array))
+    columns = [k for k, name in enumerate(graded.quantities) if name.startswith("largest") and "mean" not in name]
+    expected = []
+    for column, values in enumerate(graded.values(frames)[:, columns].T):
+        for place, level in enumerate(levels):
+            reached, train = False, column * len(levels) + place
+            for time, value in zip(t.tolist(), values, strict=True):
+                if not reached and value >= level:
+                    expected.append((time, train, 1.0))
+                elif reached and value < release * level:
+                    expected.append((time, len(columns) * len(levels) + train, 1.0))
+                else:
+                    continue
+                reached = not reached
+    encoder = LocalLoad(levels=levels, release=release, local_ms=local_ms, tare=rest(array))
+    assert spikes_of(encoder.encode(frames)) == sorted(expected)
+    assert encoder.trains(array) == 2 * len(columns) * len(levels)
+    assert (encoder.kind, graded.kind) == ("unsigned", "graded")
 
 
 def test_values_of_a_tare_in_seconds_are_those_of_one_measured_there():
@@ -264,6 +305,10 @@ def test_an_older_tare_without_noise_is_refused():
         ({"local_ms": 50}, "local_ms"),
         ({"period_ms": 0}, "period_ms is 0"),
         ({"tare": "soon"}, "tare"),
+        ({"levels": (4, 4)}, r"levels\[1\]: must be above the one before"),
+        ({"levels": (0, 4)}, r"levels\[0\] is 0"),
+        ({"release": 0}, "release is 0"),
+        ({"release": 1.1}, r"release is 1\.1"),
     ],
 )
 def test_nonsense_gets_one_clear_line(wrong, said):

@@ -74,7 +74,7 @@ def test_a_taxel_that_does_not_exist_has_no_rest():
     array = Array(1, 2, exists=np.array([[True, False]]))
     tare = Tare.take(Frames(np.ones((2, 1, 2)), [0, 100], array=array))
     assert np.array_equal(tare.rest, [[1.0, np.nan]], equal_nan=True)
-    assert repr(tare) == "Tare(1 of 1 taxels, 0 to 100 us)"
+    assert repr(tare) == "Tare(1 of 1 taxel, 0 to 100 us)"
 
 
 EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[5, 6])
@@ -87,11 +87,15 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
         (lambda: Tare.take(EVENTS, start_us=1.5), "start_us is 1.5"),
         (lambda: Tare.take(EVENTS, stop_us=True), "stop_us is True"),
         (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), "start must lie before stop"),
-        (lambda: Tare.take(EVENTS, stop_us=-5), "no event came"),
+        (lambda: Tare.take(EVENTS, stop_us=-5), "tare to -5 us: nothing came before it, but from "),
+        (lambda: Tare.take(EVENTS.between(0, 0)), "tare: there is no event"),
         (lambda: Tare.take(EVENTS, note=3), "note is 3"),
         (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), "without intensities"),
-        (lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])), "values must be finite"),
-        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must lie before stop|no event came"),
+        (
+            lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])),
+            "Frames.held fills the missing ones",
+        ),
+        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must lie before stop|nothing came"),
         (Tare, "is measured"),
         (lambda: Tare.from_json(5), "must be JSON text"),
         (lambda: Tare.from_json("[1"), "tare: "),
@@ -106,7 +110,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
         ),
         (
             lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace('"noise":[0.0]', '"noise":[-1.0]')),
-            "noise of taxel 0 must be 0 or more",
+            "noise of the taxel at row 0, column 0 must be 0 or more",
         ),
     ],
 )

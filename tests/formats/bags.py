@@ -55,6 +55,27 @@ def hand(thumb: Sequence[float], index: Sequence[float]) -> Make:
     return lambda types, ns: types[HAND](header(types, ns), np.array(thumb, float), np.array(index, float), "")
 
 
+def array_of(dtype: type[Any]) -> str:
+    """Return the std_msgs multi-array of a type of numbers."""
+    name = np.dtype(dtype).name.replace("uint", "UInt").capitalize().replace("Uint", "UInt")
+    return f"std_msgs/msg/{name}MultiArray"
+
+
+def multi_array(values: Any, sizes: Sequence[int], dtype: type[Any] = np.int16) -> Make:
+    """Return the maker of a std_msgs multi-array whose layout has these dimensions, as publishers fill it in."""
+
+    def make(types: dict[str, Any], _: int) -> Any:
+        dimension = types["std_msgs/msg/MultiArrayDimension"]
+        strides = np.cumprod([*sizes[::-1]])[::-1]
+        dims = [
+            dimension(f"d{k}", size, int(stride)) for k, (size, stride) in enumerate(zip(sizes, strides, strict=True))
+        ]
+        layout = types["std_msgs/msg/MultiArrayLayout"](dims, 0)
+        return types[array_of(dtype)](layout, np.asarray(values, dtype).reshape(-1))
+
+    return make
+
+
 def image(pixels: Any, encoding: str, *, padding: int = 0, big: bool = False) -> Make:
     """Return the maker of an image, with so many unused bytes at the end of each row."""
     pixels = np.asarray(pixels)

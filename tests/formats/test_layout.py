@@ -73,6 +73,32 @@ def test_a_compressed_table_a_numbered_time_column_and_missing_cells(tmp_path: P
     assert frames.t.tolist() == [500_000, 1_000_000, 1_500_000]
 
 
+@pytest.mark.parametrize("mark", ["nan", "NaN", "", "-"])
+def test_a_table_with_missing_cells_says_how_to_read_them(tmp_path: Path, mark: str) -> None:
+    """The layout line that the error names, added as it stands, opens the table."""
+    text = lines(VALUES).replace("6.5", mark)
+    with pytest.raises(FormatError, match=r"line 2: column 1 is .*\[table\] missing = '") as caught:
+        table(tmp_path, text, "rate_hz = 100\n")
+    remedy = str(caught.value).rpartition("[table] ")[2]
+    assert np.isnan(table(tmp_path, text, f"rate_hz = 100\n[table]\n{remedy}\n").frames().values[1, 0, 0])
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 3, 4096])
+def test_a_table_is_the_same_however_many_rows_are_read_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
+) -> None:
+    monkeypatch.setattr(taxel.formats.text, "_AT_ONCE", at_once)
+    layout = 'rate_hz = 100\n[table]\nmissing = "NA"\n'
+    frames = table(tmp_path, lines(VALUES).replace("6.5", "NA"), layout).frames()
+    expected = VALUES.copy()
+    expected[1, 0] = np.nan
+    np.testing.assert_array_equal(frames.values[:, 0], expected.astype(np.float32))
+    for cell, said in (("9,", "line 3: column 1 is 'x'"), ("9,8,", "line 3: 5 cells, must have 6")):
+        wrong = lines(VALUES).replace(cell, "x," if cell == "9," else "9,")
+        with pytest.raises(FormatError, match=said):
+            table(tmp_path, wrong, layout)
+
+
 def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
     for falls, expected in (("true", -VALUES), ("10", 10 - VALUES), ("false", VALUES)):
         recording = table(tmp_path, lines(VALUES), f"falls = {falls}\nrate_hz = 100")
@@ -103,9 +129,91 @@ def test_arrays_of_somebody_else(tmp_path: Path, ending: str, flat: bool) -> Non
     data = "" if ending == ".npy" else '[data]\narray = "palm"\ntime = "when"\n'
     layout = tmp_path / "elsewhere.toml"
     layout.write_text(("rows = 2\ncolumns = 3\n" if flat else "") + ("rate_hz = 4\n" if not data else "") + data)
-    frames = taxel.open(place, layout=layout).frames()
+    recording = taxel.open(place, layout=layout)
+    assert recording.lost == (("other arrays of the file: other",) if data else ())
+    frames = recording.frames()
     np.testing.assert_array_equal(frames.values, values.reshape(3, 2, 3).astype(np.float32))
     assert frames.t.tolist() == ([0, 250_000, 750_000] if data else [0, 250_000, 500_000])
+
+
+def test_a_given_sensor_lays_out_arrays_of_somebody_else_and_another_is_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", VALUES)
+    (tmp_path / "a.layout.toml").write_text("rate_hz = 10")
+    for array in (Array(2, 3), Array(2, 3, 4.5), Array(1, 6, 4.5)):
+        opened = taxel.open(tmp_path / "a.npy", array=array)
+        assert (opened.array.shape, opened.array.pitch_mm) == (array.shape, array.pitch_mm)
+        np.testing.assert_array_equal(opened.frames().values.reshape(3, 6), VALUES.astype(np.float32))
+    with pytest.raises(taxel.ProblemError, match=r"array: 5 x 1 taxels; .*a\.npy holds pictures of 1 x 6"):
+        taxel.open(tmp_path / "a.npy", array=Array(5, 1))
+    with pytest.raises(taxel.ProblemError, match="array is '2x3'"):
+        taxel.open(tmp_path / "a.npy", array="2x3")
+
+
+def test_times_that_are_no_us_are_told_their_unit() -> None:
+    with pytest.raises(taxel.ProblemError, match=r"t\[1\] is 0\.25: must be a whole number that fits int64, in us"):
+        Frames(VALUES[:, None], [0.0, 0.25, 0.75])
+
+
+def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as h5:
+        for run, more in (("run1", 0), ("run2", 1)):
+            h5[f"{run}/pressure"], h5[f"{run}/when"] = VALUES.reshape(3, 2, 3) + more, [0.0, 0.25, 0.75]
+    layout = tmp_path / "a.layout.toml"
+    for array, time in (("run2/pressure", "run2/when"), ("/run2/pressure", "/run2/when")):
+        layout.write_text(f'[data]\narray = "{array}"\ntime = "{time}"\n')
+        recording = taxel.open(tmp_path / "a.h5")
+        np.testing.assert_array_equal(recording.frames().values, VALUES.reshape(3, 2, 3).astype(np.float32) + 1)
+        assert recording.frames().t.tolist() == [0, 250_000, 750_000]
+        assert recording.lost == ("other arrays of the file: run1/pressure, run1/when",)
+    layout.write_text('[data]\narray = "pressure"\n')
+    with pytest.raises(FormatError, match=r"no array pressure; there are run1/pressure \(3 x 2 x 3\), run2/pressure"):
+        taxel.open(tmp_path / "a.h5")
+
+
+def test_arrays_without_a_layout_name_the_layout_that_would_read_them(tmp_path: Path) -> None:
+    import h5py
+
+    pictures, flat = VALUES.reshape(3, 2, 3), VALUES
+    np.save(tmp_path / "a.npy", flat)
+    np.savez(tmp_path / "b.npz", when=[1, 2, 3], palm=pictures)
+    with h5py.File(tmp_path / "c.h5", "w") as h5:
+        h5["run1/palm"] = pictures
+    for name, holds, keys in (
+        ("a.npy", r"an array \(3 x 6\)", "says what it is: rate_hz, rows, columns"),
+        ("b.npz", r"palm \(3 x 2 x 3\), when \(3\)", r'rate_hz, \[data\] array = "palm"'),
+        ("c.h5", r"run1/palm \(3 x 2 x 3\)", r'rate_hz, \[data\] array = "run1/palm"'),
+    ):
+        said = (
+            rf"{name}: holds {holds}, not written by taxel; a layout file beside it, {name[0]}\.layout\.toml, .*{keys}"
+        )
+        with pytest.raises(FormatError, match=rf"{said} \(docs/files\.md\)"):
+            taxel.open(tmp_path / name)
+        # The layout that the error names reads it.
+        data = "" if name == "a.npy" else f'[data]\narray = "{"run1/" * (name == "c.h5")}palm"\n'
+        (tmp_path / f"{name[0]}.layout.toml").write_text("rate_hz = 10\nrows = 2\ncolumns = 3\n" + data)
+        assert taxel.open(tmp_path / name).frames().values.shape == (3, 2, 3)
+
+
+@pytest.mark.parametrize(
+    ("layout", "said"),
+    [
+        ('array = "2x3"', "unknown key array; a size is said by rows = 2, columns = 3; there are"),
+        ('array = "palm"', r"unknown key array; it stands in \[data\]; there are"),
+        ('[data]\narray = "2x3x4.5"', r"the layout says \[data\] array: a size is said by rows = 2, .*pitch_mm = 4.5"),
+        ('[data]\ntime = "when"', r"the layout says \[data\] time: leave it out"),
+    ],
+)
+def test_a_size_or_a_name_where_none_belongs_is_told_where_it_does(tmp_path: Path, layout: str, said: str) -> None:
+    np.save(tmp_path / "a.npy", VALUES)
+    (tmp_path / "a.layout.toml").write_text(layout)
+    with pytest.raises(FormatError, match=said):
+        taxel.open(tmp_path / "a.npy")
+    np.savez(tmp_path / "b.npz", palm=VALUES, when=[1, 2, 3])
+    (tmp_path / "b.layout.toml").write_text('[data]\narray = "2x3"')
+    with pytest.raises(FormatError, match=r"no array 2x3; there are palm .*; a size is said by rows = 2, columns = 3"):
+        taxel.open(tmp_path / "b.npz")
 
 
 def test_a_layout_says_what_our_own_files_lack(tmp_path: Path) -> None:
@@ -181,6 +289,33 @@ def test_a_layout_that_makes_no_sense_is_refused_in_one_line(tmp_path: Path, lay
     assert "step" in str(refused.value)
 
 
+@pytest.mark.parametrize(("stated", "there"), [(",", ";"), (";", ","), (",", "\t"), (";", " ")])
+@pytest.mark.parametrize("head", ["", "heel, N\n"])
+def test_a_table_of_another_separator_is_named(tmp_path: Path, stated: str, there: str, head: str) -> None:
+    head = head.replace(", ", there)
+    with pytest.raises(FormatError, match=r"line 1: one column by the separator .*say in the layout"):
+        table(tmp_path, head + lines(VALUES, there), f'rate_hz = 50\n[table]\nseparator = "{stated}"')
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_table_of_times_in_us_with_another_separator_follows_its_layout(tmp_path: Path, given: bool) -> None:
+    head = "t_us;" + ";".join("abcdef") + "\n"
+    text = head + "".join(f"{20_000 * k};{';'.join(f'{v:g}' for v in row)}\n" for k, row in enumerate(VALUES))
+    (tmp_path / "step.csv").write_text(text)
+    layout = tmp_path / ("given.toml" if given else "step.layout.toml")
+    layout.write_text("rows = 2\ncolumns = 3\n[table]\nseparator = ';'\ntime_column = 't_us'\ntime_unit = 'us'\n")
+    frames = taxel.open(tmp_path / "step.csv", layout=layout if given else None).frames()
+    assert np.array_equal(frames.values.reshape(3, 6), VALUES)
+    assert frames.t.tolist() == [0, 20_000, 40_000]
+
+
+def test_a_name_with_a_comma_over_one_column_is_a_name(tmp_path: Path) -> None:
+    frames = table(
+        tmp_path, "force, N\n 1\n2\n3\n", "rows = 1\ncolumns = 1\nrate_hz = 50\n[table]\nseparator = ';'"
+    ).frames()
+    assert frames.values.ravel().tolist() == [1, 2, 3]
+
+
 @pytest.mark.parametrize(
     ("frames", "layout", "match"),
     [
@@ -208,7 +343,10 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
 @pytest.mark.parametrize(
     ("write", "match"),
     [
-        (lambda place: np.savez(place, a=np.zeros((2, 6)), b=np.zeros(3)), "holds a, b; say which in the layout"),
+        (
+            lambda place: np.savez(place, a=np.zeros((2, 6)), b=np.zeros(3)),
+            r"holds a \(2 x 6\), b \(3\); say which in the layout",
+        ),
         (lambda place: np.savez(place, a=np.zeros(6)), "must be numbers of shape pictures x rows x columns"),
         (lambda place: np.savez(place, a=np.array([["x"] * 6])), "must be numbers"),
         (lambda place: np.savez(place, a=np.zeros((2, 5))), "says 2 x 3 taxels"),

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+import taxel
 from taxel import FormatError, formats
+from taxel.cli import app
 from taxel.formats import moticon
 
 from .making import (
@@ -24,6 +29,26 @@ def test_moticon_rows_that_are_missing_for_a_foot_are_missing_not_zero(tmp_path)
     assert left.frames.values[left.frames.t == 610_000].min() == 2.5
     assert [list(left.truth[e]) for e in ("contact", "foot_off")] == [[500_000], [1_000_000]]
     assert left.series["total"].max() == 400
+
+
+def test_what_a_file_holds_beside_its_taxels_is_said_and_goes_with_the_file(tmp_path):
+    left, right = taxel.open(write_moticon(tmp_path))
+    columns = [
+        f"left {what}" for what in ("acceleration X[g]", "angular Z[dps]", "center of pressure X[-0.5...+0.5]", "cop Y")
+    ]
+    for recording, other in ((left, "right "), (right, "left ")):
+        [line] = recording.lost
+        assert line.startswith("columns that are no taxels: total, ")
+        assert other not in line
+        assert "pressure 1" not in line
+    assert all(column in left.lost[0] for column in columns)
+    for file in ("left.mcap", "left.npz", "left.h5"):
+        assert taxel.convert(left, tmp_path / file)[0] == left.lost[0]
+        assert taxel.open(tmp_path / file).lost[0] == left.lost[0]
+    facts = json.loads(CliRunner().invoke(app, ["info", str(tmp_path / "left.mcap"), "--json"]).stdout)
+    assert left.lost[0] in facts["lost"]
+    page = CliRunner().invoke(app, ["info", str(tmp_path / "left.mcap")]).stdout
+    assert f"left behind         {left.lost[0]}" in page
 
 
 def test_moticon_reports_are_taken_where_they_are(tmp_path):

@@ -26,6 +26,10 @@ def test_interpolated_rows_come_back_within_one_count(seed, start, sensors):
     found = plate.sensor_rows(interpolated(true, start, 45))
     used = found[: len(true)]
     assert np.abs(used - true[: len(used)])[: len(true) // 2 * 2 - 2].max() <= 1
+    # Columns and frames without any load stay so, and change no other.
+    around = [(0, 0), tuple(rng.integers(0, 4, 2)), tuple(rng.integers(0, 4, 2))]
+    padded = plate.sensor_rows(np.pad(interpolated(true, start, 45), around))
+    assert np.array_equal(padded, np.pad(found, around))
 
 
 def test_rows_that_were_not_interpolated_are_refused():

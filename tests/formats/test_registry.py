@@ -34,6 +34,21 @@ def test_a_folder_of_no_or_of_several_formats_is_refused(tmp_path):
         list(formats.trials(tmp_path / "nothing"))
 
 
+@pytest.mark.skipif(not Path("/proc/self/io").exists(), reason="counts bytes read as Linux does")
+@pytest.mark.parametrize("ending", ["csv", "txt", "asc", "asf", "lst", "h5", "npz"])
+def test_a_large_file_is_recognised_by_its_beginning(ending, tmp_path):
+    """The panel recognises a file before it serves its page."""
+    file = tmp_path / f"hour.{ending}"
+    file.write_bytes(b"t_us,x0y0\n" + b"1000,2\n" * 4_000_000)
+
+    def read() -> int:
+        return int(Path("/proc/self/io").read_text().split()[1])
+
+    before = read()
+    assert [name for name, kind in formats.FORMATS.items() if kind.files(file)] == []
+    assert read() - before < 1 << 20
+
+
 @pytest.mark.parametrize("write", [making.write_pedar, making.write_emed, making.write_tekscan])
 def test_an_ending_in_capitals_is_the_same_ending(write, tmp_path):
     """Programs of Windows and before write WALK.ASC."""

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from shell import call
 
 import taxel
 from taxel.recording.pressure import readings
+from taxel.recording.rest import of_pictures
 
 from .making import SHARED
 
@@ -62,3 +67,174 @@ def test_a_channel_that_begins_with_somebody_standing_on_it_has_no_rest() -> Non
             assert np.mean((frames.values - rest.values[0]) * scale < -8) <= 0.1
     assert {name for name, source in sources.items() if source == "quiet"} == UNLOADED
     assert len(sources) == 24
+
+
+#: When a palm's press of two fifths of the time is felt, us.
+PRESSED = (("contact", 40_000), ("lift", 220_000))
+
+
+def palm(seed: int, sign: int, share: float) -> taxel.Frames:
+    """Pictures of a noisy palm with offsets that is pressed twelve times, so long a share of the time."""
+    random = np.random.default_rng(seed)
+    values = random.uniform(2800, 3200, (24, 32)) + random.normal(0, random.uniform(0, 8), (900, 24, 32))
+    y, x = np.mgrid[:24, :32]
+    for k in range(12):
+        long = round(65 * share)
+        bump = np.exp(-((y - random.uniform(4, 20)) ** 2 + (x - random.uniform(4, 28)) ** 2) / 18)
+        values[100 + 65 * k :][:long] += sign * 800 * np.sin(np.linspace(0, np.pi, long))[:, None, None] * bump
+    return taxel.Frames(np.round(values), np.arange(900) * 10_000, unit="counts", array=taxel.Array(24, 32))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("share", [0.1, 0.4, 0.8])
+def test_values_that_fall_with_pressure_are_said(seed: int, share: float) -> None:
+    risen, fallen = (of_pictures(palm(seed, sign, share)) for sign in (1, -1))
+    assert (risen.source, risen.falls) == ("quiet", False)
+    assert fallen.falls
+    assert "falls = true in a layout file" in str(fallen)
+    assert "falls" not in str(risen)
+
+
+def mat(seed: int, sign: int) -> taxel.Frames:
+    """Pictures of a mat at 50 Hz that creeps, an offset by taxel, each press held for up to a second."""
+    random, t = np.random.default_rng(seed), np.arange(3000) / 50
+    y, x = np.mgrid[:16, :16]
+    creep = (np.exp(-t / 30) - 1)[:, None, None] * random.uniform(30, 90, (16, 16))
+    values = random.normal(2000, 60, (16, 16)) + creep + random.normal(0, 5, (3000, 16, 16))
+    begins = 1.5
+    for _ in range(22):
+        begins += random.uniform(0.7, 1.4)
+        ends = begins + random.uniform(0.5, 1.1)
+        force = np.exp(random.uniform(np.log(150), np.log(1600)))
+        force *= np.clip(np.minimum(t - begins, ends - t) / 0.06, 0, 1)
+        bump = np.exp(-((y - random.uniform(3, 12)) ** 2 + (x - random.uniform(3, 12)) ** 2) / 5.12)
+        values += sign * force[:, None, None] * bump
+        begins = ends
+    return taxel.Frames(np.round(values), np.arange(3000) * 20_000, unit="counts", array=taxel.Array(16, 16))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("bad", [None, 0, 4095])
+def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float | None) -> None:
+    """A quiet stretch within a press sets the tracked rest anew; two bad taxels hide nothing and pretend nothing."""
+    for sign in (1, -1):
+        frames = mat(seed, sign)
+        if bad is not None:
+            values = frames.values.copy()
+            values[100::200, 3, 3:5] = bad
+            frames = taxel.Frames(values, frames.t, unit="counts", array=frames.array)
+        assert of_pictures(frames).falls == (sign < 0)
+    taxel.convert(frames, tmp_path / "mat.npz")
+    code, shown, _ = call(capsys, "info", tmp_path / "mat.npz")
+    assert code == 0
+    assert "say falls = true in a layout file" in shown
+    assert "contact area" not in shown
+
+
+def test_a_load_that_lay_there_from_the_start_is_no_fall() -> None:
+    values = np.random.default_rng(3).normal(500, 2, (2000, 8, 8))
+    values[:1500, 2:6, 2:6] += 300
+    assert not of_pictures(taxel.Frames(values, np.arange(2000) * 10_000, unit="counts")).falls
+
+
+def test_encode_train_and_detect_hold_missing_values_and_count_them(tmp_path, capsys) -> None:
+    rows = [f"{label},{1_000_000 + 650_000 * k + late}\n" for k in range(12) for label, late in PRESSED]
+    (tmp_path / "labels.csv").write_text("label,t_us\n" + "".join(rows))
+    frames = palm(6, 1, 0.4)
+    values = frames.values.copy()
+    values[np.random.default_rng(6).random(values.shape) < 0.01] = np.nan
+    values[:, 0, 0] = np.nan
+    holes = taxel.Frames(values, frames.t, unit=frames.unit, array=frames.array)
+    taxel.convert(holes, tmp_path / "palm.npz")
+    said = f"{holes.missing} of {values.size} values are missing (NaN): each is held"
+    at = tmp_path / "palm.npz"
+    for command in (
+        (
+            "encode",
+            at,
+            tmp_path / "spikes.npz",
+            "--encoder",
+            "level_crossing",
+            "--set",
+            "levels=[200]",
+            "--tare",
+            "0.5",
+        ),
+        ("train", at, "--labels", tmp_path / "labels.csv", "-o", tmp_path / "touch", "--folds", "0"),
+        ("detect", at, "--readout", tmp_path / "touch", "--tare", "0.5", "--json"),
+    ):
+        code, shown, error = call(capsys, *command)
+        assert code == 0, error
+        assert error.count(said) == 1
+        assert "1 taxel without any value reads 0" in error
+    assert len(json.loads(shown)["detections"]) >= 20
+    held = taxel.encode.LevelCrossing([200.0]).with_tare(taxel.Tare.take(holes.held(), stop_us=500_000))
+    assert taxel.SpikeTrains.load(tmp_path / "spikes.npz") == held.encode(holes.held())
+
+
+def test_info_counts_missing_values_readings_at_full_scale_and_gaps(tmp_path, capsys) -> None:
+    frames = palm(7, 1, 0.4)
+    flawless = facts_of(frames, tmp_path / "flawless.npz", capsys)
+    assert flawless["missing"]["values"] == 0
+    assert flawless["full_scale"] is flawless["gaps"] is None
+    values = np.minimum(frames.values, 3300)
+    values[3:400, 1, 2] = np.nan
+    # Always at the greatest value: stuck, not at full scale.
+    values[:, 5, 5] = 3300
+    keep = np.ones(len(frames), bool)
+    keep[[200, 300, 301, 302, 500, 501]] = False
+    flawed = taxel.Frames(values[keep], frames.t[keep], unit="counts", array=frames.array)
+    facts = facts_of(flawed, tmp_path / "flawed.npz", capsys)
+    assert facts["missing"] == {"values": np.count_nonzero(np.isnan(values[keep])), "of": flawed.values.size}
+    counts = np.count_nonzero(values[keep] == 3300, axis=0)
+    counts[5, 5] = 0
+    counts[counts < 3] = 0
+    assert facts["full_scale"] == {"value": 3300, "readings": counts.sum(), "taxels": np.count_nonzero(counts)}
+    assert counts.any()
+    # One picture left out is two intervals.
+    assert facts["gaps"] == {"count": 2, "longest_us": 40_000, "t_us": 2_990_000}
+    code, shown, _ = call(capsys, "info", tmp_path / "flawed.npz")
+    assert code == 0
+    assert all(f"  {name:<20}" in shown for name in ("missing values", "full scale", "gaps"))
+
+
+def facts_of(frames: taxel.Frames, place: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    taxel.convert(frames, place)
+    code, shown, _ = call(capsys, "info", place, "--json")
+    assert code == 0
+    return json.loads(shown)
+
+
+def test_training_on_values_that_fall_says_what_turns_them(tmp_path, capsys) -> None:
+    taxel.convert(palm(5, -1, 0.4), tmp_path / "palm.npz")
+    rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
+    (tmp_path / "labels.csv").write_text("label,t_us\n" + "".join(rows))
+    code, _, said = call(
+        capsys, "train", tmp_path / "palm.npz", "--labels", tmp_path / "labels.csv", "-o", tmp_path / "a"
+    )
+    assert code == 2
+    assert "nothing was felt in the recording up to" in said
+    assert "falls = true" in said
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_turns_them(tmp_path, capsys, sign):
+    """Of values that rise nothing is said where nothing is detected; nor where something is."""
+    taxel.convert(palm(5, sign, 0.4), tmp_path / "palm.npz")
+    # No press loads 700 of the 768 taxels; each loads 5.
+    for threshold, finds in ((700, False), (5, sign > 0)):
+        rule = tmp_path / f"{threshold}.json"
+        taxel.detect.PlainRule("area", threshold, noise_floor=100.0).save(rule)
+        command = ("detect", tmp_path / "palm.npz", "--readout", rule, "--tare", "0.5")
+        code, shown, _ = call(capsys, *command)
+        assert code == 0
+        code, as_json, _ = call(capsys, *command, "--json")
+        hint, found = (json.loads(as_json)[name] for name in ("hint", "detections"))
+        assert bool(found) == finds
+        if sign < 0:
+            assert hint.startswith("rest: a quiet stretch")
+            assert "say falls = true in a layout file" in hint
+            assert hint in shown
+        else:
+            assert hint is None
+            assert "falls" not in shown

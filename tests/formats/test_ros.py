@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sqlite3
 import sys
@@ -17,6 +18,8 @@ from shell import call
 
 import taxel
 from taxel import FormatError, ProblemError
+from taxel.cli._opening import FileOptions
+from taxel.cli._recordings import references
 from taxel.formats import ros
 from taxel.formats.ros.reading import _times
 
@@ -41,7 +44,7 @@ def test_a_palm_opens_as_pictures_from_every_kind_of_bag(name: str, tmp_path: Pa
     opened = taxel.open(bag, topic="/palm", field="taxels", array=PALM_ARRAY)
     t = BEGIN_NS // 1000 + np.arange(6) * 10_000
     assert opened.frames() == taxel.Frames(PALMS, t, unit="counts", array=PALM_ARRAY)
-    assert (opened.kind, opened.verdict, opened.source) == ("ros", "nothing left out", f"/palm.taxels ({PALM})")
+    assert (opened.kind, opened.remarks, opened.source) == ("ros", (), f"/palm.taxels ({PALM})")
     assert opened.counts == {"messages": 6, "messages_of_another_length": 0, "times_by_the_bag": 0}
     # The only field with numbers need not be named; without an array a message is one row.
     assert np.array_equal(taxel.open(bag, topic="/palm").frames().values[:, 0], PALMS.reshape(6, 768))
@@ -114,15 +117,84 @@ def test_topics_fields_and_parts_of_lists_become_sources(tmp_path: Path) -> None
     assert np.array_equal(both.sources["hand"].frames().values[:, 0, 2], np.arange(6))
     with pytest.raises(ProblemError, match=r"holds 2 sources \(palm, hand\); say which"):
         both.frames()
+    # What else the bag holds is named, in a recording made from it too.
+    assert {one.lost for one in both.sources.values()} == {("other topics of the bag: /skin",)}
+    taxel.convert(both, tmp_path / "both.mcap")
+    assert taxel.open(tmp_path / "both.mcap").sources["hand"].lost == ("other topics of the bag: /skin",)
     fingers = taxel.open(bag, topic="/hand", field=["thumb", "index"])
     assert {name: one.array.shape for name, one in fingers.sources.items()} == {
-        "hand.thumb": (1, 3),
-        "hand.index": (1, 2),
+        "hand_thumb": (1, 3),
+        "hand_index": (1, 2),
     }
     forces = taxel.open(bag, topic="/skin", field="patches.forces.z")
     assert np.array_equal(forces.frames().values[:, 0], [[0.5, k, 1.5] for k in range(6)])
-    assert forces.verdict == "at the bag's times, as its messages have no header"
+    assert forces.remarks == ("at the bag's times, as its messages have no header",)
     assert np.array_equal(taxel.open(bag, topic="/skin", field="patches.1.taxels").frames().values[0, 0], [3, 4])
+
+
+@pytest.mark.parametrize("sizes", [(24, 32), (768,), ()])
+def test_a_multi_array_is_its_data_and_says_its_rows_and_columns(
+    sizes: tuple[int, ...], tmp_path: Path, capsys
+) -> None:
+    kind = "std_msgs/msg/Int16MultiArray"
+    sent = [("/raw", kind, 10 * k, None, bags.multi_array(PALMS[k], sizes)) for k in range(3)]
+    sent.append(("/status", "std_msgs/msg/Float64", 40, None, lambda types, _: types["std_msgs/msg/Float64"](1.0)))
+    bag = bags.write(tmp_path / "palm.mcap", sent)
+    [topic] = ros.topics(bag)
+    assert (topic.field, topic.shape) == ("data", sizes if len(sizes) == 2 else (768,))
+    assert "--topic /raw --field data" in call(capsys, "info", bag)[1]
+    frames = taxel.open(bag, topic="/raw").frames()
+    assert frames.array.shape == ((24, 32) if len(sizes) == 2 else (1, 768))
+    assert np.array_equal(frames.values.reshape(3, 24, 32), PALMS[:3])
+    with pytest.raises(FormatError, match="topic /status: no field with more numbers than one"):
+        taxel.open(bag, topic="/status")
+
+
+@pytest.mark.parametrize("name", ["grasp.bag", "grasp.db3"])
+@pytest.mark.parametrize("begins", [0, 2])
+def test_multi_arrays_of_every_number_are_listed_and_read_also_after_empty_ones(
+    begins: int, name: str, tmp_path: Path
+) -> None:
+    dtypes = (np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64, np.float32, np.float64)
+    values = RNG.integers(0, 100, (5, 2, 3))
+    sent = [
+        (f"/{np.dtype(d).name}", bags.array_of(d), 10 * k, None,
+         bags.multi_array(values[k] if k >= begins else [], (2, 3) if k >= begins else (0, 0), d))
+        for k in range(5) for d in dtypes
+    ]  # fmt: skip
+    sent.append(("/never", bags.array_of(np.float64), 60, None, bags.multi_array([], (0,), np.float64)))
+    sent.append(("/one", bags.array_of(np.float64), 61, None, bags.multi_array([1], (1,), np.float64)))
+    bag = bags.write(tmp_path / name, sent)
+    listed = {one.topic: (one.field, one.shape, one.dtype, one.messages) for one in ros.topics(bag)}
+    assert listed == {f"/{(n := np.dtype(d).name)}": ("data", (2, 3), n, 5) for d in dtypes}
+    for d in dtypes:
+        opened = taxel.open(bag, topic=f"/{np.dtype(d).name}")
+        assert np.array_equal(opened.frames().values, values[begins:])
+        assert opened.frames().unit == ("as sent" if np.dtype(d).kind == "f" else "counts")
+        assert opened.counts["messages_of_another_length"] == begins
+
+
+def test_texts_count_from_the_recordings_beginning_and_json_from_1970(tmp_path: Path, capsys) -> None:
+    values = RNG.integers(0, 2, (200, 4, 4)) + 100 * (np.arange(200) > 120)[:, None, None]
+    sent = [
+        ("/a", bags.array_of(np.float64), 10 * k, None, bags.multi_array(values[k], (4, 4), float)) for k in range(200)
+    ]
+    bag, begin = bags.write(tmp_path / "a.bag", sent), BEGIN_NS // 1000
+    info = ("info", bag, "--topic", "/a")
+    said = call(capsys, *info)[1]
+    assert said.splitlines()[0].startswith(f"{bag}: ROS bag, from /a.data")
+    assert re.search(r"^  rest +a quiet stretch, 0\.\d+ to [01]\.\d+ s, tracked from there$", said, re.M)
+    assert "the ROS bag does not say what was lost" in said
+    # Only the line that says the beginning has the time since 1970.
+    assert [line.split()[0] for line in said.splitlines() if "1795" in line] == ["from"]
+    quiet = json.loads(call(capsys, *info, "--json")[1])["rest"]["quiet_us"]
+    assert begin <= quiet[0] < quiet[1] <= begin + 1_990_000
+    labels = tmp_path / "labels.csv"
+    for t in (600_000, begin + 10**7):
+        labels.write_text(f"label,t_us\ncontact,{t}\n")
+        wrong = call(capsys, "train", bag, "--topic", "/a", "--labels", labels, "-o", tmp_path / "r.json")[2]
+        assert "holds 1 event, none within" in wrong
+        assert f"(0.000 to 1.990 s); it begins 2026-11-18 11:06:40.000 UTC, {begin} us since 1970, and labels" in wrong
 
 
 def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> None:
@@ -132,7 +204,7 @@ def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> 
     for array in (None, taxel.Array(1, 3)):
         opened = taxel.open(bag, topic="/hand", field="thumb", array=array)
         assert (opened.counts["messages"], opened.counts["messages_of_another_length"]) == (4, 2)
-        assert opened.verdict == "2 messages of another length left out"
+        assert opened.remarks == ("2 messages of another length left out",)
         assert np.array_equal(opened.frames().t - BEGIN_NS // 1000, [0, 10_000, 30_000, 50_000])
     with pytest.raises(FormatError, match="thumb: its messages hold 3 values; the array has 2 x 2"):
         taxel.open(bag, topic="/hand", field="thumb", array=taxel.Array(2, 2))
@@ -162,7 +234,7 @@ def test_a_stamp_of_0_or_one_that_steps_back_gives_way_to_the_bags_time(
     opened = taxel.open(bags.write(tmp_path / "grasp.mcap", several), topic="/palm")
     assert (opened.frames().t - BEGIN_NS // 1000).tolist() == [1000 * ms for ms in expected]
     assert opened.counts["times_by_the_bag"] == by_the_bag
-    assert (f"{by_the_bag} of 4 messages at the bag's time" in opened.verdict) == (by_the_bag > 0)
+    assert any(f"{by_the_bag} of 4 messages at the bag's time" in line for line in opened.remarks) == (by_the_bag > 0)
 
 
 @given(
@@ -340,3 +412,38 @@ def test_from_a_bag_to_a_detection_on_the_command_line(tmp_path: Path, monkeypat
     assert call(capsys, "cut", "grasp", "part.npz", *finger, "--rows", "0:1")[0] == 0
     assert taxel.open("part.npz").array.shape == (1, 3)
     assert call(capsys, "merge", "grasp", "grasp", *finger, "--gap", 1, "-o", "both.npz")[0] == 0
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        {"left": ",/grip/left,", "right": ",/grip/right,"},
+        {"left": ",grip_left,", "right": ",grip_right,"},
+        {"left": "pick,grip_left,", "right": "pick,/grip/right,"},
+        {"left": "pick grip_left,,", "right": "pick grip_right,,"},
+        {"left": "pick.mcap grip_left,,", "right": "pick,grip_right,"},
+    ],
+    ids=["topics", "sources", "recording and source", "titles", "mixed"],
+)
+def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tmp_path: Path) -> None:
+    rows, us = [("left", 20_000), ("right", 30_000), ("left", 70_000)], BEGIN_NS // 1000
+    several = [
+        (f"/grip/{side}", SKIN, 10 * k, None, bags.skin([([k, 0], [1])]))
+        for k in range(10)
+        for side in ("left", "right")
+    ]
+    bag = bags.write(tmp_path / "pick.mcap", several)
+    table = tmp_path / "labels.csv"
+    table.write_text("recording,source,label,t_us\n" + "".join(f"{names[s]}touch,{us + t}\n" for s, t in rows))
+    options = FileOptions(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
+    opened = options.all([bag])
+    left, right = references(str(table), "--labels", opened)
+    assert [(left["touch"] - us).tolist(), (right["touch"] - us).tolist()] == [[20_000, 70_000], [30_000]]
+    table.write_text(table.read_text() + "pick"[: 4 * (names["left"][0] != ",")] + f",/grip/thumb,touch,{us}\n")
+    with pytest.raises(ProblemError, match="is of source grip_thumb; there is grip_left, grip_right"):
+        references(str(table), "--labels", opened)
+    table.write_text(f"label,t_us\ntouch,{us + 20_000}\n")
+    assert [one["touch"].tolist() for one in references(str(table), "--labels", opened)] == [[us + 20_000]] * 2
+    other = bags.write(tmp_path / "other.mcap", several)
+    with pytest.raises(ProblemError, match="names no recording, and there are 2; must have the column recording"):
+        references(str(table), "--labels", options.all([bag, other]))

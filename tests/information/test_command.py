@@ -331,3 +331,47 @@ def test_folders_of_labels_are_named_where_their_folder_is_given(tmp_path):
         taxel.convert(events, tmp_path / "trials" / label / "one.npz")
     done = run(tmp_path / "trials", "--window-ms", "60", "--report", tmp_path / "page.html")
     assert str(done.exception).endswith("trials: holds no recording; its folders left, right do: name them")
+
+
+def test_numbered_pictures_are_refused_until_a_rate_is_given(tmp_path):
+    rng = np.random.default_rng(4)
+    (tmp_path / "hand").mkdir()
+    (tmp_path / "hand" / "layout.toml").write_text("rows = 2\ncolumns = 2\n")
+    grasps = tmp_path / "hand" / "grasps.csv"
+    pressed = np.repeat(np.arange(40) % 2, 10)[:, None] * rng.integers(20, 60, (400, 4))
+    np.savetxt(grasps, pressed, fmt="%d", delimiter=",", header="a,b,c,d", comments="")
+    recording = taxel.open(grasps)
+    assert not recording.timed
+    (tmp_path / "l.csv").write_text("t_us,label\n" + "".join(f"{200_000 * k},{'ab'[k % 2]}\n" for k in range(20)))
+    for labels in (("--labels", tmp_path / "l.csv"), ("--labels", "notes"), ()):
+        refused = run(grasps, *labels, *QUICK, "--report", tmp_path / "page.html")
+        assert isinstance(refused.exception, ProblemError)
+        assert "grasps.csv: its pictures have no times; say how many there are a second: --rate-hz" in str(
+            refused.exception
+        )
+    assert not (tmp_path / "page.html").exists()
+    done = run(
+        grasps,
+        "--rate-hz",
+        "100",
+        "--labels",
+        tmp_path / "l.csv",
+        "--window-ms",
+        "100",
+        "--periods",
+        "10",
+        "--windows",
+        "50",
+        "--draws",
+        "1",
+        "--shuffles",
+        "2",
+        "--taxels",
+        "1",
+        "--folds",
+        "2",
+        "--report",
+        tmp_path / "page.html",
+    )
+    assert done.exit_code == 0, done.exception
+    assert "20 trials" in done.stdout

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import re
 
 import numpy as np
 import pytest
 from making import made
-from stated import examples
+from stated import examples, graded
 
 from taxel import Neuron, ProblemError, SpikeTrains
-from taxel.learn import Certificate, ConeX, ConeXProblem, Row, check_certificate
+from taxel.learn import Certificate, ConeR, ConeX, ConeXProblem, Row, check_certificate
+from taxel.learn._statement import pattern_rows
 
 
 def refuted(seed=0, **options):
@@ -28,7 +31,7 @@ def test_no_is_always_proven_and_nothing_else_is_claimed(options):
         assert check_certificate(cone.problem_, cone.certificate_)
         assert np.isnan(cone.weights_).all()
         assert cone.objective_ == np.inf
-        assert cone.gap_ == 0.0
+        assert np.isnan(cone.gap_)
         others = np.array([row.kind != "target" for row in cone.certificate_.rows])
         assert np.all(cone.certificate_.multipliers[others] >= 0)
 
@@ -204,3 +207,107 @@ def test_what_cancels_in_a_coefficient_is_no_proof() -> None:
         assert check_certificate(problem, proof) == proven
     plain = SpikeTrains.from_lists([[10.0], [30.0]], stop=60.0, values=[[1e-8], [1.0]], kind="graded")
     assert Neuron(tau=10.0).potential([1e9, 0.0], plain, [20.0])[0] > 0.3
+
+
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+def test_the_check_states_its_rows_itself(time, monkeypatch):
+    cone = refuted(3, time=time)
+
+    def none(*_, **__):
+        raise AssertionError("a row of the compiled part was asked for")
+
+    monkeypatch.setattr(ConeXProblem, "row", none)
+    cone.problem_._problem = cone.problem_.lb = cone.problem_.ub = None
+    assert check_certificate(cone.problem_, cone.certificate_)
+
+
+@pytest.mark.parametrize("kernel", ["alpha", "double_exponential", "exponential"])
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
+@pytest.mark.parametrize("first_threshold", ["theta_0", "printed"])
+def test_the_rows_of_the_check_are_those_of_the_problem(kernel, time, after_spike, first_threshold):
+    if (kernel, time) == ("exponential", "continuous"):
+        pytest.skip("this kernel crosses no threshold in continuous time")
+    options = {"kernel": kernel, "time": time, "after_spike": after_spike, "first_threshold": first_threshold}
+    for seed in range(3):
+        random = np.random.default_rng([44, seed])
+        patterns, targets = examples(seed, trains=8, patterns=2, targets=2, whole_ms=time == "grid")
+        patterns = graded(patterns, seed) if seed == 2 else patterns
+        cone = made(ConeX, **options, theta_plus=1.0, margin=0.05)
+        problem = ConeXProblem(cone, patterns, targets)
+        stated = pattern_rows(cone, cone.neuron, patterns, problem.targets, margin=problem.margin)
+        asked = 0
+        for p, rows in enumerate(stated):
+            times = random.uniform(rows.start, rows.end, 60)
+            times = np.append(times, (targets[p] - 10.0 ** random.uniform(-7, 1, (9, 2))).ravel())
+            times = np.unique(times.round() if time == "grid" else times)
+            names = [("target", k) for k in range(2)] + [("slope", k) for k in range(2)] * (time == "continuous")
+            for t in times:
+                try:
+                    problem.silence(p, t)
+                except ProblemError:
+                    assert not rows.is_silent(np.array([t]))[0], t
+                    continue
+                assert rows.is_silent(np.array([t]))[0], t
+                names.append(("silence", t))
+                asked += 1
+            for kind, at in names:
+                for margin in (True, False):
+                    coefficients, limit = problem.row((kind, p, at), margin=margin)
+                    here, _, its = rows.named(kind, at, "", margin=margin)
+                    assert here == pytest.approx(coefficients, rel=1e-9, abs=1e-13), (kind, at)
+                    assert its == pytest.approx(limit, rel=1e-9, abs=1e-13), (kind, at)
+        assert asked > 40
+
+
+def test_a_certificate_of_a_row_that_is_not_there_is_one_clear_error():
+    cone = refuted()
+    for row, said in (
+        (Row("silence", 99, 5.0), "a row of pattern 99, there are 8"),
+        (Row("target", 0, 7), "the problem has no such row"),
+        (Row("silence", 0, 1e6), "the problem has no such row"),
+        (Row("behind", 0, 0), "the problem has no such row"),
+    ):
+        with pytest.raises(ProblemError, match=said):
+            check_certificate(cone.problem_, Certificate([row], np.ones(1), 1.0, False, ""))
+
+
+def test_a_certificate_goes_through_json_and_proves_the_same():
+    cone = refuted()
+    text = json.dumps(cone.certificate_.to_dict())
+    again = Certificate.from_dict(json.loads(text))
+    assert again.rows == cone.certificate_.rows
+    assert np.array_equal(again.multipliers, cone.certificate_.multipliers)
+    assert again.to_dict() == cone.certificate_.to_dict()
+    assert check_certificate(cone.problem_, again)
+    held = json.loads(text)
+    for wrong, said in (
+        ([], "must be a dict of rows"),
+        ({**held, "more": 1}, "must be a dict of rows"),
+        ({**held, "multipliers": held["multipliers"][1:]}, "multipliers? for"),
+        ({**held, "rows": [["target", 0]] * len(held["rows"])}, "must be kind, pattern and target or time"),
+        ({**held, "at_all": "yes"}, "at_all"),
+        ({**held, "gap": None}, "gap"),
+    ):
+        with pytest.raises(ProblemError, match=said):
+            Certificate.from_dict(wrong)
+
+
+def test_a_certificate_has_one_multiplier_a_row() -> None:
+    trains = SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
+    cone = ConeX().fit([trains], [[40.0]])
+    proof = dataclasses.replace(cone.certificate_, multipliers=np.ones(len(cone.certificate_.rows) + 1))
+    with pytest.raises(ProblemError, match=r"certificate: 2 multipliers for 1 row: must be one a row"):
+        check_certificate(cone.problem_, proof)
+
+
+def test_the_repr_of_a_fit_says_how_it_ended() -> None:
+    patterns, targets = examples(0, trains=12, patterns=8, targets=1)
+    assert repr(ConeX(lb=-1, ub=1)) == "ConeX(lb=-1, ub=1)"
+    assert repr(ConeX(lb=-1, ub=1).fit(patterns, targets)) == "<ConeX(lb=-1, ub=1): infeasible>"
+    solved = ConeX(lb=-9, ub=9).fit(patterns[:1], targets[:1])
+    assert re.fullmatch(r"<ConeX\(lb=-9, ub=9\): solved, gap_ \d\.\de[-+]\d+>", repr(solved))
+    more = examples(6, trains=120, patterns=2, targets=2, duration=200.0)
+    stopped = ConeX(max_seconds=1e-9).fit(*more)
+    assert repr(stopped).startswith("<ConeX(max_seconds=1e-09): stopped, violation_ ")
+    assert re.fullmatch(r"<ConeR\(\): solved, gap_ \d\.\de-\d+>", repr(ConeR().fit(*more)))

@@ -124,8 +124,8 @@ def test_control_c_keeps_the_best_so_far_and_the_pattern():
         learn_for_ever()
     assert online.status_ in ("solved", "stopped")
     assert online.patterns_ >= 1
-    assert repr(online).startswith("OnlineConeR(neuron=Neuron(tau=40.0), ")
-    assert "window=50" in repr(online)
+    assert repr(online).startswith("<OnlineConeR(neuron=Neuron(tau=40.0), ")
+    assert f"window=50): {online.status_}, gap_ " in repr(online)
 
 
 @pytest.mark.parametrize("learner", [ConeR(), OnlineConeR(window=2)])

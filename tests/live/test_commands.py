@@ -1,25 +1,30 @@
 """The commands `taxel record` and `taxel live`: when they end, what they print and with which exit code."""
 
+import contextlib
 import json
 import re
 import signal
 import socket
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from loopback import free_port
+from typer.testing import CliRunner
 
 import taxel
 from taxel import Array, Events, Neuron, Readout, wire
+from taxel.cli import app, main
+from taxel.cli._opening import FileOptions
 from taxel.encode import ContactArea
 from taxel.live import Live, send
 from taxel.simulate import Board, Scene, emulate
 from taxel.wire import Registers
 
-from .boards import LOOPBACK, SMALL, command, listening, play, presses, touch
+from .boards import LOOPBACK, SMALL, command, listening, play, presses, recording, touch
 
 
 def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path: Path) -> None:
@@ -38,6 +43,57 @@ def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path
     assert again.returncode == 2
     said = f"taxel: {file}: exists already; give --overwrite, or name another"
     assert again.stderr.strip().splitlines() == [said]
+
+
+def test_taxel_record_keeps_the_registers_of_a_sensor_of_ones_own(tmp_path: Path) -> None:
+    port, file, array = free_port(), tmp_path / "own.mcap", Array(4, 4)
+    with recording(file, port, "--rate-hz", 500, "--bits", 12) as process:
+        listening(process)
+        source = taxel.live.Source(array, rate=500, bits=12, to=f"{LOOPBACK}:{port}")
+        for k in range(20):
+            source.push(np.full((4, 4), 100 + 20 * k))
+            time.sleep(0.002)
+        process.send_signal(signal.SIGINT)
+        said, wrong = process.communicate(timeout=60)
+    assert process.returncode == 0, (said, wrong)
+    registers = taxel.open(file).registers
+    assert registers == source.registers
+    assert registers.frame_us == pytest.approx(2000, rel=1e-3)
+    # Nobody stated a pitch.
+    assert taxel.open(file).array.pitch_mm is None
+    assert FileOptions(array=["4x4"]).one(file).array.pitch_mm is None
+
+
+@pytest.mark.parametrize("which", [("record", "own.mcap"), ("live", "--panel")])
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        ([], "--rate-hz and --bits belong together"),
+        (["--rate-hz", "500", "--preset", "2 kHz"], "--rate-hz and --preset"),
+        (["--rate-hz", "500", "--from", "zenoh:127.0.0.1:7447/left"], "--rate-hz and --from"),
+    ],
+)
+def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(
+    which: tuple[str, ...],
+    more: list[str],
+    reason: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    how = ("--port", "0", "--host", LOOPBACK, "--seconds", "0.1", "--array", "4x4", "--bits", "12")
+    with pytest.raises(SystemExit) as ended:
+        main([*which, *how, *more])
+    assert ended.value.code == 2
+    assert reason in capsys.readouterr().err
+
+
+def test_the_panels_address_is_on_standard_error_where_lines_are_json() -> None:
+    arguments = command("live", "--panel", "--json", "--port", 0, "--host", LOOPBACK, "--seconds", 0.1)
+    ended = subprocess.run(arguments, capture_output=True, text=True, check=False, timeout=60)
+    assert ended.stdout == ""
+    assert re.search(r"^panel: http://127\.0\.0\.1:\d+/#token=\w+$", ended.stderr, re.MULTILINE), ended.stderr
 
 
 def test_taxel_record_says_how_much_a_board_of_version_2_sent(tmp_path: Path) -> None:
@@ -218,3 +274,26 @@ def test_a_board_with_more_taxels_than_the_array_is_said_while_it_runs(tmp_path:
     assert "--array" in said
     assert process.returncode == 2
     assert file.exists(), "the bytes are kept"
+
+
+def test_the_link_to_another_computer_stays_until_the_receiver_has_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+
+    @contextlib.contextmanager
+    def remote(*_: object, lossless: bool) -> Iterator[None]:
+        yield
+        done.append("closed")
+
+    class Receiver(Live):
+        def stop(self) -> taxel.live.Summary:
+            done.append("stopped")
+            return super().stop()
+
+    monkeypatch.setattr("taxel.cli.live.remote", remote)
+    monkeypatch.setattr("taxel.cli.live.Live", Receiver)
+    told = CliRunner().invoke(
+        app, ["live", "--panel", "--seconds", "0.5", "--host", LOOPBACK, "--port", f"{free_port()}"]
+    )
+    assert told.exit_code == 3, told.exception
+    assert done[0] == "stopped"
+    assert done[-1] == "closed"

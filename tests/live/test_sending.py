@@ -1,4 +1,4 @@
-"""Detections on their way to other programs: the lines of --json, lost where nobody reads, never waited for."""
+"""Detections on their way to other programs: the lines of --json, lost where there is no reader, never waited for."""
 
 import json
 import os
@@ -8,7 +8,9 @@ import subprocess
 import time
 import tty
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from loopback import free_port
 
@@ -19,6 +21,38 @@ from .boards import LOOPBACK, SMALL, command, play, presses, touch, wait_for
 
 LONG_BEFORE_ANY = {"guard_frames": 1e6}
 KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "said_us", "said_ns"}
+
+
+@pytest.mark.parametrize(
+    ("bits", "frame", "said"),
+    [
+        (12, [[0, 1, 2], [3, 5000, 6]], "row 1, column 1 is 5000; must be a whole number from 0 to 4095 (12 bits)"),
+        (12, [0, 1, 2, -1, 4096, 6], "row 1, column 0 is -1; must be a whole number from 0 to 4095 (12 bits)"),
+        (1, np.full((2, 3), 2), "row 0, column 0 is 2; must be a whole number from 0 to 1 (1 bit)"),
+        (
+            12,
+            np.full((2, 3), 0.5, np.float32),
+            "row 0, column 0 is 0.5; must be a whole number from 0 to 4095 (12 bits); scale readings to it first: "
+            "np.rint(readings / full * 4095), full the greatest of them",
+        ),
+        (
+            16,
+            np.full((2, 3), np.nan),
+            "row 0, column 0 is nan; must be a whole number from 0 to 65535 (16 bits); scale",
+        ),
+        (12, np.zeros((3, 2)), "of shape 3 x 2, must be 2 x 3 (rows x columns), or 6 row by row"),
+        (12, np.zeros(7, np.int64), "of shape 7, must be 2 x 3 (rows x columns), or 6 row by row"),
+        (12, 3, "of shape one number, must be 2 x 3"),
+    ],
+)
+def test_a_source_refuses_what_its_bits_and_taxels_cannot_hold_by_name(bits: int, frame: Any, said: str) -> None:
+    source = taxel.live.Source(taxel.Array(2, 3), 100.0, bits=bits, to="127.0.0.1:9")
+    with pytest.raises(taxel.ProblemError) as refused:
+        source.push(frame)
+    assert str(refused.value).startswith(f"frame: {said}")
+    most = 2**bits - 1
+    for held in (np.full((2, 3), most), np.full(6, float(most)), np.zeros((2, 3), np.uint8)):
+        source.push(held)
 
 
 def listen(send: object, record: Path) -> Live:
@@ -120,7 +154,7 @@ def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path
             assert time.monotonic() < until, live.counters
             time.sleep(0.002)
         lost = live.counters["sent"][0]["lost"]
-        assert live.counters["sent"][0]["trouble"] == "nobody reads"
+        assert live.counters["sent"][0]["trouble"] == "no reader"
         reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
         wait_for(live, n + play(events[4 * 20 :], live.address[1]))
         counts = live.stop().counters
@@ -183,7 +217,7 @@ def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
             line = json.loads(other.recv(65_536))
             told = process.stderr.read()
     assert set(line) == KEYS
-    assert f"taxel: lines not sent to pipe:{pipe}: 3 of 3: nobody reads" in told
+    assert f"taxel: lines not sent to pipe:{pipe}: 3 of 3: no reader" in told
     assert process.returncode == 3
     said = subprocess.run(
         command("live", "--panel", "--send", "udp:127.0.0.1:9"), capture_output=True, text=True, check=False

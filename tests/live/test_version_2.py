@@ -1,15 +1,17 @@
 """A board of version 2, heard live and read again: nothing lost, and said so."""
 
+import re
 import socket as udp
 import time
 
 import numpy as np
 import pytest
 from loopback import until
+from shell import call
 
 import taxel
 from taxel.encode import ChangeEvents
-from taxel.simulate import Board, Scene, Silence, Version2, emulate, play
+from taxel.simulate import Board, Faults, Scene, Silence, Version2, emulate, play
 from taxel.wire import Command, Registers
 
 
@@ -30,6 +32,25 @@ def test_a_recording_of_version_2_says_that_nothing_was_lost(tmp_path):
     # Version 1 contains the same changes, with times rounded down to 100 us.
     assert len(one) == report.changes
     assert [start for _, start in events.markers] == [True, False]
+
+
+def test_the_numbers_of_a_verdict_are_those_of_the_recording(tmp_path, capsys):
+    """What the verdict of version 2 counts, the counts of its recording count, and ``taxel info`` prints."""
+    acts, faults = [Silence(80.0), Scene.draw(seed=3)], Faults(lost=0.1, corrupted=0.1, repeated=0.05, seed=5)
+    path = tmp_path / "two.mcap"
+    with taxel.live.Live(0, host="127.0.0.1", record=path) as live:
+        emulate("{}:{}".format(*live.address), acts, seed=1, tare_ms=20.0, wire=2, faults=faults)
+        verdict = live.stop().verdict
+    recording = taxel.open(path)
+    assert recording.verdict == verdict
+    said = {what: int(n) for n, what in re.findall(r"(\d+) ([^,;]+)", verdict)}
+    found = recording.counts["decoder_version_2"]
+    assert said["datagrams lost or damaged on the way"] == found["missing"] > 5
+    assert said["datagrams damaged"] == sum(found[cause] for cause in ("checksum", "short", "foreign")) > 5
+    assert said.get("values repaired from the board's refresh", 0) == found["repaired"]
+    _, printed, _ = call(capsys, "info", path)
+    printed = dict(re.findall(r"^ +(missing|checksum) +(\d+)$", printed, re.MULTILINE))
+    assert {name: int(n) for name, n in printed.items()} == {name: found[name] for name in ("missing", "checksum")}
 
 
 def test_raw_bytes_of_version_2_are_refused_and_nothing_is_left(tmp_path):

@@ -260,7 +260,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         ),
         (lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]), "of is 'N': must say what is read"),
         (lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"), r"readings\[1\] is 1: must rise"),
-        (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 readings and 2 values"),
+        (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 reading and 2 values"),
         (lambda: Calibration.table(ARRAY, [0.0, 1.0], [1.0, 2.0], unit="N"), "what reads 0 above rest bears 0"),
         (lambda: Calibration.table(ARRAY, [1.0], [1.0], unit="bar"), "unit is 'bar': must be one of 'N', 'kPa'"),
         (lambda: Calibration.law(ARRAY, sensor={"exponent": 2.0}), "exponent is 2: must be from 0.5 to 1"),

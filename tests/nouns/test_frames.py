@@ -33,6 +33,23 @@ def test_numpy_gives_the_same_frames_back(frames: Frames) -> None:
     assert np.array_equal(values - 1, frames.values) or np.allclose(values - 1, frames.values, atol=1e-6)
 
 
+@given(some(), st.floats(0, 1), st.integers(0, 10**6))
+def test_a_missing_value_is_the_last_one_of_its_taxel(frames: Frames, share: float, seed: int) -> None:
+    values = frames.values.copy()
+    values[np.random.default_rng(seed).random(values.shape) < share] = np.nan
+    full = Frames(values, frames.t, unit=frames.unit, array=frames.array)
+    assert full.missing == np.count_nonzero(np.isnan(values))
+    held = full.held()
+    assert (held.unit, held.array, held.missing) == (full.unit, full.array, 0)
+    for y, x in np.ndindex(values.shape[1:]):
+        own = values[:, y, x]
+        last = next((v for v in own if not np.isnan(v)), np.float32(0))
+        for k, value in enumerate(own):
+            last = last if np.isnan(value) else value
+            assert held.values[k, y, x] == last
+    assert held.held() is held
+
+
 @given(some(), st.integers(-1000, 6000), st.integers(-1000, 6000))
 def test_a_cut_in_time_gives_parts_that_make_the_whole(frames: Frames, start: int, stop: int) -> None:
     start, stop = sorted((start, stop))

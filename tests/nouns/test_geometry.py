@@ -244,7 +244,9 @@ def test_another_pitch_is_said_and_never_refused() -> None:
     t = [0, 1000, 2000]
     here, there = Frames(values, t, array=PLATE), Frames(values, t, array=Array(4, 3, 5.08, name="old"))
     calibration = Calibration.fit([Load(there, 3.0)], exponent=1.0)
-    with pytest.warns(UserWarning, match=r"plate has its taxels rows 7.62 mm and columns 5.08 mm apart, not 5.08 mm"):
+    with pytest.warns(
+        UserWarning, match=r"plate has its taxels rows 7.62 mm and columns 5.08 mm apart, old 5.08 mm apart"
+    ):
         of_here = calibration.apply(here)
     assert np.array_equal(of_here.values, calibration.apply(there).values)
     with pytest.warns(UserWarning, match="plate has its taxels"):

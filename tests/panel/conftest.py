@@ -1,8 +1,11 @@
-"""A live source and its panel, for the tests of the server."""
+"""A live source and its panel, for the tests of the server; the browser, for those of the page."""
 
 import pytest
+from tests.panel.browser import chromium
 
 from taxel.live import Live, Panel
+
+__all__ = ["chromium"]
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 
@@ -11,10 +12,13 @@ from formats.making import write_gaitpdb, write_icub, write_pedar, write_tekscan
 from panel.protocol import Client, head, section
 
 import taxel
-from taxel import Array, Frames
+from taxel import Array, Frames, Places
 from taxel.live import Panel
 from taxel.live import _shown_files as shown_files
+from taxel.live._shown_files import side_by_side
 from taxel.recording.opening import open_joined
+from taxel.recording.pressure import above_rest, force_n
+from taxel.recording.rest import ticks_by_unit
 
 UNKNOWN = 65_535
 
@@ -75,7 +79,6 @@ def test_a_picture_of_any_kind_of_file_is_shown_in_its_unit(tmp_path, ending):
         assert max(overview["force"]) * of["step"] == pytest.approx(
             np.nansum(frames.values, axis=(1, 2)).max(), rel=1e-3
         )
-        assert page.ask("encode", encoder={"name": "fa1"})["type"] == "refused"
 
 
 def test_both_feet_stand_side_by_side(tmp_path):
@@ -102,6 +105,94 @@ def test_both_feet_stand_side_by_side(tmp_path):
     assert said == [["heel", "turn"], ["turn"]]
     part = taxel.open(tmp_path / "cut.mcap")
     assert part.sources["right"].frames() == right.between(0, 100_000)
+
+
+def spikes_up_to(page, t_us):
+    """The spikes of a view that moves to a time: times (ms), trains, values."""
+    assert page.ask("seek", t_us=t_us)["type"] == "done"
+    told = page.until("spikes")
+    assert told["left_out"] == 0
+    return list(zip(told["t_ms"], told["train"], told["value"], strict=True))
+
+
+def spikes_of(trains):
+    """The spikes of trains, in the same form."""
+    numbers = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
+    values = np.ones(len(trains.times)) if trains.values is None else trains.values
+    return list(zip(trains.times.tolist(), numbers.tolist(), values.tolist(), strict=True))
+
+
+@pytest.mark.parametrize(
+    "encoder",
+    [
+        taxel.encode.LevelCrossing([30.0, 60.0]),
+        taxel.encode.ChangeEvents(noise_floor=5.0, bits=3),
+        taxel.encode.ThresholdIzhikevich([40.0]),
+    ],
+    ids=lambda encoder: encoder.name,
+)
+def test_spikes_of_pictures_are_those_of_the_encoder(tmp_path, encoder):
+    frames = frames_of(fractions=False)
+    taxel.convert(frames, tmp_path / "mat.mcap")
+    expected = spikes_of(encoder.encode(frames))
+    assert len(expected) > 30
+    with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
+        opened(page, "mat.mcap")
+        page.send(type="credit", n=2)
+        assert page.ask("encode", encoder=json.loads(encoder.to_json()))["type"] == "done"
+        # Whatever was shown before, a view has the spikes up to its time.
+        for t_us in (int(frames.t[-1]), 1_500_007, 2_200_007):
+            there = [one for one in expected if one[0] <= t_us / 1000]
+            assert sorted(spikes_up_to(page, t_us)) == sorted(there)
+            while not page.pictures or head(page.pictures[-1])[0]["t_us"] != t_us:
+                page.next()
+            about, raster = head(page.pictures[-1])[0], section(page.pictures[-1], 6, "u1").reshape(-1, 4)
+            counted = np.zeros(raster.shape, int)
+            for t, train, _ in there:
+                column = int(t * 1000) // about["column_us"] - about["first"]
+                counted[column, train * 4 // encoder.trains(frames.array)] += 1
+            assert np.array_equal((raster & 15) + (raster >> 4), counted)
+        if encoder.name == "level_crossing":
+            # Narrow columns end 1.8 s after the beginning: the encoder begins there, with the picture before.
+            assert page.ask("zoom", column_us=125)["type"] == "done"
+            told = spikes_up_to(page, 2_200_007)
+            assert len(told) < len(there)
+            assert {*there} >= {*told} >= {one for one in there if one[0] > 2100}
+
+
+def test_spikes_of_both_feet_are_those_of_each(tmp_path):
+    file = write_pedar(tmp_path)
+    [both] = open_joined(file)
+    encoder = taxel.encode.ChangeEvents(noise_floor=1.0)
+    expected = []
+    for n, foot in enumerate(("left", "right")):
+        frames = both.sources[foot].frames()
+        assert (frames.values == np.floor(frames.values)).all()
+        own = frames.array.rows * frames.array.columns
+        expected += [(t, n * own + train, value) for t, train, value in spikes_of(encoder.encode(frames))]
+    assert {train // own for _, train, _ in expected} == {0, 1}
+    with Panel(file) as panel, Client(panel) as page:
+        about = opened(page, file.name)
+        assert page.ask("encode", encoder=json.loads(encoder.to_json()))["type"] == "done"
+        assert sorted(spikes_up_to(page, about["stop_us"])) == sorted(expected)
+
+
+def test_an_encoder_that_does_not_fit_pictures_is_refused_with_the_reason(tmp_path):
+    taxel.convert(frames_of(), tmp_path / "mat.mcap")
+    trial = taxel.open(write_icub(tmp_path))[0]
+    taxel.convert(trial, tmp_path / "grasp.npz")
+    with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
+        opened(page, "mat.mcap")
+        said = page.ask("encode", encoder={"name": "fa2"})
+        assert (said["type"], said["field"]) == ("refused", "encoder")
+        assert "must come every period_ms" in said["reason"]
+        # A value is missing from the 41st picture on.
+        assert page.ask("encode", encoder={"name": "change_events"})["type"] == "done"
+        assert page.ask("seek", t_us=450_000)["type"] == "done"
+        assert "values must be finite" in page.until("warning")["text"]
+        opened(page, "grasp.npz")
+        said = page.ask("encode", encoder={"name": "change_events"})
+        assert (said["type"], "--rate-hz" in said["reason"]) == ("refused", True)
 
 
 def test_pictures_without_times_are_numbered(tmp_path):
@@ -134,8 +225,9 @@ def test_a_file_of_several_trials_shows_each(tmp_path):
         values, _ = values_at(page, about, 0)
         assert np.array_equal(values, np.full((5, 12), 55))
         assert page.ask("open", name=file.name, trial="ball/9")["type"] == "refused"
-        answer = page.ask("mark", label="slip", t_us=0)
-        assert "holds several trials" in answer["reason"]
+        assert page.ask("mark", label="slip", t_us=0)["type"] == "done"
+    assert (tmp_path / "ball.csv.notes.csv").read_text() == "label,t_us,recording\nslip,0,ball/2\n"
+    assert [[note.text for note in one.notes] for one in taxel.open(file)] == [[], ["slip"]]
 
 
 def test_events_of_a_table_are_shown_as_those_of_a_board(tmp_path):
@@ -197,3 +289,165 @@ def test_the_health_of_pictures_names_the_places_that_are_shown(tmp_path):
         opened(page, file.name)
         assert page.ask("health")["type"] == "done"
         assert page.since_asked("health")["source"] == file.name
+
+
+def above_rest_of(page, about, t_us):
+    """Return what the client draws above rest at a time, in the unit of the file."""
+    _, picture = values_at(page, about, t_us)
+    held = section(picture, 0, "<u2").astype(int)
+    rests = [one for one in (section(shown, 5, "<u2") for shown in page.pictures) if len(one)]
+    above = np.where((held == UNKNOWN) | (rests[-1] == UNKNOWN), 0, held - rests[-1].astype(int))
+    above[above <= about["pictures"]["floor"]] = 0
+    return above * about["pictures"]["step"]
+
+
+def test_pictures_of_unknown_unit_are_above_the_rest_of_a_quiet_stretch_as_info_has_it(tmp_path):
+    rng, t = np.random.default_rng(8), np.arange(400) * 10_000
+    values = 60 + rng.normal(0, 0.1, (400, 6, 6)) + np.arange(400)[:, None, None] * 0.01
+    values[200:260, 1:4, 1:4] += 70
+    taxel.convert(Frames(values, t, unit="raw", array=Array(6, 6)), tmp_path / "mat.npz")
+    recording = taxel.open(tmp_path / "mat.npz")
+    over, floor, rest = above_rest(recording)
+    assert rest.source == "quiet"
+    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
+        about = opened(page, "mat.npz")
+        assert [one["rest"] for one in about["pictures"]["sources"]] == ["quiet"]
+        for k in (30, 150, 210, 255, 399):
+            expected = np.where(over.values[k] >= floor, over.values[k], 0)
+            shown = above_rest_of(page, about, int(t[k])).reshape(6, 6)
+            # The rest of the page is that of a picture not long before, half a tick from it at most.
+            assert shown == pytest.approx(expected, abs=0.6 / ticks_by_unit(recording.frames()) + 2e-3)
+            assert head(page.pictures[-1])[0]["flags"] & 96 == 64
+        force, _ = max_and_column(page, about)
+        assert force == pytest.approx(np.where(over.values >= floor, over.values, 0).sum(axis=(1, 2)).max(), rel=0.02)
+
+
+@pytest.mark.parametrize("layout", [None, "falls = true"])
+def test_a_press_that_is_held_sets_the_rest_of_a_falling_sensor_nowhere_anew(tmp_path, layout):
+    t = np.arange(3000) * 20_000
+    values = np.rint(3000 + np.random.default_rng(2).normal(0, 2, (3000, 16, 16)))
+    values[250:1250, 3:6, 4:7] -= 200
+    taxel.convert(Frames(values, t, unit="counts", array=Array(16, 16)), tmp_path / "mat.npz")
+    if layout is not None:
+        (tmp_path / "layout.toml").write_text(layout)
+    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
+        about = opened(page, "mat.npz")
+        [source] = about["pictures"]["sources"]
+        assert (source["rest"], source["falls"]) == ("quiet", layout is None)
+        # Before it, in it, and after it, taxels that read as at rest are at rest; pressed ones are above it if turned.
+        for k in (100, 260, 700, 1240, 1300, 2500):
+            shown = above_rest_of(page, about, int(t[k])).reshape(16, 16)
+            pressed = layout is not None and 250 <= k < 1250
+            assert (shown[3:6, 4:7] > 60).all() == pressed, k
+            shown[3:6, 4:7] = 0
+            assert np.count_nonzero(shown) <= 16, k
+            if not pressed:
+                assert shown.max() < 20, k
+    over, floor, rest = above_rest(taxel.open(tmp_path / "mat.npz"))
+    assert rest.falls == (layout is None)
+    assert np.count_nonzero(over.values[[100, 1300, 2500]] > floor) <= 3 * 16
+
+
+def max_and_column(page, about):
+    """Return the greatest sum of the overview, in the unit of the file, and its column."""
+    page.send(type="overview")
+    force = page.until("overview")["force"]
+    return max(force) * about["pictures"]["step"], int(np.argmax(force))
+
+
+def test_without_a_quiet_stretch_values_are_shown_as_they_are(tmp_path):
+    rng, t = np.random.default_rng(8), np.arange(100) * 10_000
+    values = rng.uniform(20, 90, (100, 4, 4))
+    taxel.convert(Frames(values, t, unit="raw", array=Array(4, 4)), tmp_path / "mat.npz")
+    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
+        about = opened(page, "mat.npz")
+        assert [one["rest"] for one in about["pictures"]["sources"]] == ["none"]
+        shown = above_rest_of(page, about, 300_000)
+        assert shown == pytest.approx(np.float32(values[30]).ravel(), abs=about["pictures"]["step"])
+        assert head(page.pictures[-1])[0]["flags"] & 96 == 0
+
+
+def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
+    frames = np.zeros((20, 1, 3))
+    frames[5:] = [1.0, 3.0, 0.0]
+    places = Places([-500.0, -700.0, -600.0], [40.0, -40.0, 900.0])
+    for name, array in (("placed", Array(1, 3, places=places)), ("channels", Array(1, 3))):
+        taxel.convert(Frames(frames, np.arange(20) * 10_000, unit="N", array=array), tmp_path / f"{name}.npz")
+    with Panel(tmp_path / "placed.npz") as panel, Client(panel) as page:
+        for name, expected in (("placed", (-650.0, -20.0)), ("channels", (np.nan, np.nan))):
+            about = opened(page, f"{name}.npz")
+            _, picture = values_at(page, about, 150_000)
+            centre = section(picture, 3, "<f4").reshape(-1, 4)[-1, 2:]
+            assert centre == pytest.approx(expected, abs=0.02, nan_ok=True)
+
+
+def test_feet_in_one_system_of_coordinates_keep_their_places_and_others_stand_apart():
+    def foot(xs):
+        return Array(1, len(xs), places=Places(xs, [0.0] * len(xs)))
+
+    both, lefts = side_by_side([foot([-700.0, -300.0]), foot([300.0, 700.0])])
+    assert (lefts, both.places.x.ravel()[[0, 1, 3, 4]].tolist()) == ([0, 3], [-700, -300, 300, 700])
+    both, _ = side_by_side([foot([0.0, 400.0]), foot([0.0, 400.0])])
+    assert both.places.x.ravel()[[0, 1, 3, 4]].tolist() == [0, 400, 600, 1000]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_force_from_pressures_uses_each_taxel_s_area(tmp_path, seed):
+    draw = np.random.default_rng(seed)
+    rows, columns = int(draw.integers(1, 5)), int(draw.integers(2, 9))
+    x, y = draw.uniform(0, 90, (2, rows, columns))
+    area = draw.uniform(5.0, 400.0, (rows, columns))
+    exists = draw.random((rows, columns)) > 0.2
+    exists[0, 0] = True
+    values = np.where(exists, draw.uniform(0, 90, (60, rows, columns)) * (np.arange(60) > 20)[:, None, None], 0)
+    for unit, known in (("kPa", area), ("kPa", None), ("counts", area)):
+        array = Array(rows, columns, exists=exists, places=Places(x, y, known, "mm"))
+        frames = Frames(values, np.arange(60) * 10_000, unit=unit, array=array)
+        taxel.convert(frames, tmp_path / "foot.npz", overwrite=True)
+        with Panel(tmp_path / "foot.npz") as panel, Client(panel) as page:
+            about = opened(page, "foot.npz")
+            newtons = about["pictures"]["newtons"]
+            force = force_n(frames)
+            assert (newtons is None) == (force is None) == (unit != "kPa" or known is None)
+            # In another unit the rest of a quiet stretch is subtracted.
+            total = values.sum(axis=(1, 2)) if force is None else force
+            if unit == "kPa":
+                step = about["pictures"]["step"] if newtons is None else newtons
+                page.send(type="overview")
+                assert max(page.until("overview")["force"]) * step == pytest.approx(total.max(), rel=2e-3)
+                # What is played from a keyframe is weighed as the whole is.
+                for k in (25, 40, 59):
+                    _, picture = values_at(page, about, int(frames.t[k]))
+                    assert section(picture, 3, "<u4").reshape(-1, 4)[-1, 0] * step == pytest.approx(total[k], rel=2e-3)
+
+
+@pytest.mark.parametrize("column", [False, True])
+def test_channels_have_a_curve_each(tmp_path, column):
+    draw = np.random.default_rng(9)
+    values = draw.uniform(0, 90, (2000, 1, 7)).round()
+    values[400:800] = values[399]
+    shape = (7, 1) if column else (1, 7)
+    frames = Frames(values.reshape(-1, *shape), np.arange(2000) * 10_000, unit="N", array=Array(*shape))
+    taxel.convert(frames, tmp_path / "insole.npz")
+    with Panel(tmp_path / "insole.npz") as panel, Client(panel) as page:
+        about = opened(page, "insole.npz")
+        for t_us, column_us in ((3_000_000, 4_000), (7_000_000, 4_000), (15_000_000, 16_000), (15_004_000, 1_000)):
+            assert page.ask("zoom", column_us=column_us)["type"] == "done"
+            _, picture = values_at(page, about, t_us)
+            while head(picture)[0]["column_us"] != column_us:
+                picture = page.until("picture")
+            of = head(picture)[0]
+            curves = section(picture, 7, "<u2").reshape(-1, 7)
+            assert len(curves) == of["count"] > 100
+            ends = np.minimum((of["first"] + 1 + np.arange(of["count"])) * column_us - 1, t_us)
+            at = np.searchsorted(frames.t, ends, side="right") - 1
+            np.testing.assert_array_equal(curves * about["pictures"]["step"], values[at, 0])
+
+
+def test_only_channels_have_a_curve_each(tmp_path):
+    for name, array in (("mat", Array(2, 3)), ("line", Array(1, 6, pitch_mm=5.0)), ("many", Array(1, 65))):
+        frames = Frames(np.ones((20, *array.shape)), np.arange(20) * 10_000, unit="N", array=array)
+        taxel.convert(frames, tmp_path / f"{name}.npz")
+        with Panel(tmp_path / f"{name}.npz") as panel, Client(panel) as page:
+            _, picture = values_at(page, opened(page, f"{name}.npz"), 100_000)
+            assert not section(picture, 7, "<u2").size

@@ -184,6 +184,31 @@ def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
         assert {m["encoder"] for m in told} == {"change_events"}
 
 
+def test_a_seek_brings_the_rest_of_its_time_at_once(tmp_path):
+    # A taxel's first value is its rest: at 1 s that of the first taxel alone is known.
+    t, x, ticks = np.array([1_000_000, 2_000_000, 3_000_000]), [1, 2, 2], [50, 60, 90]
+    events = taxel.Events(t, x, 0 * t, t > 0, intensity=ticks, array=taxel.Array(4, 4))
+    taxel.convert(events, tmp_path / "begun.mcap")
+    with Panel(tmp_path / "begun.mcap") as panel, Client(panel) as page:
+        assert page.ask("open", name="begun.mcap")["type"] == "done"
+        assert page.ask("zoom", column_us=4000, end_us=3_000_000)["type"] == "done"
+        rest = np.empty(0)
+        for t_us, known in ((1_000_000, [50, 65_535]), (3_000_000, [50, 60]), (1_000_000, [50, 65_535])):
+            assert page.ask("seek", t_us=t_us)["type"] == "done"
+            page.send(type="credit", n=1)
+            while head(page.until("picture"))[0]["t_us"] != t_us:
+                pass
+            sent = section(page.pictures[-1], 5, "<u2")
+            rest = sent if len(sent) else rest
+            assert rest[1:3].tolist() == known, t_us
+        # Each step is a picture that stands, faster than the rest is sent while time moves.
+        for known in ([50, 60], [50, 60]):
+            assert page.ask("step", frames=1)["type"] == "done"
+            sent = section(page.until("picture"), 5, "<u2")
+            rest = sent if len(sent) else rest
+            assert rest[1:3].tolist() == known
+
+
 def test_a_recording_alone_is_viewed_and_the_address_names_it(tmp_path):
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "two.mcap")
@@ -272,3 +297,65 @@ def test_labels_that_change_at_once_are_in_the_file_as_the_page_shows_them(tmp_p
                 page.until("done")
             shown = [f"{row['label']},{row['t_us']}" for row in labels_of(page)]
             assert file.read_text().splitlines()[1:] == shown
+
+
+def test_a_label_outside_the_recording_is_refused(tmp_path):
+    """A late label of the last touch may lie a second behind the last event, one of pictures on the last of them."""
+    t = np.arange(2_000_000, 3_000_000, 1000)
+    events = taxel.Events(t, t % 4, t % 3, t % 2 == 0, array=taxel.Array(4, 4))
+    taxel.convert(events, tmp_path / "walk.mcap")
+    frames = taxel.Frames(np.zeros((100, 4, 4)), np.arange(100) * 20_000, unit="N", array=taxel.Array(4, 4))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    (tmp_path / "table.csv").write_text("\n".join(["1,2,3,4"] * 60) + "\n")
+    (tmp_path / "table.layout.toml").write_text("rows = 2\ncolumns = 2\n")
+    with Panel(tmp_path / "walk.mcap") as panel, Client(panel) as page:
+        for name, first, last, late, far in (
+            ("walk.mcap", 2_000_000, 2_999_000, 1_000_000, "1.000 s"),
+            ("mat.npz", 0, 1_980_000, 20_000, "0.020 s"),
+            ("table.csv", 0, 590_000, 10_000, "2 pictures"),
+        ):
+            assert page.ask("open", name=name)["type"] == "done"
+            assert page.ask("mark", label="a", t_us=last + late)["type"] == "done"
+            assert page.ask("mark", label="a", t_us=first - late)["type"] == "done"
+            more = 10_000 if name == "table.csv" else 1
+            for t_us, side in ((last + late + more, "after the end"), (first - late - more, "before the begin")):
+                refused = page.ask("mark", label="a", t_us=t_us)
+                said = f"a label {far} {side} of {name}: must lie within it"
+                assert (refused["field"], refused["reason"]) == ("t_us", said)
+            mine = labels_of(page)[0]["label_id"]
+            assert page.ask("move", label_id=mine, t_us=10**12)["type"] == "refused"
+            assert page.ask("rename", label_id=mine, label="b")["type"] == "done"
+
+
+def test_a_note_that_became_a_label_counts_once_however_it_is_changed(tmp_path):
+    frames = taxel.Frames(np.zeros((100, 4, 4)), np.arange(100) * 10_000, unit="N", array=taxel.Array(4, 4))
+    (tmp_path / "own").mkdir()
+    taxel.convert(frames, tmp_path / "own" / "mat.npz")
+    (tmp_path / "own" / "mat.notes.csv").write_text("label,t_us\nheel,300000\ntoe,500000\nheel,700000\n")
+    taxel.convert(taxel.open(tmp_path / "own" / "mat.npz"), tmp_path / "mat.mcap")
+
+    def counted():
+        return sorted((note.t, note.text) for note in taxel.open(tmp_path / "mat.mcap").notes)
+
+    own = [(300_000, "heel"), (500_000, "toe"), (700_000, "heel")]
+    with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
+        assert page.ask("open", name="mat.mcap")["type"] == "done"
+        for t_us, text in own:
+            assert page.ask("mark", label=text, t_us=t_us, replaces_us=t_us)["type"] == "done"
+        assert counted() == own
+        first, second, third = (row["label_id"] for row in labels_of(page))
+        assert page.ask("move", label_id=first, t_us=310_000)["type"] == "done"
+        assert page.ask("rename", label_id=second, label="ball")["type"] == "done"
+        assert page.ask("delete", label_id=third)["type"] == "done"
+        assert counted() == [(310_000, "heel"), (500_000, "ball")]
+        assert [row["replaces_us"] for row in labels_of(page)] == [300_000, 500_000]
+        assert page.ask("delete", label_id=third)["type"] == "refused"
+        page.send(type="recordings")
+        assert [one["labels"] for one in page.until("recordings")["files"]] == [2]
+    # Another panel knows it from the table.
+    with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
+        assert page.ask("open", name="mat.mcap")["type"] == "done"
+        assert [row["replaces_us"] for row in labels_of(page)] == [300_000, 500_000]
+        assert page.ask("mark", label="heel", t_us=700_000, replaces_us=700_000)["type"] == "done"
+        assert counted() == [(310_000, "heel"), (500_000, "ball"), (700_000, "heel")]
+        assert page.ask("mark", label="x", t_us=1, replaces_us="soon")["field"] == "replaces_us"

@@ -11,7 +11,6 @@ from panel.protocol import SOON, Client, head, heard, say, section, word
 from tests.detect.test_readout import recipe, tare, touches
 
 import taxel
-from taxel.cli import main
 from taxel.detect import Example, train
 from taxel.live import Live, Panel, Source
 
@@ -131,35 +130,12 @@ def test_what_is_not_known_of_registers_is_not_shown_as_a_rate(tmp_path):
             assert (shown["arrival"]["state"], shown["arrival"]["since_ns"]) == ("nothing", None)
 
 
-def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(capsys):
-    how = [
-        "live",
-        "--panel",
-        "--port",
-        "0",
-        "--host",
-        "127.0.0.1",
-        "--seconds",
-        "0.1",
-        "--array",
-        "4x4",
-        "--bits",
-        "12",
-    ]
-    for more, reason in (
-        ([], "--rate-hz and --bits belong together"),
-        (["--rate-hz", "500", "--preset", "2 kHz"], "--rate-hz and --preset"),
-        (["--rate-hz", "500", "--from", "zenoh:127.0.0.1:7447/left"], "--rate-hz and --from"),
-    ):
-        with pytest.raises(SystemExit) as ended:
-            main([*how, *more])
-        assert ended.value.code == 2
-        assert reason in capsys.readouterr().err
-
-
 def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
     readout = train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
-    readout.save(tmp_path / "touch.readout.json")
+    readout.save(tmp_path / "touch.json")
+    rule = taxel.detect.PlainRule("area", 2, noise_floor=3.0)
+    rule.save(tmp_path / "rule.json")
+    (tmp_path / "other.json").write_text('{"format": "something else"}')
     events, _ = touches(11)
     taxel.convert(events, tmp_path / "played.mcap")
     with (
@@ -167,21 +143,21 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         Panel(live, folder=tmp_path) as panel,
         Client(panel) as page,
     ):
-        assert page.until("recordings")["readouts"] == ["touch.readout.json"]
+        assert page.until("recordings")["readouts"] == ["rule.json", "touch.json"]
         page.ask("open", name="played.mcap")
         assert page.ask("read_out", readout="none.json")["type"] == "refused"
-        assert page.ask("read_out", readout="touch.readout.json")["type"] == "done"
+        assert page.ask("read_out", readout="touch.json")["type"] == "done"
         found = next(m for m in page.said if m["type"] == "detections")["detections"]
         assert [one["label"] for one in found] == ["contact", "lift"] * 6
         assert page.ask("train")["reason"].count("names no event")
         page.ask("live")
         address = live.address
         # The board: first something must be held that can be its rest.
-        assert "no value has arrived" in page.ask("read_out", readout="touch.readout.json")["reason"]
+        assert "no value has arrived" in page.ask("read_out", readout="touch.json")["reason"]
         say(live, *(word(4000, x, y, 50) for x in range(8) for y in range(8)))
         heard(live, 64)
         time.sleep(0.2)
-        assert page.ask("read_out", readout="touch.readout.json")["type"] == "done"
+        assert page.ask("read_out", readout="touch.json")["type"] == "done"
         hello = page.since_asked("hello")
         assert hello["readout"] == ["contact", "lift"]
         assert panel.live is not live

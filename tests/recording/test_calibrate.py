@@ -85,7 +85,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
     lines = [",".join(map(str, row)) for row in rows]
     table.write_text("\n".join(["x,y,reading,value", *lines[:-1]]))
     done = run("calibrate", path, "--table", table)
-    assert (done.returncode, "no reading of taxel 1, 1 under 4" in done.stderr) == (2, True)
+    assert (done.returncode, "no reading of row 1, column 1 under 4" in done.stderr) == (2, True)
     table.write_text("\n".join(["x,y,reading,value", *lines]))
     assert run("calibrate", path, "--table", table).returncode == 0
     # 1, 2 and 3 counts on taxels that read 1, 2 and 2 counts a newton.

@@ -67,7 +67,7 @@ def test_a_recording_copied_to_mcap_keeps_every_message(tmp_path: Path, compress
         assert np.array_equal(getattr(a.datagrams(), name), getattr(b.datagrams(), name))
     assert (a.events, a.notes, a.detections, a.registers) == (b.events, b.notes, b.detections, b.registers)
     assert a.register_changes == b.register_changes
-    assert b.verdict == f"converted from a recording that says: {a.verdict}"
+    assert (b.verdict, b.remarks) == (a.verdict, ("converted from one.mcap",))
 
 
 def test_raw_bytes_come_back_exactly_through_mcap(tmp_path: Path) -> None:
@@ -165,6 +165,18 @@ def test_a_csv_of_pictures_has_a_column_a_taxel_that_exists(tmp_path: Path) -> N
     back = taxel.open(path).frames()
     assert np.array_equal(back.values, frames.values)
     assert np.array_equal(back.array.exists, exists)
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 4096])
+def test_a_csv_of_pictures_keeps_each_value_to_the_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
+) -> None:
+    monkeypatch.setattr(taxel.recording.csv, "_PICTURES", at_once)
+    values = np.array([[0.0, -0.0, np.nan], [0.1, 1e-30, 1e30], [7.0, -7.5, 0.1]], np.float32)
+    taxel.convert(taxel.Frames(values[:, None], [0, 5, 9]), tmp_path / "a.csv")
+    read = taxel.open(tmp_path / "a.csv").frames()
+    assert read.t.tolist() == [0, 5, 9]
+    assert read.values.tobytes() == values.tobytes()
 
 
 def test_a_csv_of_events_has_the_columns_that_the_field_knows(tmp_path: Path) -> None:

@@ -80,7 +80,7 @@ def full(folder: Path) -> Contents:
     sources["board"] = one.but(
         frames=None, payload=raw, samples=samples, columns=tuple(f"c{k}" for k in range(10)), truncated=True,
         rebuilt={"gaps": 1}, differences=True, origin_us=7, unmarked=(1,), version_2=True, untimed=True,
-        sources=sources, lost=("something",), side="left", heel="top",
+        sources=sources, lost=("something",), remarks=("by another's times",), side="left", heel="top",
     )  # fmt: skip
     sources["other"] = sources["board"].but(label="other")
     return sources["board"]

@@ -17,6 +17,8 @@ import taxel
 from taxel._base import h5_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
+from taxel.recording import h5
+from taxel.recording.h5 import is_ours
 
 from .making import some_events
 
@@ -107,6 +109,23 @@ def test_numbers_of_every_kind_come_through_shared_memory_as_they_are(tmp_path: 
             file.text("one")
 
 
+def test_data_sets_in_groups_are_listed_by_path_however_they_are_linked(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as h5:
+        h5["run1/deep/pressure"] = values = np.arange(24, dtype=np.int16).reshape(4, 2, 3)
+        h5["run1/back"] = h5["run1"]
+        h5["run1/none"] = h5py.Empty("f")
+        h5["run1/lost"] = h5py.SoftLink("/nowhere")
+        h5["run1/far"] = h5py.ExternalLink("nowhere.h5", "/x")
+        h5["soft"] = h5py.SoftLink("/run1/deep/pressure")
+    with H5File(tmp_path / "a.h5") as file:
+        listed = {name: entry.shape for name, entry in file.entries.items() if entry.is_numbers}
+        assert listed == {"soft": (4, 2, 3), "run1/deep/pressure": (4, 2, 3)}
+        assert set(file.entries) - set(listed) == {"run1", "run1/back", "run1/deep", "run1/none"}
+        np.testing.assert_array_equal(file.numbers("run1/deep/pressure"), values)
+
+
 def test_a_damaged_file_is_one_error_or_reads(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     taxel.convert(some_events(200), path)
@@ -118,3 +137,16 @@ def test_a_damaged_file_is_one_error_or_reads(tmp_path: Path) -> None:
         path.write_bytes(bytes(data[: int(draw.integers(len(data) // 2, len(data)))]))
         with contextlib.suppress(FormatError):
             taxel.open(path)
+
+
+def test_the_library_is_not_asked_whose_a_file_without_our_name_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    h5py = pytest.importorskip("h5py")
+    taxel.convert(some_events(), tmp_path / "ours.h5")
+    with h5py.File(tmp_path / "subj000.h5", "w") as theirs:
+        theirs["img000"] = np.ones((3, 3, 3), np.uint16)
+    (tmp_path / "empty.h5").write_bytes(b"")
+    assert [is_ours(tmp_path / f"{name}.h5") for name in ("ours", "subj000", "empty", "none")] == [True] + 3 * [False]
+    asked: list[Path] = []
+    monkeypatch.setattr(h5, "H5File", lambda path: contextlib.nullcontext(asked.append(path)))
+    assert [is_ours(tmp_path / f"{name}.h5") for name in ("subj000", "empty", "none")] == 3 * [False]
+    assert not asked

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 import taxel
+from taxel import _core
 from taxel._core import ProblemError
 from taxel.recording.health import _around
+from taxel.recording.rest import flickering, ticks_by_unit
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 
@@ -296,6 +300,45 @@ def test_pictures_tell_too() -> None:
     assert found.named() == {"dead": [(4, 7)], "stuck": [(3, 2)], "noisy": []}
 
 
+def test_a_taxel_that_flickers_is_noisy_and_leaves_the_judgement_of_others_alone() -> None:
+    random = np.random.default_rng(5)
+    values = random.normal(300, 2, (1200, 12, 16)).astype(np.float32)
+    y, x = np.mgrid[:12, :16]
+    for k in range(12):
+        values[100 * k + 40 : 100 * k + 70] += 120 * np.exp(-((y - 6) ** 2 + (x - 8) ** 2) / 18)
+    values[:, 7, 7] = 320
+    quiet = taxel.Frames(values.copy(), np.arange(1200) * 50_000)
+    assert taxel.health(quiet).named() == {"dead": [], "stuck": [(7, 7)], "noisy": []}
+    values[random.random(1200) < 0.02, 3, 12] = 4095
+    one = taxel.Frames(values, quiet.t)
+    assert taxel.health(one).named() == {"dead": [], "stuck": [(7, 7)], "noisy": [(12, 3)]}
+    # The range of the values is that of all others, so that the same taxels count as loaded.
+    assert ticks_by_unit(one) == pytest.approx(ticks_by_unit(quiet), rel=1e-3)
+    # Short touches of the same height are none: neighbours move with them.
+    touched = values.copy()
+    touched[:, 3, 12] = 300
+    touched[np.arange(5, 1200, 60), 2:5, 11:14] = 4095
+    assert not flickering(taxel.Frames(touched, one.t)).any()
+    # Nor are channels, few pictures, or a taxel that misses values.
+    assert not flickering(taxel.Frames(values.reshape(1200, 1, -1), one.t)).any()
+    assert not flickering(one.between(0, 4_000_000)).any()
+    values[3, 3, 12] = np.nan
+    assert not flickering(taxel.Frames(values, one.t)).any()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_changes_of_pictures_are_those_of_each_taxel_alone(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    n, rows, columns = (int(random.integers(*among)) for among in ((0, 40), (1, 4), (1, 5)))
+    values = random.integers(0, 3, (n, rows, columns)).astype(np.float32)
+    values[random.random(values.shape) < 0.2] = np.nan
+    number, on = _core.changes_of_frames(taxel.Frames(values, np.arange(n))._parts())
+    for k, of in enumerate(values.reshape(n, rows * columns).T):
+        # A NaN has no direction of change.
+        ways = [int(b > a) - int(b < a) for a, b in pairwise(of.tolist()) if b > a or b < a]
+        assert (number[k], on[k]) == (len(ways), sum(a == b for a, b in pairwise(ways)))
+
+
 def test_nothing_recorded_shows_nothing_and_draws() -> None:
     found = taxel.health(taxel.Events([], [], [], [], array=taxel.Array(3, 3)))
     assert found.named() == {"dead": [], "stuck": [], "noisy": []}
@@ -307,3 +350,11 @@ def test_nothing_recorded_shows_nothing_and_draws() -> None:
 def test_nonsense_is_refused(recorded: object) -> None:
     with pytest.raises(ProblemError, match="recorded is"):
         taxel.health(recorded)
+
+
+def test_a_missing_cell_of_pictures_was_not_pressed() -> None:
+    touch = np.array([0, 40, 80, 40, 0])[:, None, None] * np.ones((3, 3))
+    values = np.concatenate([touch] * 2)
+    values[:, 1, 1] = np.nan
+    found = taxel.health(taxel.Frames(values, np.arange(10) * 100_000, unit="N"))
+    assert found.untold.tolist() == [[False] * 3, [False, True, False], [False] * 3]

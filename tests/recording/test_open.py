@@ -120,7 +120,8 @@ def test_raw_bytes_need_no_magic_and_say_whether_they_are_complete(tmp_path: Pat
     rec = taxel.open(path)
     assert not rec.truncated
     assert rec.events == events
-    assert rec.verdict.startswith("raw bytes do not say what was lost")
+    assert rec.verdict == "the .lsa does not say what was lost"
+    assert "short by whole turns of 6.5536 s" in rec.remarks[0]
     (tmp_path / "a.lss").unlink()
     assert taxel.open(path).truncated
     assert "a.lss is not there" in taxel.open(path).verdict
@@ -138,6 +139,26 @@ def test_a_plain_npz_or_csv_gets_the_thesis_array_or_one_that_fits(tmp_path: Pat
     assert taxel.open(tmp_path / "b.csv").array.shape == (64, 100)
     with pytest.raises(FormatError, match="outside"):
         taxel.open(tmp_path / "b.csv", array=THESIS)
+
+
+@pytest.mark.parametrize("pictures", [False, True])
+def test_a_csv_is_the_same_however_much_of_it_is_read_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pictures: bool
+) -> None:
+    path, random = tmp_path / "a.csv", np.random.default_rng(3)
+    frames = Frames(random.normal(size=(40, 2, 3)).astype(np.float32), np.arange(40) * 7, array=taxel.Array(2, 3))
+    taxel.convert(frames if pictures else some_events(50), path)
+    table = frames if pictures else taxel.open(path).events
+    lines = path.read_bytes().split(b"\n")
+    wrong = [*lines[:20], b"", lines[20].rpartition(b",")[0] + b",abc", *lines[21:]]
+    for size in (1, 37, 400, 1 << 22):
+        monkeypatch.setattr(taxel.recording.csv, "_AT_ONCE", size)
+        path.write_bytes(b"\r\n".join(lines))
+        read = taxel.open(path).frames() if pictures else taxel.open(path).events
+        assert read == table
+        path.write_bytes(b"\n".join(wrong))
+        with pytest.raises(FormatError, match=r"line 22, column \w+: could not convert"):
+            taxel.open(path)
 
 
 def test_a_csv_from_other_programs_is_read_as_it_comes(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def test_other_peoples_h5_is_a_list_of_trials_whose_truth_is_notes(tmp_path: Pat
         assert {n.text: n.t for n in rec.notes} == {e: int(t[0]) for e, t in trial.truth.items()}
     with h5py.File(tmp_path / "other.h5", "w") as h5:
         h5["t"] = [1]
-    with pytest.raises(FormatError, match="without the attribute taxel"):
+    with pytest.raises(FormatError, match=r"holds t \(1\); must be t, x, y, p"):
         taxel.open(tmp_path / "other.h5")
 
 
@@ -181,7 +181,7 @@ def test_merge_refuses_what_does_not_go_together(tmp_path: Path) -> None:
     events, frames = opened(some_events(20), tmp_path), opened(some_frames(), tmp_path, "f.npz")
     small = opened(taxel.Events([0], [0], [0], [True], array=taxel.Array(2, 2)), tmp_path, "s.npz")
     for parts, said in (
-        ([events, frames], "events among pictures"),
+        ([events, frames], "holds events, .* pictures; convert one of them"),
         ([], "one or more"),
         ([events, small], "different"),
     ):

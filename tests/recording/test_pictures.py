@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +22,7 @@ from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
 from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Contents, several
 from taxel.recording.opening import joined, open_joined
 
 WHOLE = st.integers(0, 65_535).map(float)
@@ -110,6 +112,55 @@ def test_the_official_reader_decodes_every_picture(tmp_path: Path) -> None:
             assert np.array_equal(cells, values, equal_nan=True)
 
 
+def low_rate(place: Path) -> dict[str, list[dict[str, Any]]]:
+    """Return the low-rate pictures of each channel, by the official reader; `data` are bytes."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    with place.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            if channel.topic.endswith("/pressure"):
+                image = json.loads(message.data)
+                assert schema.name == "foxglove.RawImage"
+                image["log_us"] = message.log_time // 1000
+                image["data"] = list(base64.b64decode(image["data"]))
+                found.setdefault(channel.topic, []).append(image)
+    return found
+
+
+def test_a_viewer_sees_ten_pictures_a_second_above_rest(tmp_path: Path) -> None:
+    t = np.arange(100) * 10_000
+    load = np.where(t < 600_000, 0.0, 4.0)[:, None, None] * np.array([[1.0, 0.5, 0.0]])
+    load[70, 0, 2] = np.nan
+    for unit, rest in (("kPa", "0"), ("V", "quiet stretch")):
+        frames = Frames(load + (unit == "V") * 7.5, t, unit=unit, array=Array(1, 3))
+        taxel.convert(frames, tmp_path / f"{unit}.mcap")
+        [images] = low_rate(tmp_path / f"{unit}.mcap").values()
+        assert [one["t_us"] for one in images] == list(range(0, 1_000_000, 100_000))
+        assert [one["data"] for one in images] == [[0, 0, 0]] * 6 + [[255, 128, 0]] * 4
+        assert {(one["rest"], one["unit"], one["width"], one["height"]) for one in images} == {(rest, unit, 3, 1)}
+        # The rest that is tracked rises a little below a load.
+        assert images[-1]["full"] == pytest.approx(4.0, abs=0.0 if unit == "kPa" else 0.1)
+        assert taxel.open(tmp_path / f"{unit}.mcap").frames() == frames
+
+
+def test_each_source_has_low_rate_pictures_but_where_pictures_are_numbered(tmp_path: Path) -> None:
+    array = Array(2, 3)
+    left = Frames(np.ones((50, 2, 3)), np.arange(50) * 20_000 + 7, unit="N", array=array)
+    right = Frames(np.ones((500, 2, 3)), np.arange(500) * 2000 - 3000, unit="N", array=array)
+    both = {
+        name: Contents(tmp_path / "a", name, "npz", array, label=name, frames=frames)
+        for name, frames in (("left", left), ("right", right))
+    }
+    taxel.convert(taxel.Recording(several(both)), tmp_path / "both.mcap")
+    shown = low_rate(tmp_path / "both.mcap")
+    assert {topic: len(images) for topic, images in shown.items()} == {"/pressure": 10, "/right/pressure": 11}
+    for images, frames in ((shown["/pressure"], left), (shown["/right/pressure"], right)):
+        assert {one["t_us"] for one in images} <= set(frames.t.tolist())
+        assert [one["log_us"] for one in images] == [one["t_us"] + 3000 for one in images]  # the file begins at 0
+    numbered = Contents(tmp_path / "n", "n", "npz", array, frames=right, untimed=True)
+    taxel.convert(taxel.Recording(numbered), tmp_path / "numbered.mcap")
+    assert low_rate(tmp_path / "numbered.mcap") == {}
+
+
 def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
     array = Array(1, 2, name="channels")
     frames = Frames([[[1.0, 2.5]], [[3.0, 4.0]]], [0, 10_000], unit="N", array=array)
@@ -124,9 +175,10 @@ def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
     assert back.frames() == frames
     assert [(note.text, note.t) for note in back.notes] == [("heel", 5000), ("bare", None)]
     assert (back.detections, back.columns, back.lost) == (of.detections, ["hip", "knee"], ("something",))
-    assert (back.source, back.verdict) == (
+    assert (back.source, back.verdict, back.remarks) == (
         "an amplifier",
-        "converted from a recording that says: the .npz does not say what was lost",
+        "the .npz does not say what was lost",
+        ("converted from a",),
     )
     assert not back.truncated
 

@@ -62,3 +62,20 @@ def test_pictures_rest_at_zero_and_events_without_intensities_have_no_pressure(t
     assert (refused.returncode, "without intensities" in refused.stderr) == (2, True)
     assert not (tmp_path / "e.csv").exists()
     assert "ends in .csv" in run("info", tmp_path / "f.npz", "--table", tmp_path / "f.txt").stderr
+
+
+def test_the_noise_of_taxels_without_a_load_is_no_sum(tmp_path: Path) -> None:
+    values = np.random.default_rng(3).normal(500.0, 3.0, (300, 12, 12))
+    values[200:260, 4:6, 4:6] += 700.0
+    taxel.convert(taxel.Frames(values, np.arange(300) * 10_000, unit="counts"), tmp_path / "a.npz")
+    assert run("info", tmp_path / "a.npz", "--table", tmp_path / "a.csv").returncode == 0
+    rows = list(csv.DictReader((tmp_path / "a.csv").open()))
+    found = np.array([float(row["sum_counts"]) for row in rows])
+    assert not found[:200].any()
+    assert not found[260:].any()
+    assert found[200:260] == pytest.approx(2800.0, rel=0.02)
+    # In a unit of force nothing is cut off, and values below 0 cancel those above.
+    taxel.convert(taxel.Frames(values - 500.0, np.arange(300) * 10_000, unit="N"), tmp_path / "n.npz")
+    assert run("info", tmp_path / "n.npz", "--table", tmp_path / "n.csv").returncode == 0
+    row = list(csv.DictReader((tmp_path / "n.csv").open()))[7]
+    assert float(row["sum_N"]) == pytest.approx((values[7] - 500.0).sum(), abs=0.01)

@@ -57,8 +57,8 @@ def test_a_load_that_stays_and_one_that_comes_back(tmp_path: Path) -> None:
     pressed = (found.t >= 1_000_000) & (found.t < 2_000_000)
     assert found.rest.quiet_us == (0, 500_000)
     assert found.total[pressed][0] == pytest.approx(160.0)
-    # Of a load that stays, the tracked rest takes a twentieth a second.
-    assert found.total[pressed][-1] == pytest.approx(160.0 * np.exp(-1 / 20), rel=0.01)
+    # Of a load that stays, a rest that is known takes a 3600th a second.
+    assert found.total[pressed][-1] == pytest.approx(160.0 * np.exp(-1 / 3600), rel=1e-4)
     assert found.area[pressed].tolist() == [4.0] * np.count_nonzero(pressed)
     assert not found.total[~pressed].any()
 

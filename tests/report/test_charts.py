@@ -175,6 +175,7 @@ def page(*figures):
         drawn=charts,
         rows=[],
         beside=[],
+        begun=[],
         held_out=[],
         outside=[],
         worst=[],
@@ -206,11 +207,17 @@ def test_a_page_needs_nothing_but_itself():
     assert "<code>taxel view &#39;a walk.mcap&#39;</code>." in text
 
 
-def opened(text, tmp_path):
-    """Return a page as a browser holds it after some seconds."""
+def opened(text, tmp_path, width=800):
+    """Return a page as a browser of this width, px, holds it after some seconds."""
     place = tmp_path / "page.html"
     place.write_text(text, encoding="utf-8")
-    asked = ["--headless", "--disable-gpu", "--virtual-time-budget=4000", f"--user-data-dir={tmp_path / 'profile'}"]
+    asked = [
+        "--headless",
+        f"--window-size={width},900",
+        "--disable-gpu",
+        "--virtual-time-budget=4000",
+        f"--user-data-dir={tmp_path / 'profile'}",
+    ]
     asked += ["--no-sandbox"] * (os.geteuid() == 0)
     return subprocess.run(
         [shutil.which("chromium"), *asked, "--dump-dom", place.as_uri()],
@@ -264,3 +271,36 @@ def test_a_window_that_is_dragged_wider_leaves_one_drawing(tmp_path):
     assert dragged in seen
     assert re.findall(r'class="charts" data-drawn="(\d+)"', seen) == ["1"]
     assert (seen.count('class="strip"'), seen.count("<canvas")) == (1, 1)
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
+@pytest.mark.parametrize("name", ["pick_test gripper_left_tactile", "a" * 60 + ".mcap", "s.mcap"])
+@pytest.mark.parametrize("width", [1400, 1100])
+def test_no_table_of_a_report_is_cut(tmp_path, name, width):
+    score = {"events": 1500, "found": 1400, "missed": 100, "false": 100}
+    score["error"] = score["delay"] = "-11.55 ± 105.4 (median -11.92, 95 % in -103.46 to 120.62)"
+    row = {"recording": name, "label": "contact", "detections": 1500, "score": score}
+    moment = {"label": "contact", "t": 123_456_789.0, "what": "missed"}
+    text = render(
+        "report/listening.html.j2",
+        title="t",
+        readout="r",
+        judged="",
+        scored=True,
+        labels=[],
+        drawn={},
+        aligned={},
+        rows=[row],
+        held_out=[row],
+        worst=[(name, moment, 123.456789)],
+        begun=[(name, "2026-01-02 03:04:05 UTC")],
+        viewed=[],
+        outside=[],
+        beside=[("contact", "neuron", score), ("contact", "the area above 12 taxels for 3 ms", score)],
+    )
+    measured = (
+        "<p id=said></p><script>document.getElementById('said').textContent = JSON.stringify([innerWidth, "
+        "...[...document.querySelectorAll('.scroll')].map((e) => e.scrollWidth - e.clientWidth)])</script></body>"
+    )
+    seen = opened(text.replace("</body>", measured), tmp_path, width)
+    assert json.loads(re.search(r'<p id="said">(.*?)</p>', seen)[1]) == [width, 0, 0, 0, 0]

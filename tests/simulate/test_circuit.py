@@ -333,7 +333,10 @@ def test_the_ramp_turns_steep_where_a_taxel_moves_and_gentle_where_none_does():
         (lambda: AdaptiveRamp(steepest=600), "steepest is 600: must be at most gentlest, 510"),
         (lambda: AdaptiveRamp().convert(np.ones((9, 4, 4)), period_us=0.0), "period_us is 0 us: must be above 0"),
         (lambda: VirtualGround(wire_ohm=1e-5), "wire_ohm is 0.00001 ohm: must be 0, or from 0.001 to 1e9"),
-        (lambda: VirtualGround().volts([[1.0, -2.0]]), "conductance at x 1, y 0 is -2 uS: must be from 0 to 1e9"),
+        (
+            lambda: VirtualGround().volts([[1.0, -2.0]]),
+            "conductance at row 0, column 1 is -2 uS: must be from 0 to 1e9",
+        ),
         (lambda: VirtualGround().volts([1.0]), r"conductance_us has shape \(1,\)"),
         (lambda: Divider().volts(np.zeros((2, 0))), r"conductance_us has shape \(2, 0\)"),
         (lambda: Converter(ramp=200), "step_us is 0.75 us: must be 0.8667 or more"),

@@ -8,16 +8,19 @@ import subprocess
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import taxel
 from taxel import ProblemError, wire
+from taxel.cli.emulate import _TruthTable
 from taxel.demo.script import endless, script
 from taxel.device import Device
 from taxel.simulate import Board, Faults, Flaws, Pipe, Replay, Silence, Version2, emulate, play, truth
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
+from taxel.simulate.emulator_report import EmulatorReport
 from taxel.wire import Registers
 
 
@@ -135,6 +138,17 @@ def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
     again = subprocess.run([*command, "--truth", str(labels)], capture_output=True, text=True, timeout=60, check=False)
     assert (again.returncode, again.stdout) == (2, "")
     assert str(labels) in again.stderr
+
+
+def test_the_truth_of_a_board_that_is_late_is_late_by_the_host(tmp_path):
+    contacts = [SimpleNamespace(start_us=1e6, stop_us=2e6), SimpleNamespace(start_us=5e6, stop_us=6e6)]
+    nothing = {"changes": 0, "datagrams": 0, "bytes": 0, "dropped": 0, "late_frames": 0, "late_us": {}}
+    with _TruthTable(tmp_path / "labels.csv", False) as table:
+        table.add(contacts)
+        table.write(EmulatorReport(frames=10_000, began_ns=10**18, board_seconds=2.0, seconds=2.01, **nothing))
+        table.write(EmulatorReport(frames=30_000, began_ns=10**18, board_seconds=6.0, seconds=14.0, **nothing))
+    host_s = [(row.host_ns - 10**18) / 1e9 for row in taxel.Labels(tmp_path / "labels.csv").rows]
+    np.testing.assert_allclose(host_s, [1, 2, 13, 14])
 
 
 class Heard:

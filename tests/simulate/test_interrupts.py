@@ -12,9 +12,16 @@ import taxel
 from taxel.simulate import Scene, Silence, truth
 from taxel.simulate.circuit import Converter
 
-#: Calls that each take minutes, by what they do; the child process reports when a call is about to begin.
+#: Calls that each take 10 s or more, by what they do; the child process reports when a call is about to begin.
 LONG = {
-    "a scene in the shortest steps": "begun(); Scene.draw(1).replace(lead_ms=10_000.0).motion(step_us=1.0)",
+    "a scene in the shortest steps": """
+        scene = Scene.draw(1)
+        body = scene.parameters["bodies"][0]
+        bodies = [{**body, "x_mm": 30.0 + 50.0 * i, "y_mm": 30.0 + 50.0 * j} for i in range(3) for j in range(3)]
+        scene = scene.replace(surface="layer", lead_ms=10_000.0, bodies=bodies)
+        begun()
+        scene.motion(step_us=1.0)
+    """,
     "the law of a body on many cells": """
         press = {"pressed": {"peak_n": 5.0, "speed_mm_s": 50.0, "hold_ms": 5.0, "wait_ms": 0.0}}
         body = {"shape": {"sphere": {"radius_mm": 60.0}}, "x_mm": 80.0, "y_mm": 80.0, "mass_g": 50.0, "motion": press}

@@ -99,7 +99,7 @@ SOUND: dict[str, Sound] = {
     "taxel.detect.Recipe.learner_of": method(RECIPE, "learner_of", label="a"),
     "taxel.detect.Recipe.from_dict": plain(taxel.detect.Recipe.from_dict, values={"encoder": {"name": "fa1"}}),
     "taxel.detect.Recipe.load": plain(
-        taxel.detect.Recipe.load, recipe="here.toml", changes={"learner.tau": 5.0}, labels=["a"]
+        taxel.detect.Recipe.load, recipe="here.toml", changes={"learner.tau": 5.0}, labels=["a"], noise_floor=2.0
     ),
     "taxel.detect.Recipe.inputs_of": method(RECIPE, "inputs_of", label="a"),
     "taxel.detect.Recipe.points_of": method(RECIPE, "points_of", label="a"),
@@ -141,7 +141,9 @@ SOUND: dict[str, Sound] = {
         labels={"a": [9000]},
         tare=None,
         group="walk",
+        name="walk 1",
     ),
+    "taxel.detect.PlainScore.sooner": method(PLAIN, "sooner", than=SCORE),
     "taxel.detect.PlainScore.better": method(PLAIN, "better", than=SCORE),
     "taxel.detect.PlainScore.to_dict": method(PLAIN, "to_dict", than=SCORE),
     "taxel.detect.Alignment.felt": method(ALIGNMENT, "felt", example=0),

@@ -24,6 +24,7 @@ SOUND: dict[str, Sound] = {
         series={"force": np.ones(3)},
         about={"speed": 1.2},
         timed=True,
+        unread=("acceleration",),
     ),
 }
 

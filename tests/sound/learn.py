@@ -156,13 +156,20 @@ SOUND: dict[str, Sound] = {
     "taxel.learn.check_certificate": plain(
         taxel.learn.check_certificate, problem=REFUTED.problem_, certificate=REFUTED.certificate_, margin=True
     ),
+    "taxel.learn.Certificate.from_dict": plain(taxel.learn.Certificate.from_dict, held=REFUTED.certificate_.to_dict()),
+    "taxel.learn.check_solution": plain(taxel.learn.check_solution, cone=FITTED, patterns=[PLAIN], targets=[[5.0]]),
+    "taxel.learn.check_gap": plain(
+        taxel.learn.check_gap, cone=FITTED, patterns=[PLAIN], targets=[[5.0]], silence=[None]
+    ),
     "taxel.learn.STDP.fit": fresh(taxel.learn.STDP, "fit", patterns=[PLAIN], targets=None),
 }
 
 #: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.learn.Certificate": lambda: REFUTED.certificate_,
+    "taxel.learn.Checked": lambda: taxel.learn.check_solution(SOLVED, [PLAIN], [[5.0]]),
     "taxel.learn.Margin": lambda: SOLVED.margin_,
+    "taxel.learn.Multipliers": lambda: FITTED.multipliers_,
     "taxel.learn.Row": lambda: REFUTED.certificate_.rows[0],
 }
 

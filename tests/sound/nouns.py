@@ -82,7 +82,10 @@ SOUND: dict[str, Sound] = {
     "taxel.Tare.save": method(TARE, "save", path="tare.json", overwrite=True),
     "taxel.Tare.load": plain(taxel.Tare.load, path="here_tare.json"),
     "taxel.Labels": plain(taxel.Labels, path="here_labels.csv"),
-    "taxel.Labels.named": lambda: (taxel.Labels("here_labels.csv").named, {"recording": "walk.mcap"}),
+    "taxel.Labels.named": lambda: (
+        taxel.Labels("here_labels.csv").named,
+        {"recording": "walk.mcap", "trial": "walk 1", "source": "left"},
+    ),
     "taxel.Labels.of": lambda: (taxel.Labels("here_labels.csv").of, {"recording": taxel.open("here_events.npz")}),
     "taxel.Clock.host_ns": method(CLOCK, "host_ns", board_us=[500]),
     "taxel.Clock.board_us_at": method(CLOCK, "board_us_at", host_ns=[500_000]),

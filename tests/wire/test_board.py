@@ -103,7 +103,7 @@ def test_read_back_and_damage_on_the_serial_line():
         (lambda: Board().frame(np.zeros(4096), most="all"), "most is 'all'"),
         (lambda: Board().record("yes"), "start is 'yes': must be True or False"),
         (lambda: Board().command("text"), "data is 'text': must be bytes"),
-        (lambda: Board(7), "registers is 7: must be a taxel.Registers"),
+        (lambda: Board(7), "registers is 7: must be a taxel.wire.Registers"),
         (lambda: Board(array=7), "array is 7: must be a taxel.Array"),
         (lambda: Board(array=taxel.Array(257, 256)), "array of 257 x 256 taxels: has more than 65536 positions"),
         (lambda: Board(previous="mean"), "previous is 'mean': must be one of 'last_sent', 'last_sample'"),

@@ -254,7 +254,7 @@ def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
         (lambda: wire.Decoder().push(b"", arrived="now"), "arrived is 'now': must be a whole number"),
         (lambda: wire.Decoder().push(b"", arrived=0.5), "arrived is 0.5: must be a whole number"),
         (lambda: wire.Decoder().push(b"", arrived=2**63), "arrived is 9223372036854775808: must be a whole number"),
-        (lambda: wire.Decoder().push_into(None, b""), "columns is None: must be a taxel.Columns"),
+        (lambda: wire.Decoder().push_into(None, b""), "columns is None: must be a taxel.wire.Columns"),
         (lambda: wire.Decoder().push_into(wire.Columns(2), bytes(15)), "room for 2 rows: 15 bytes may need 4"),
         (lambda: wire.Columns(0), "rows is 0: must be a whole number from 1"),
         (lambda: wire.Columns(2**48), "there is no memory for so many"),
@@ -262,7 +262,7 @@ def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
         (lambda: wire.encode(b""), "events is b'': must be a taxel.Events"),
         (
             lambda: wire.encode(taxel.Events([0], [64], [0], [True], array=taxel.Array(1, 65))),
-            "event 0: taxel x=64, y=0: version 1 of the wire holds columns and rows 0 to 63",
+            "event 0: row 0, column 64: version 1 of the wire holds rows and columns 0 to 63",
         ),
     ],
 )

@@ -14,7 +14,7 @@ pub struct Array {
     pub rows: u16,
     /// Number of columns, from left to right.
     pub columns: u16,
-    /// Distance between the centres of neighbours; `None` where nobody knows it, or where `places` are known.
+    /// Distance between the centres of neighbours; `None` where it is unknown, or where `places` are known.
     #[serde(default, with = "stated")]
     pub pitch_mm: Option<Pitch>,
     /// Name of the sensor.
@@ -60,7 +60,7 @@ pub struct Places {
     /// The area of each taxel, in the square of the unit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub area: Option<Vec<f64>>,
-    /// The unit of places; `None` where nobody knows it.
+    /// The unit of places; `None` where it is unknown.
     #[serde(default)]
     pub unit: Option<PlaceUnit>,
 }
@@ -75,7 +75,7 @@ pub enum PlaceUnit {
 
 /// The pitch in files: a number, or a pair of numbers (rows, columns), or null.
 ///
-/// Before a pitch could be unknown, 1 stood for one that nobody knew: a file's 1 reads as unknown, and a pitch of 1 mm is
+/// Before a pitch could be unknown, 1 stood for an unknown one: a file's 1 reads as unknown, and a pitch of 1 mm is
 /// written as a pair.
 mod stated {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -89,7 +89,7 @@ mod stated {
         Pair([f64; 2]),
     }
 
-    /// The pitch that nobody knew.
+    /// The number that stood for an unknown pitch.
     const UNKNOWN: f64 = 1.0;
 
     pub(super) fn serialize<S: Serializer>(pitch: &Option<Pitch>, to: S) -> Result<S::Ok, S::Error> {
@@ -167,7 +167,10 @@ impl Array {
                 let is_area = name == "places.area";
                 if !value.is_finite() || (is_area && value <= 0.0) {
                     let right = if is_area { "above 0 and finite" } else { "finite" };
-                    return Err(problem!("{name} of taxel {taxel} is {value}: must be {right}"));
+                    return Err(problem!(
+                        "{name} of the taxel at {} is {value}: must be {right}",
+                        self.place_of(taxel)
+                    ));
                 }
             }
         }
@@ -192,10 +195,33 @@ impl Array {
         usize::from(y) * usize::from(self.columns) + usize::from(x)
     }
 
+    /// Where a taxel is, in text for people; `taxel` is its index, row by row.
+    #[must_use]
+    pub fn place_of(&self, taxel: usize) -> String {
+        let columns = usize::from(self.columns).max(1);
+        format!("row {}, column {}", taxel / columns, taxel % columns)
+    }
+
     /// Whether a taxel exists.
     #[must_use]
     pub fn has(&self, taxel: usize) -> bool {
         self.exists.as_ref().is_none_or(|exists| exists[taxel])
+    }
+
+    /// The area of each taxel, mm2, by index; `None` where it is not known.
+    #[must_use]
+    pub fn areas_mm2(&self) -> Option<Vec<f64>> {
+        match (&self.pitch_mm, &self.places) {
+            (Some(pitch), _) => Some(vec![pitch.area(); self.len()]),
+            (None, Some(Places { area, unit: Some(PlaceUnit::Mm), .. })) => area.clone(),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a single row or column with neither pitch nor places, which has no map, centre or area.
+    #[must_use]
+    pub fn is_channels(&self) -> bool {
+        self.pitch_mm.is_none() && self.places.is_none() && (self.rows == 1 || self.columns == 1)
     }
 
     /// Whether another array has the same rows, columns and taxels, so that what was measured or trained on it fits.
@@ -294,7 +320,7 @@ mod tests {
         let short = Places { x: vec![0.0], ..places.clone() };
         assert!(text(&Array { places: Some(short), ..array.clone() }).contains("places.x has 1 entries"));
         let flat = Places { area: Some(vec![9.0, 0.0]), ..places.clone() };
-        assert!(text(&Array { places: Some(flat.clone()), ..array.clone() }).contains("area of taxel 1"));
+        assert!(text(&Array { places: Some(flat.clone()), ..array.clone() }).contains("at row 0, column 1 is 0"));
         let exists = Some(vec![true, false]);
         Array { places: Some(flat), exists, ..array }.check().unwrap();
     }

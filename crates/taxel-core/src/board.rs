@@ -118,7 +118,7 @@ impl Board {
             scan: Scan::new(&registers, array),
             time: 0,
             comparators: Comparators::new(array.len(), array.columns),
-            afferents: Afferents::default(),
+            afferents: Afferents::new(array.len()),
             asynchronous: None,
             link: Link::new(settings, array)?,
             refresh: Refresh::default(),
@@ -140,8 +140,8 @@ impl Board {
         Ok(self)
     }
 
-    /// Resets the board: registers, values and time as at the start, in a new session; datagrams that wait are still
-    /// sent.
+    /// Resets the board: registers as the logic resets them, with the version of the wire that it had at first; values,
+    /// time and fault counts 0, in a new session. Datagrams that wait are still sent, the current one is discarded.
     ///
     /// # Errors
     ///
@@ -152,6 +152,7 @@ impl Board {
         self.session = self.session.wrapping_add(1);
         (self.written, self.active) = (registers, registers);
         (self.at_reset, self.markers_dropped) = (self.counts, 0);
+        (self.reader, self.reported) = (CommandReader::default(), [0; 3]);
         self.scan.reset();
         (self.time, self.refresh) = (0, Refresh::default());
         self.comparators.values.fill(0);

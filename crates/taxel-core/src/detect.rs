@@ -34,8 +34,8 @@ pub struct Detection {
     /// The earliest time by the board's clock at which the host can know, us: the end of the frame of the crossing, or
     /// of the last frame on which the rule rests.
     pub known: i64,
-    /// The slope of potential minus threshold at the crossing, mV/ms: a measure of confidence; not a number
-    /// for a rule.
+    /// The slope of the potential as it comes to the threshold, mV/ms ([`OutputSpike`](crate::neuron::OutputSpike)); not
+    /// a number for a rule.
     pub slope: f64,
     /// Whether the detection may rest on values that states of version 2 repaired: the event may then have happened
     /// before `t`.

@@ -288,7 +288,7 @@ impl<'a> EventsView<'a> {
         let (columns, rows) = (self.array.columns, self.array.rows);
         for (k, (&x, &y)) in self.x.iter().zip(self.y).enumerate() {
             if x >= columns || y >= rows {
-                return Err(problem!("event {k}: taxel x={x}, y={y} lies outside {rows} rows x {columns} columns"));
+                return Err(problem!("event {k}: row {y}, column {x} lies outside {rows} rows x {columns} columns"));
             }
         }
         Ok(())

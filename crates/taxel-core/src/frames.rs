@@ -1,6 +1,6 @@
 //! Views of pictures of the whole array over time.
 
-use crate::{Array, Result, problem};
+use crate::{Array, Result, Stop, problem};
 
 /// Pictures in memory of a caller (a file, NumPy), who must not change them meanwhile; this crate never copies many.
 #[derive(Debug, Clone, Copy)]
@@ -31,4 +31,35 @@ impl<'a> FramesView<'a> {
     pub fn iter(self) -> impl Iterator<Item = (i64, &'a [f32])> {
         self.t.iter().copied().zip(self.values.chunks_exact(self.array.len().max(1)))
     }
+
+    /// The changes of each taxel from picture to picture; one from or to a NaN has no direction and is none.
+    ///
+    /// # Errors
+    ///
+    /// If the caller stops.
+    pub fn changes(self, stop: Stop<'_>) -> Result<Changes> {
+        let taxels = self.array.len();
+        let mut changes = Changes { number: vec![0; taxels], on: vec![0; taxels] };
+        let mut last = vec![0_i8; taxels];
+        for ((_, before), (_, picture)) in self.iter().zip(self.iter().skip(1)) {
+            stop.check()?;
+            let counts = changes.number.iter_mut().zip(&mut changes.on).zip(&mut last);
+            for ((&value, &before), ((number, on), last)) in picture.iter().zip(before).zip(counts) {
+                let way = i8::from(value > before) - i8::from(value < before);
+                *number += u32::from(way != 0);
+                *on += u32::from(way != 0 && way == *last);
+                *last = if way == 0 { *last } else { way };
+            }
+        }
+        Ok(changes)
+    }
+}
+
+/// The changes of each taxel of pictures.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Changes {
+    /// Number of changes.
+    pub number: Vec<u32>,
+    /// Number of those in the direction of the taxel's change before.
+    pub on: Vec<u32>,
 }

@@ -12,7 +12,7 @@ pub mod rivals;
 mod statement;
 mod stdp;
 
-pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, Horizon, Shares};
+pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, GapMultipliers, Horizon, Shares};
 pub use engines::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
 pub use fit::{Engine, Fit, Left, Round, Status};
 pub use online::OnlineConeR;

@@ -2,16 +2,31 @@
 
 use std::collections::BTreeSet;
 
-/// The noise floor of the board's fast presets, ticks: by it a rest is found that nobody measured.
+/// The noise floor of the board's fast presets, ticks: by it a rest is found that was not measured.
 pub const NOISE_FLOOR: f64 = 3.0;
 
 /// Half a tick, which is added to the noise floor as a threshold: the rest is a mean, and values are whole ticks.
 const HALF_TICK: f64 = 0.5;
 
+/// The step between values that a noise floor belongs to, in the sensor's unit: a tick; where the floor is below one tick
+/// but not 0, the unit is coarser than the values, and the step is the floor.
+#[must_use]
+pub fn step_of(noise_floor: f64) -> f64 {
+    if noise_floor > 0.0 { noise_floor.min(1.0) } else { 1.0 }
+}
+
 /// The smallest value of a touched taxel with this `rest`, for a board's noise floor; all in the sensor's unit.
 #[must_use]
 pub fn touched_from(rest: f64, noise_floor: f64) -> f64 {
-    rest + noise_floor + HALF_TICK
+    rest + noise_floor + HALF_TICK * step_of(noise_floor)
+}
+
+/// Difference of a value from its rest, ticks; 0 up to the noise floor, and if either is unknown.
+#[inline(always)]
+#[must_use]
+pub fn above_noise(value: u16, rest: u16, noise_floor: u16) -> u16 {
+    let above = value.less(rest);
+    if above > noise_floor { above } else { 0 }
 }
 
 /// A numeric type of taxels' values.
@@ -98,7 +113,6 @@ impl Rest<u16> {
     #[inline(always)]
     #[must_use]
     pub fn above_noise(&self, taxel: usize, value: u16, noise_floor: u16) -> u16 {
-        let above = self.above(taxel, value);
-        if above > noise_floor { above } else { 0 }
+        above_noise(value, self.values[taxel], noise_floor)
     }
 }

@@ -7,8 +7,8 @@
 
 use crate::Array;
 use crate::held::UNKNOWN;
-use crate::rest::NOISE_FLOOR;
-use crate::tracked_rest::TrackedRest;
+use crate::rest::{NOISE_FLOOR, Value};
+use crate::tracked_rest::{Grid, TrackedRest};
 
 /// Width of a bin, us.
 pub const BIN_US: i64 = 50_000;
@@ -56,10 +56,17 @@ struct Touch {
 }
 
 /// See the module.
+///
+/// Only taxels that had a value, and their neighbours, take memory and time: an array may be large, and few of its
+/// taxels active.
 #[derive(Debug, Clone)]
 pub struct TouchCounts {
-    rows: usize,
-    columns: usize,
+    grid: Grid,
+    exists: Option<Vec<bool>>,
+    /// By taxel index: 1 + its place in the vectors below; 0 for a taxel that is not counted.
+    places: Vec<u32>,
+    /// The indices of the counted taxels.
+    taxels: Vec<u32>,
     /// Number of each taxel's neighbours that exist.
     neighbours: Vec<u8>,
     rest: TrackedRest,
@@ -75,23 +82,33 @@ impl TouchCounts {
     /// values on.
     #[must_use]
     pub fn new(array: &Array, rest: f64) -> Self {
-        let (rows, columns, n) = (usize::from(array.rows), usize::from(array.columns), array.len());
-        let exists = |taxel: usize| array.exists.as_ref().is_none_or(|exists| exists[taxel]);
-        let neighbours = |taxel: usize| around(rows, columns, taxel, 1).filter(|&near| exists(near)).count() as u8;
-        let blank = Bin { held: f32::NAN, greatest: f32::NAN, changes: 0 };
-        Self {
-            rows,
-            columns,
-            neighbours: (0..n).map(|taxel| if exists(taxel) { neighbours(taxel) } else { 0 }).collect(),
-            rest: TrackedRest::new(columns, NOISE_FLOOR, vec![rest; n]),
-            bins: vec![blank; n],
-            counts: vec![Counts::default(); n],
-            touch: vec![Touch::default(); n],
+        let grid = Grid { taxels: array.len(), columns: usize::from(array.columns) };
+        let mut counts = Self {
+            grid,
+            exists: array.exists.clone(),
+            places: vec![0; grid.taxels],
+            taxels: vec![],
+            neighbours: vec![],
+            rest: TrackedRest::sparse(grid.taxels, grid.columns, NOISE_FLOOR),
+            bins: vec![],
+            counts: vec![],
+            touch: vec![],
             end: None,
+        };
+        if rest != f64::NO_REST {
+            (0..grid.taxels).for_each(|taxel| counts.add(taxel));
+            counts.rest = TrackedRest::new(grid.columns, NOISE_FLOOR, vec![rest; grid.taxels]);
         }
+        counts
     }
 
-    /// The counts by taxel index, up to the last whole bin.
+    /// The indices of the taxels that are counted: those that had a value, and their neighbours.
+    #[must_use]
+    pub fn taxels(&self) -> &[u32] {
+        &self.taxels
+    }
+
+    /// The counts of the [`TouchCounts::taxels`], up to the last whole bin; all others have none.
     #[must_use]
     pub fn counts(&self) -> &[Counts] {
         &self.counts
@@ -101,7 +118,7 @@ impl TouchCounts {
     /// whether the taxel itself changed, not what a state of version 2 says of it.
     pub fn event(&mut self, t: i64, taxel: usize, ticks: u16, up: bool, own: bool) {
         let value = if ticks == UNKNOWN {
-            let held = self.bins[taxel].held;
+            let held = self.place(taxel).map_or(f32::NAN, |place| self.bins[place].held);
             (if held.is_nan() { 0.0 } else { held }) + if up { 4.0 } else { -4.0 }
         } else {
             ticks.into()
@@ -115,7 +132,11 @@ impl TouchCounts {
         if self.end.is_none_or(|end| t >= end) {
             self.advance(t);
         }
-        let bin = &mut self.bins[taxel];
+        let place = match self.place(taxel) {
+            Some(place) if !self.bins[place].held.is_nan() => place,
+            _ => self.begin(taxel),
+        };
+        let bin = &mut self.bins[place];
         bin.held = value;
         bin.greatest = bin.greatest.max(value);
         bin.changes += u32::from(own);
@@ -132,30 +153,66 @@ impl TouchCounts {
         self.end = Some(self.end.unwrap_or_else(|| next(t)));
     }
 
+    /// The place of a taxel's counts, if it is counted.
+    #[inline]
+    fn place(&self, taxel: usize) -> Option<usize> {
+        (self.places[taxel] as usize).checked_sub(1)
+    }
+
+    /// Counts a taxel and its neighbours from its first value on; returns its place.
+    #[cold]
+    fn begin(&mut self, taxel: usize) -> usize {
+        for near in self.grid.around(taxel, 1) {
+            if self.places[near] == 0 {
+                self.add(near);
+                self.rest.add(near as u32);
+            }
+        }
+        self.places[taxel] as usize - 1
+    }
+
+    /// Counts a taxel that was not counted so far.
+    fn add(&mut self, taxel: usize) {
+        let exists = |taxel: usize| self.exists.as_ref().is_none_or(|exists| exists[taxel]);
+        let neighbours = self.grid.around(taxel, 1).filter(|&near| near != taxel && exists(near)).count() as u8;
+        self.neighbours.push(if exists(taxel) { neighbours } else { 0 });
+        self.taxels.push(taxel as u32);
+        self.bins.push(Bin { held: f32::NAN, greatest: f32::NAN, changes: 0 });
+        self.counts.push(Counts::default());
+        self.touch.push(Touch::default());
+        self.places[taxel] = self.taxels.len() as u32;
+    }
+
+    /// The places of the counted taxels up to `reach` rows and columns around that at `place`.
+    fn around(&self, place: usize, reach: usize) -> impl Iterator<Item = usize> {
+        let others = self.grid.around(self.taxels[place] as usize, reach);
+        others.filter_map(|other| self.place(other)).filter(move |&other| other != place)
+    }
+
     fn end_bin(&mut self, t: i64) {
         self.count_changes();
         let (mut near, mut down) = (vec![0_u8; self.bins.len()], vec![0_u8; self.bins.len()]);
-        for (taxel, rest) in self.rest.rests().enumerate() {
-            let bin = self.bins[taxel];
+        for (place, rest) in self.rest.rests().enumerate() {
+            let bin = self.bins[place];
             // A taxel's first value is its rest.
             let Some(rest) = rest.map(|rest| rest as f32) else { continue };
-            if bin.greatest - rest < TOUCH {
+            if bin.greatest.is_nan() || bin.greatest - rest < TOUCH {
                 continue;
             }
-            self.counts[taxel].pressed += 1;
-            for other in around(self.rows, self.columns, taxel, 1) {
+            self.counts[place].pressed += 1;
+            for other in self.around(place, 1) {
                 near[other] += 1;
                 down[other] += u8::from(bin.held - rest >= TOUCH);
             }
         }
-        for (taxel, &neighbours) in self.neighbours.iter().enumerate() {
-            let (touch, counts) = (&mut self.touch[taxel], &mut self.counts[taxel]);
-            let begins = !touch.present && neighbours >= 3 && 4 * near[taxel] >= 3 * neighbours;
+        for (place, &neighbours) in self.neighbours.iter().enumerate() {
+            let (touch, counts) = (&mut self.touch[place], &mut self.counts[place]);
+            let begins = !touch.present && neighbours >= 3 && 4 * near[place] >= 3 * neighbours;
             if begins {
                 *touch = Touch { present: true, changed: false };
             }
-            touch.changed |= self.bins[taxel].changes > 0;
-            if touch.present && 4 * down[taxel] <= neighbours {
+            touch.changed |= self.bins[place].changes > 0;
+            if touch.present && 4 * down[place] <= neighbours {
                 counts.touches += 1;
                 counts.missed += u32::from(!touch.changed);
                 touch.present = false;
@@ -168,18 +225,18 @@ impl TouchCounts {
     }
 
     fn count_changes(&mut self) {
-        for taxel in 0..self.bins.len() {
-            let changes = self.bins[taxel].changes;
+        for place in 0..self.bins.len() {
+            let changes = self.bins[place].changes;
             if changes == 0 {
                 continue;
             }
             let (mut most, mut second) = (0, 0);
-            for other in around(self.rows, self.columns, taxel, 2) {
+            for other in self.around(place, 2) {
                 let others = self.bins[other].changes;
                 (most, second) = if others > most { (others, most) } else { (most, second.max(others)) };
             }
-            self.counts[taxel].changed += 1;
-            self.counts[taxel].by_itself += u32::from(changes >= OFTEN && changes > BY_ITSELF * second);
+            self.counts[place].changed += 1;
+            self.counts[place].by_itself += u32::from(changes >= OFTEN && changes > BY_ITSELF * second);
         }
     }
 }
@@ -187,12 +244,4 @@ impl TouchCounts {
 /// The first end of a bin after `t`.
 fn next(t: i64) -> i64 {
     (t.div_euclid(BIN_US) + 1).saturating_mul(BIN_US)
-}
-
-/// The taxels up to `reach` rows and columns away.
-fn around(rows: usize, columns: usize, taxel: usize, reach: usize) -> impl Iterator<Item = usize> {
-    let (row, column) = (taxel / columns, taxel % columns);
-    let (top, bottom) = (row.saturating_sub(reach), (row + reach + 1).min(rows));
-    let (left, right) = (column.saturating_sub(reach), (column + reach + 1).min(columns));
-    (top..bottom).flat_map(move |y| (left..right).map(move |x| y * columns + x)).filter(move |&other| other != taxel)
 }

@@ -1,9 +1,14 @@
-//! The rest of a sensor that nobody measured: found in a quiet stretch, and tracked from there on.
+//! The rest of a sensor whose rest was not measured: found in a quiet stretch, and tracked from there on.
+//!
+//! A taxel's rest is held ([`Baseline::hold`]) once it is known, so that a press that is held for long stays one: from a
+//! given rest on; where none is given, from the first quiet stretch on; and from where it is set anew.
 //!
 //! Reading: a stretch is quiet if no taxel was further from its mean than the tracked rest calls far; on a grid, if no
 //! three of nine neighbours were, so that bad taxels, which move alone or in pairs, do not count. It can be that of a
 //! load that does not move: a taxel that lies far below its rest for a whole quiet stretch was loaded before, and its
-//! rest is set anew.
+//! rest is set anew. Where values fall with pressure, it is one that lies far above.
+
+use std::collections::HashMap;
 
 use crate::baseline::{Baseline, FAR_NOISE, stands_out_from};
 use crate::rest::Value;
@@ -47,6 +52,14 @@ impl Stretch {
         }
     }
 
+    /// Adds a taxel after the others, without a value so far.
+    fn add(&mut self) {
+        self.first.push(0.0);
+        for statistics in [&mut self.least, &mut self.greatest, &mut self.sums, &mut self.squares] {
+            statistics.push(0.0);
+        }
+    }
+
     /// A taxel that has no value before this one had it throughout.
     fn begin(&mut self, taxel: usize, value: f32) {
         self.first[taxel] = value;
@@ -58,39 +71,39 @@ impl Stretch {
     }
 
     /// The median of the taxels' standard deviations on a grid, where a touch moves few of them; 0 for channels, each of
-    /// which a load may move. A taxel without a value so far is one that did not move.
+    /// which a load may move. A taxel without a value so far, or that is not tracked, did
+    /// not move.
     #[allow(clippy::cast_precision_loss)]
-    fn noise(&self, columns: usize) -> f64 {
+    fn noise(&self, grid: Grid) -> f64 {
         let n = self.samples as f32;
         let variance = |(sum, squares): (&f32, &f32)| (squares - sum * sum / n).max(0.0) / n;
         let mut all: Vec<f32> = self.sums.iter().zip(&self.squares).map(variance).collect();
-        if is_channels(all.len(), columns) {
+        if grid.is_channels() {
             return 0.0;
         }
-        let middle = all.len() / 2;
-        f64::from(*all.select_nth_unstable_by(middle, f32::total_cmp).1).sqrt()
+        match (grid.taxels / 2).checked_sub(grid.taxels - all.len()) {
+            Some(middle) => f64::from(*all.select_nth_unstable_by(middle, f32::total_cmp).1).sqrt(),
+            None => 0.0,
+        }
     }
 
-    /// Whether it was quiet: see the module.
-    fn quiet(&self, far: f64, known: &[bool], columns: usize) -> bool {
+    /// Whether it was quiet: see the module. `index` is that of a tracked taxel.
+    fn quiet(&self, far: f64, known: &[bool], grid: Grid, index: impl Fn(usize) -> usize) -> bool {
         let moved = |taxel: usize| {
             let mean = self.mean(taxel) - f64::from(self.first[taxel]);
             known[taxel] && (f64::from(self.greatest[taxel]) - mean).max(mean - f64::from(self.least[taxel])) >= far
         };
-        let moved: Vec<usize> = (0..known.len()).filter(|&taxel| moved(taxel)).collect();
-        if is_channels(known.len(), columns) {
-            return moved.is_empty();
+        let mut moved = (0..known.len()).filter(|&taxel| moved(taxel));
+        if grid.is_channels() {
+            return moved.next().is_none();
         }
-        let rows = known.len() / columns;
-        let mut near = vec![0; known.len()];
+        let mut near = HashMap::new();
         for taxel in moved {
-            let (row, column) = (taxel / columns, taxel % columns);
-            for y in row.saturating_sub(1)..(row + 2).min(rows) {
-                for x in column.saturating_sub(1)..(column + 2).min(columns) {
-                    near[y * columns + x] += 1;
-                    if near[y * columns + x] >= TOUCHED_TOGETHER {
-                        return false;
-                    }
+            for place in grid.around(index(taxel), 1) {
+                let together = near.entry(place).or_insert(0);
+                *together += 1;
+                if *together >= TOUCHED_TOGETHER {
+                    return false;
                 }
             }
         }
@@ -98,22 +111,45 @@ impl Stretch {
     }
 }
 
-/// Whether so many taxels in so many columns are channels, in which no taxel has neighbours all around it.
-fn is_channels(taxels: usize, columns: usize) -> bool {
-    columns == 1 || taxels <= columns
+/// An array of so many taxels in so many columns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Grid {
+    pub taxels: usize,
+    pub columns: usize,
 }
 
-/// The rest of each taxel, tracked as [`Baseline::tracked`] does; before the first quiet stretch, from the taxels' first
-/// values on.
+impl Grid {
+    /// Whether it is channels, in which no taxel has neighbours all around it.
+    fn is_channels(self) -> bool {
+        self.columns == 1 || self.taxels <= self.columns
+    }
+
+    /// A taxel and those up to `reach` rows and columns away.
+    pub fn around(self, taxel: usize, reach: usize) -> impl Iterator<Item = usize> {
+        let (row, column) = (taxel / self.columns, taxel % self.columns);
+        let (top, bottom) = (row.saturating_sub(reach), (row + reach + 1).min(self.taxels / self.columns));
+        let (left, right) = (column.saturating_sub(reach), (column + reach + 1).min(self.columns));
+        (top..bottom).flat_map(move |y| (left..right).map(move |x| y * self.columns + x))
+    }
+}
+
+/// The rest of each taxel, tracked as [`Baseline::tracked`] does and held once it is known; before the first quiet
+/// stretch, from the taxels' first values on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedRest {
-    columns: usize,
+    grid: Grid,
+    /// The indices of the tracked taxels in the order of their values; `None` if all are tracked, by index.
+    tracked: Option<Vec<u32>>,
     noise_floor: f64,
+    /// Whether values fall from their rest with pressure.
+    falls: bool,
     baseline: Baseline,
     /// The values to read: those of taxels without a value are their rest.
     values: Vec<f32>,
     /// Whether a taxel had a value so far, or its rest was given.
     known: Vec<bool>,
+    /// Whether the rest of any taxel was given: then the quiet stretch found none of the others, which were loaded.
+    given: bool,
     stretch: Option<Stretch>,
     far: f64,
     /// The first quiet stretch, us.
@@ -132,9 +168,41 @@ impl TrackedRest {
         let known: Vec<bool> = begins.iter().map(|&rest| rest != f64::NO_REST).collect();
         let rest = begins.into_iter().map(|rest| if rest == f64::NO_REST { 0.0 } else { rest }).collect();
         #[allow(clippy::cast_possible_truncation)]
-        let baseline = Baseline::tracked(rest, vec![far as f32; n]);
-        let (columns, begins) = (columns.max(1), vec![f64::NO_REST; n]);
-        Self { columns, noise_floor, baseline, values: vec![0.0; n], known, stretch: None, far, quiet: None, begins }
+        let mut baseline = Baseline::tracked(rest, vec![far as f32; n]);
+        (0..n).filter(|&taxel| known[taxel]).for_each(|taxel| baseline.hold(taxel));
+        let given = known.contains(&true);
+        let (grid, begins) = (Grid { taxels: n, columns: columns.max(1) }, vec![f64::NO_REST; n]);
+        let (values, tracked) = (vec![0.0; n], None);
+        let falls = false;
+        let (stretch, quiet) = (None, None);
+        Self { grid, tracked, noise_floor, falls, baseline, values, known, given, stretch, far, quiet, begins }
+    }
+
+    /// The same of values that fall from their rest with pressure: what lies far above it was loaded before.
+    #[must_use]
+    pub fn falling(self) -> Self {
+        Self { falls: true, ..self }
+    }
+
+    /// The rest of those of an array's `taxels` that [`TrackedRest::add`] names, none so far: the others count as taxels
+    /// without a value.
+    #[must_use]
+    pub fn sparse(taxels: usize, columns: usize, noise_floor: f64) -> Self {
+        let grid = Grid { taxels, columns: columns.max(1) };
+        Self { grid, tracked: Some(vec![]), ..Self::new(columns, noise_floor, vec![]) }
+    }
+
+    /// Tracks one more taxel, by index, whose values come after those of the taxels so far; its rest is unknown.
+    pub fn add(&mut self, taxel: u32) {
+        self.tracked.get_or_insert_default().push(taxel);
+        #[allow(clippy::cast_possible_truncation)]
+        self.baseline.add(0.0, self.far as f32);
+        self.values.push(0.0);
+        self.known.push(false);
+        self.begins.push(f64::NO_REST);
+        if let Some(stretch) = &mut self.stretch {
+            stretch.add();
+        }
     }
 
     /// Reads the next values, at `t` us, NaN for a taxel without one; returns them above the rest (negative below it).
@@ -161,7 +229,7 @@ impl TrackedRest {
         self.baseline.above()
     }
 
-    /// Makes a taxel's first value its rest; [`TrackedRest::take`] does so where nobody did before.
+    /// Makes a taxel's first value its rest; [`TrackedRest::take`] does so for a taxel without a rest.
     pub fn begin(&mut self, taxel: usize, value: f32) {
         self.known[taxel] = true;
         self.baseline.begin(taxel, value.into());
@@ -176,10 +244,11 @@ impl TrackedRest {
         let next = Stretch::new(t, &self.values);
         let Some(stretch) = self.stretch.replace(next) else { return };
         // Noise above the noise floor would be events without end: a load that moves is no noise.
-        let noise = stretch.noise(self.columns).min(self.noise_floor);
+        let noise = stretch.noise(self.grid).min(self.noise_floor);
         let far = stands_out_from(FAR_NOISE, noise, self.noise_floor);
         let any = self.known.contains(&true);
-        if stretch.samples < LEAST_SAMPLES || !any || !stretch.quiet(far, &self.known, self.columns) {
+        let index = |taxel: usize| self.tracked.as_ref().map_or(taxel, |tracked| tracked[taxel] as usize);
+        if stretch.samples < LEAST_SAMPLES || !any || !stretch.quiet(far, &self.known, self.grid, index) {
             return;
         }
         let first = self.quiet.is_none();
@@ -195,12 +264,19 @@ impl TrackedRest {
                 continue;
             }
             let (mean, rest) = (stretch.mean(taxel), self.baseline.values()[taxel]);
-            let below = mean <= rest - far;
-            if below || first && mean < rest + far {
+            let load = if self.falls { rest - mean } else { mean - rest };
+            let released = load <= -far;
+            if released || first && load < far {
                 self.baseline.set(taxel, mean);
             }
-            if below || self.begins[taxel] == f64::NO_REST {
-                self.begins[taxel] = self.begins[taxel].min(self.baseline.values()[taxel]);
+            if released || !self.given {
+                self.baseline.hold(taxel);
+            }
+            let (rest, begins) = (self.baseline.values()[taxel], &mut self.begins[taxel]);
+            if *begins == f64::NO_REST {
+                *begins = rest;
+            } else if released {
+                *begins = if self.falls { begins.max(rest) } else { begins.min(rest) };
             }
         }
     }
@@ -216,7 +292,7 @@ impl TrackedRest {
         self.quiet
     }
 
-    /// The rest of each taxel in its first quiet stretch, or in a later one that lies far below it: from where to track
+    /// The rest of each taxel in its first quiet stretch, or in a later one in which it was released: from where to track
     /// a recording that is read again; [`Value::NO_REST`] for a taxel without any.
     #[must_use]
     pub fn begins(&self) -> &[f64] {

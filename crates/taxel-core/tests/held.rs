@@ -118,6 +118,13 @@ fn in_whole_ticks_above_noise_is_the_same_as_touched() {
 }
 
 #[test]
+fn half_a_tick_is_half_of_a_floor_below_a_tick() {
+    for (floor, from) in [(0.0, 0.5), (0.04, 0.06), (0.5, 0.75), (1.0, 1.5), (3.0, 3.5), (30.0, 30.5)] {
+        assert!((touched_from(0.0, floor) - from).abs() < 1e-12, "{floor}");
+    }
+}
+
+#[test]
 fn an_unknown_rest_is_the_first_value_and_one_that_was_set_stays() {
     let mut rest = Rest::measured(vec![30, u16::NO_REST]);
     assert!(!rest.follow(0, 10) && rest.follow(1, 20) && !rest.follow(1, 10));

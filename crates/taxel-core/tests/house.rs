@@ -33,7 +33,8 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
     (
         "taxel-live",
         &[
-            &["error", "clock", "host_clock", "latency", "locked"],
+            &["error", "latency", "locked"],
+            &["clock", "host_clock"],
             &["address", "bridged", "ports"],
             &["recording"],
             &["capture"],
@@ -43,9 +44,10 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
     (
         "taxel-panel",
         &[
-            &["assets", "clients", "connections", "limits", "options", "request", "time_columns"],
-            &["array_state", "encoded_spikes", "recorder", "taxel_history"],
+            &["assets", "centre", "clients", "connections", "limits", "options", "request", "time_columns", "weights"],
+            &["array_state", "recorder", "taxel_history"],
             &["keyframe_index"],
+            &["encoded_spikes"],
             &["handler", "player"],
             &["labels", "picture", "presets"],
             &["live_source"],
@@ -66,11 +68,10 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["enter", "instructions", "thread_state"],
             &["convert", "parameters"],
             &["threaded"],
-            &["bridge"],
+            &["bridge", "cone_x"],
             &[
                 "calibration",
                 "circuit",
-                "cone_x",
                 "detect",
                 "encode",
                 "held",

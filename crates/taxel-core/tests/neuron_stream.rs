@@ -125,3 +125,32 @@ fn a_factor_on_the_threshold_moves_the_crossing_to_where_the_potential_has_that_
         assert!((first.slope - (1.0 - x) * (-x).exp() / 10.0).abs() < 1e-14);
     }
 }
+
+#[test]
+fn a_spikes_slope_is_that_of_the_potential_up_to_it() {
+    let mut random = StdRng::seed_from_u64(9);
+    let mut checked = 0;
+    for round in 0..40 {
+        let trains = random_trains(&mut random, 30, round % 2 == 0);
+        let weights: Vec<f64> = (0..30).map(|_| random.random_range(-0.2..0.5)).collect();
+        for neuron in neurons() {
+            let spikes = neuron.run(&weights, &trains, 1.0, Stop::never()).unwrap();
+            let apart = if neuron.time == Time::Grid { neuron.step_ms } else { 1e-6 };
+            for (k, spike) in spikes.iter().enumerate() {
+                // In the refractory time the potential is 0 by 6.7, while the slope is that of the sum of inputs.
+                let free = k == 0 || spike.t - apart > spikes[k - 1].t + neuron.refractory + 1e-9;
+                if !free || spike.t - apart < trains.start {
+                    continue;
+                }
+                let times = [spike.t - apart, spike.t];
+                let fired: Vec<f64> = spikes[..k].iter().map(|spike| spike.t).collect();
+                let at = neuron.potential(&weights, &trains, &times, &fired, Stop::never()).unwrap();
+                let slope = (at[1] - at[0]) / apart;
+                let within = if neuron.time == Time::Grid { 1e-9 } else { 1e-4 };
+                assert!((slope - spike.slope).abs() <= within * slope.abs().max(1.0), "{slope} {spike:?} {neuron:?}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 500, "{checked}");
+}

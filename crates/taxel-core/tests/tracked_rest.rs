@@ -1,4 +1,4 @@
-//! The rest of a sensor that nobody measured.
+//! The rest of a sensor whose rest was not measured.
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::rest::Value;
@@ -68,8 +68,8 @@ fn a_load_stays_above_the_rest_and_what_was_loaded_at_first_is_found_once_it_is_
     let mut rest = unknown();
     sampled(&mut rest, 0, 20, |_, _| 50.0);
     let above = sampled(&mut rest, 20, 20, |_, taxel| if touched(taxel) { 90.0 } else { 50.0 });
-    // After a second the rest has moved by a twentieth: far values are followed with 20 s.
-    assert!((37.5..39.0).contains(&above[28]), "{}", above[28]);
+    // After a second the rest has hardly moved: far values of a rest that is known are followed with an hour.
+    assert!((39.9..40.0).contains(&above[28]), "{}", above[28]);
     assert_eq!(above[0], 0.0);
     // Loaded from the first value on; released for a second.
     let mut rest = unknown();
@@ -78,6 +78,28 @@ fn a_load_stays_above_the_rest_and_what_was_loaded_at_first_is_found_once_it_is_
     sampled(&mut rest, 30, 30, |_, _| 50.0);
     assert!((rest.rests().nth(28).unwrap().unwrap() - 50.0).abs() < 0.01);
     assert_eq!(rest.begins()[28], 50.0);
+}
+
+#[test]
+fn a_press_that_is_held_sets_no_rest_anew_where_values_fall_with_it() {
+    // As above, upside down; then pressed for 20 s.
+    let mut rest = unknown().falling();
+    let is_3000 = |rest: &TrackedRest| {
+        let now = rest.rests().nth(28).flatten().unwrap();
+        (now - 3000.0).abs() < 0.2 && (rest.begins()[28] - 3000.0).abs() < 1e-6
+    };
+    sampled(&mut rest, 0, 30, |_, taxel| if touched(taxel) { 2960.0 } else { 3000.0 });
+    sampled(&mut rest, 30, 30, |_, _| 3000.0);
+    assert!(is_3000(&rest), "{:?} {:?}", rest.rests().nth(28), rest.begins()[28]);
+    let above = sampled(&mut rest, 60, 20, |_, taxel| if touched(taxel) { 2960.0 } else { 3000.0 });
+    assert!((-40.0..-39.9).contains(&above[28]), "{}", above[28]);
+    sampled(&mut rest, 80, 380, |_, taxel| if touched(taxel) { 2960.0 } else { 3000.0 });
+    sampled(&mut rest, 460, 20, |_, _| 3000.0);
+    assert!(is_3000(&rest), "{:?} {:?}", rest.rests().nth(28), rest.begins()[28]);
+    // A rest that is given is not set below it either.
+    let mut rest = TrackedRest::new(8, 3.0, vec![3000.0; 64]).falling();
+    sampled(&mut rest, 0, 30, |_, taxel| if touched(taxel) { 2960.0 } else { 3000.0 });
+    assert!(rest.rests().nth(28).unwrap().unwrap() > 2997.0);
 }
 
 #[test]
@@ -102,4 +124,31 @@ fn a_clock_that_steps_back_begins_a_new_stretch() {
     assert_eq!(rest.quiet(), None);
     sampled(&mut rest, 10, 1, |_, _| 50.0);
     assert_eq!(rest.quiet(), Some((0, QUIET_US)));
+}
+
+#[test]
+fn a_sparse_rest_is_that_of_all_taxels_of_which_most_have_no_value() {
+    let mut random = StdRng::seed_from_u64(11);
+    for active in [5_usize, 30, 64] {
+        let (mut dense, mut sparse) = (unknown(), TrackedRest::sparse(64, 8, 3.0));
+        let (mut places, mut held) = (vec![], [f32::NAN; 64]);
+        for k in 0..200 {
+            for _ in 0..4 {
+                let taxel = random.random_range(0..active) * 37 % 64;
+                let loaded = k / 30 % 2 == 1 && touched(taxel);
+                held[taxel] = 50.0 + random.random_range(-2.0..2.0_f32) + if loaded { 40.0 } else { 0.0 };
+                if !places.contains(&taxel) {
+                    places.push(taxel);
+                    sparse.add(taxel as u32);
+                }
+            }
+            let all = dense.take(k * 50_000, held).to_vec();
+            let some = sparse.take(k * 50_000, places.iter().map(|&taxel| held[taxel])).to_vec();
+            assert_eq!(some, places.iter().map(|&taxel| all[taxel]).collect::<Vec<_>>(), "{active} active, sample {k}");
+        }
+        assert_eq!(sparse.quiet(), dense.quiet(), "{active} active");
+        assert!(dense.quiet().is_some());
+        let begins: Vec<f64> = places.iter().map(|&taxel| dense.begins()[taxel]).collect();
+        assert_eq!(sparse.begins(), begins, "{active} active");
+    }
 }

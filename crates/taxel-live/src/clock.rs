@@ -12,6 +12,7 @@
 //! time.
 
 mod offset;
+mod pace;
 mod points;
 mod stretch;
 
@@ -20,13 +21,13 @@ use std::collections::VecDeque;
 use taxel_core::wire::{DatagramInfo, WORD_BYTES};
 
 pub use offset::Offset;
+use pace::Arrivals;
+pub use pace::{Pace, doubt};
 use points::Points;
-use stretch::{Point, Stretch};
+use stretch::{LONG_US, Point, STRETCHES, Stretch};
 
 /// Duration of a stretch, the unit in which points are stored, us of the board's clock.
 const STRETCH_US: i64 = 250_000;
-/// Number of stretches from which the line is fitted: 64 s, within which the rate of a quartz is constant.
-const STRETCHES: usize = 256;
 /// Number of recent stretches of which all stored points are kept; of older ones only the points near the line are.
 const NEW: usize = 8;
 
@@ -44,8 +45,6 @@ const ANOTHER: usize = 4;
 const QUARTZ: f64 = 200.0;
 /// Largest drift of any clock, ppm: a ceramic resonator has 5000.
 const ANY: f64 = 20_000.0;
-/// Duration beyond which a slope larger than [`QUARTZ`] is accepted, us.
-const LONG_US: i64 = 10_000_000;
 
 /// The largest datagram of a board of version 1, bytes: 280 events. A shorter one ends a frame.
 const FULL: usize = 280 * WORD_BYTES;
@@ -73,6 +72,7 @@ pub struct BoardClock {
     /// Number of stretches since the line was fitted.
     unfitted: usize,
     offset: Option<Offset>,
+    arrivals: Arrivals,
 }
 
 impl BoardClock {
@@ -101,6 +101,9 @@ impl BoardClock {
     /// returns whether a stretch ended.
     pub fn note(&mut self, board_us: i64, arrived_ns: i64) -> bool {
         let point = (board_us, arrived_ns - board_us * 1000);
+        if let Some(offset) = self.offset {
+            self.arrivals.note(arrived_ns - offset.host_ns(board_us));
+        }
         let mut ended = false;
         if self.running.points > 0 {
             let (now, then) = (board_us.div_euclid(STRETCH_US), self.running.last.div_euclid(STRETCH_US));
@@ -136,6 +139,12 @@ impl BoardClock {
         self.offset
     }
 
+    /// The drift and the delays so far, and whether they can be; after the first datagram.
+    #[must_use]
+    pub fn pace(&self) -> Option<Pace> {
+        self.offset.map(|line| self.arrivals.pace(line))
+    }
+
     /// The estimate from all datagrams, when no more arrive.
     fn finish(&mut self) -> Option<Offset> {
         if self.running.points > 0 {
@@ -147,6 +156,7 @@ impl BoardClock {
 
     fn end_stretch(&mut self) {
         let stretch = std::mem::take(&mut self.running);
+        self.arrivals.end_stretch(stretch.lowest());
         if let (Some(low), Some(offset), Some(last)) = (stretch.lowest(), self.offset, self.stretches.back()) {
             #[allow(clippy::cast_precision_loss)]
             let (off, paused) = ((low.1 + low.0 * 1000 - offset.host_ns(low.0)) as f64, (low.0 - last.first) as f64);
@@ -426,6 +436,39 @@ mod tests {
     }
 
     #[test]
+    fn a_sender_that_does_not_keep_pace_with_its_clock_is_doubted_and_a_poor_clock_is_not() {
+        for (drift_ppm, doubted) in [(-9_900.0, false), (9_900.0, false), (10_100.0, true), (-318_601.0, true)] {
+            let mut link = Link::new(11, drift_ppm, 1000);
+            let mut clock = BoardClock::default();
+            link.send(&mut clock, 0, 20_000_000);
+            let pace = clock.pace().expect("something came");
+            assert!((pace.drift_ppm - drift_ppm).abs() < 0.01 * drift_ppm.abs(), "{drift_ppm}: {pace:?}");
+            assert_eq!(pace.doubt.is_some(), doubted, "{pace:?}");
+            let text = format!("a drift of {drift_ppm:+.0}").chars().take(14).collect::<String>();
+            assert!(pace.doubt.is_none_or(|why| why.starts_with(&text)), "{text}");
+        }
+    }
+
+    #[test]
+    fn delays_beyond_the_shortest_are_told_and_those_of_seconds_doubted() {
+        let (start, mut clock) = (1_000_000_000_000, BoardClock::default());
+        assert_eq!(clock.pace(), None);
+        // One in ten is late by 20 ms, and of 30 s the last two are sent together 1.5 s later.
+        for k in 0..30_000_i64 {
+            let late = if k >= 28_000 { 1_500_000_000 } else { 20_000_000 * i64::from(k % 10 == 9) };
+            clock.note(k * 1000, start + k * 1_000_000 + late);
+            if k == 27_999 {
+                let pace = clock.pace().expect("something came");
+                let (median, most) = (pace.delay.p50_us.expect("some"), pace.delay.p99_us.expect("some"));
+                assert!(median < 1.0 && (20_000.0..20_700.0).contains(&most), "{pace:?}");
+                assert_eq!(pace.doubt, None);
+            }
+        }
+        let why = clock.pace().and_then(|pace| pace.doubt).expect("a doubt");
+        assert!(why.contains("a delay of 1.5 s"), "{why}");
+    }
+
+    #[test]
     fn memory_stays_bounded() {
         let mut clock = BoardClock::default();
         for k in 0..2_000_000_i64 {
@@ -434,5 +477,6 @@ mod tests {
         let most = usize::try_from(STRETCH_US / PART_US).expect("some") * QUICK;
         assert!(clock.stretches.iter().chain([&clock.running]).all(|stretch| stretch.quick.len() <= most));
         assert!(clock.stretches.len() <= STRETCHES);
+        assert_eq!(clock.arrivals.remembered(), STRETCHES);
     }
 }

@@ -49,7 +49,7 @@ use crate::capture::{Origin, Receiver};
 use crate::locked::lock;
 use crate::{Error, Result};
 pub use copies::{Copied, Copies};
-pub use counters::{Counters, SourceCounts, Summary};
+pub use counters::{Arrival, ArrivalState, BoardState, Counters, DecodingCounts, ReadoutCounts, SourceCounts, Summary};
 pub use handle::Handle;
 pub use options::{LiveOptions, Record};
 use output::DetectionOutput;

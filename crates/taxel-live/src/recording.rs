@@ -68,6 +68,9 @@ pub struct Header {
     /// What conversions to this file left out, one line each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<String>,
+    /// What else there is to know of the recording, one line each: by whose times it is, what it was converted from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
     /// The numbers of events that a state gave, in a file made of events whose datagrams do not state it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<u64>,
@@ -225,6 +228,7 @@ impl Header {
             registers,
             driven: None,
             lost: vec![],
+            remarks: vec![],
             repaired: vec![],
             difference: false,
             origin_us: 0,
@@ -264,13 +268,21 @@ fn check_name(name: &str) -> taxel_core::Result<()> {
     Ok(())
 }
 
+/// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
+const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
+/// ... resets, and values that differed from the board's own, as their events were lost.
+const BOARD_RESET: &str = "resets";
+const REPAIRED: &str = "events_repaired";
+
 impl Counts {
     /// The verdict in one line: nothing lost after arrival, or what was lost where.
     #[must_use]
     pub fn verdict(&self) -> String {
         let missing = self.received.saturating_sub(self.dropped_by_queue + self.recorded);
         let bridged = self.bridged.as_deref().copied().unwrap_or_default();
+        let of_board = |cause: &str| self.decoder.get(cause).copied().unwrap_or(0);
         let lost: Vec<String> = [
+            (of_board(BOARD_DROPPED), "times that the board dropped events"),
             (self.dropped_by_kernel, "messages dropped by the kernel"),
             (self.dropped_by_queue, "datagrams dropped by taxel's queue"),
             (missing, "datagrams received but not recorded"),
@@ -286,7 +298,7 @@ impl Counts {
         let damage: Vec<String> = self
             .decoder
             .iter()
-            .filter(|(_, n)| **n > 0)
+            .filter(|(cause, n)| **n > 0 && ![BOARD_DROPPED, BOARD_RESET, REPAIRED].contains(&cause.as_str()))
             .map(|(cause, n)| format!("{n} {}", cause.replace('_', " ")))
             .collect();
         let mut line = if lost.is_empty() && self.missing.is_some() {
@@ -299,6 +311,14 @@ impl Counts {
         if !damage.is_empty() {
             line = format!("{line}; in the bytes that came: {}", damage.join(", "));
         }
+        for (n, what) in [
+            (of_board(REPAIRED), "values repaired from the board's refresh"),
+            (of_board(BOARD_RESET), "resets of the board"),
+        ] {
+            if n > 0 {
+                line = format!("{line}; {n} {what}");
+            }
+        }
         if bridged.silences > 0 || bridged.restarts > 0 {
             line = format!(
                 "{line}; the other computer was silent for a second or more {} times, and began anew {} times",
@@ -306,7 +326,7 @@ impl Counts {
             );
         }
         if let Some(verdict) = &self.converted {
-            line = format!("converted from a recording that says: {verdict}");
+            line.clone_from(verdict);
         }
         line
     }
@@ -336,9 +356,9 @@ pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String
         ("taxels_outside_the_array", counts.outside),
         ("datagrams_of_an_unknown_kind", counts.unknown_kind),
         ("malformed_bodies", counts.malformed),
-        ("times_that_the_board_dropped_events", counts.dropped),
-        ("resets", counts.resets),
-        ("events_repaired", counts.repaired),
+        (BOARD_DROPPED, counts.dropped),
+        (BOARD_RESET, counts.resets),
+        (REPAIRED, counts.repaired),
         ("differences_from_an_unknown_value", counts.unknown_value),
     ];
     (counts.datagrams > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))

@@ -120,14 +120,14 @@ fn bridged(
             None => {}
         }
         if sends.is_finished()
-            && let Some(live) = source.take_if(|live| live.counters().decoded == n as u64)
+            && let Some(live) = source.take_if(|live| live.counters().decoding.decoded == n as u64)
         {
             ended = Some(live.stop().expect("a sound way"));
         }
     }
     sends.join().expect("sent");
     let received = live.counters().capture.datagrams;
-    wait_until(|| live.counters().decoded == received);
+    wait_until(|| live.counters().decoding.decoded == received);
     (near, ended.expect("ended"), far, live.stop().expect("a sound way"))
 }
 
@@ -139,8 +139,8 @@ fn came(summary: &Summary) -> Bridged {
 fn what_came_there_comes_here_and_as_of_this_clock() {
     let (near, sent, far, received) = bridged(3000, "whole", |_, parcel| vec![parcel]);
     assert_eq!(sent.counters.bridged, None);
-    assert_eq!(received.counters.decoded, 3000);
-    assert_eq!(received.counters.wire, sent.counters.wire);
+    assert_eq!(received.counters.decoding.decoded, 3000);
+    assert_eq!(received.counters.decoding.wire, sent.counters.decoding.wire);
     let bridged = came(&received);
     assert_eq!((bridged.missing, bridged.dropped, bridged.refused, bridged.ended), (0, 0, 0, true));
     assert!(received.verdict.starts_with("nothing lost"), "{}", received.verdict);
@@ -148,7 +148,7 @@ fn what_came_there_comes_here_and_as_of_this_clock() {
     assert_eq!(there.len(), 3000);
     for (a, b) in there.iter().zip(&here) {
         assert_eq!(a.1, b.1);
-        assert!((a.0 - b.0).abs() < 1000, "both clocks are this computer's: {} ns apart", a.0 - b.0);
+        assert!((a.0 - b.0).abs() < 10_000, "both clocks are this computer's: {} ns apart", a.0 - b.0);
     }
 }
 
@@ -170,7 +170,7 @@ fn what_is_lost_repeated_or_spoilt_on_the_way_is_counted() {
     assert!(bridged.missing > 0 && spoilt > 0);
     assert_eq!(bridged.refused, spoilt);
     assert!(bridged.repeated > 0);
-    assert_eq!(came, received.counters.decoded);
+    assert_eq!(came, received.counters.decoding.decoded);
     // The first parcels and the last arrived (numbers 0 and 1 do), or what is beyond them is not known to be missing.
     if bridged.ended {
         assert_eq!(came + bridged.missing, 3000);

@@ -123,7 +123,7 @@ fn what_came_after_the_stop_is_left() {
         let to = receiver.address();
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
-            // A sender that never pauses keeps nobody from ending.
+            // A sender that never pauses does not keep a receiver from ending.
             scope.spawn(|| {
                 let mut sender = Sender::open(to, true).expect("a socket");
                 while !ended.load(Ordering::Relaxed) {

@@ -126,10 +126,10 @@ fn wait_for(live: &Live, what: impl Fn(&Live) -> bool) {
 fn assert_closed(summary: &Summary, report: &Report) {
     let c = &summary.counters;
     assert_eq!(report.board.datagrams, report.sent.datagrams);
-    assert_eq!(c.capture.datagrams, c.decoded + c.capture.dropped_by_queue);
+    assert_eq!(c.capture.datagrams, c.decoding.decoded + c.capture.dropped_by_queue);
     assert_eq!(c.capture.waiting, 0);
-    assert_eq!(c.wire.bytes, 5 * c.wire.words + c.wire.skipped);
-    assert_eq!(c.wire.bytes, c.capture.bytes - c.capture.bytes_dropped_by_queue);
+    assert_eq!(c.decoding.wire.bytes, 5 * c.decoding.wire.words + c.decoding.wire.skipped);
+    assert_eq!(c.decoding.wire.bytes, c.capture.bytes - c.capture.bytes_dropped_by_queue);
     assert_eq!(c.capture.messages + c.capture.dropped_by_kernel, report.sent.messages);
 }
 
@@ -160,7 +160,7 @@ fn a_recording_holds_the_events_that_the_board_sent() {
     assert_closed(&summary, &report);
     let expected = sent(3000, 3000);
     assert!(expected.len() > 4096);
-    assert_eq!(summary.counters.events, expected.len() as u64);
+    assert_eq!(summary.counters.decoding.events, expected.len() as u64);
     assert_eq!(recorded(&path).0, expected);
     assert!(summary.verdict.starts_with("nothing lost after arrival"), "{}", summary.verdict);
 }
@@ -170,7 +170,7 @@ fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
     let path = Scratch::new("bytes.lsa");
     let live = Live::start(ANY, options(Some(&path)), ReadoutSetup::None, vec![]).expect("a port and a file");
     let report = emulate(live.address(), false, presses(1000, 1000));
-    wait_for(&live, |live| live.counters().wire.bytes == report.sent.bytes);
+    wait_for(&live, |live| live.counters().decoding.wire.bytes == report.sent.bytes);
     assert!(!path.0.with_extension("lss").exists(), "not complete yet");
     live.stop().expect("no error");
     let mut decoder = Decoder::new(Array::thesis());
@@ -197,8 +197,8 @@ fn detections_live_are_those_of_the_recording() {
     }
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
-    assert_eq!(summary.counters.late, 0);
-    assert_eq!(summary.counters.events, summary.counters.read_out);
+    assert_eq!(summary.counters.readout.late, 0);
+    assert_eq!(summary.counters.decoding.events, summary.counters.readout.read_out);
     let delivered = delivered.lock().expect("not poisoned");
     assert_eq!(*delivered, queued, "sink and queue get the same");
     let output: Vec<Detection> = delivered.iter().map(|s| s.detection.clone()).collect();
@@ -298,10 +298,13 @@ fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
     sender.flush().expect("sent");
     let summary = live.stop().expect("no error");
     let (c, sent) = (summary.counters, sender.counts());
-    assert_eq!((c.capture.datagrams, c.capture.bytes, c.decoded), (sent.datagrams, sent.bytes, sent.datagrams));
-    assert_eq!(c.wire.bytes, sent.bytes);
-    assert_eq!(c.wire.bytes, 5 * c.wire.words + c.wire.skipped);
-    let w = c.wire;
+    assert_eq!(
+        (c.capture.datagrams, c.capture.bytes, c.decoding.decoded),
+        (sent.datagrams, sent.bytes, sent.datagrams)
+    );
+    assert_eq!(c.decoding.wire.bytes, sent.bytes);
+    assert_eq!(c.decoding.wire.bytes, 5 * c.decoding.wire.words + c.decoding.wire.skipped);
+    let w = c.decoding.wire;
     assert!(w.skipped > 0 && w.short > 0 && w.unpaired > 0 && w.back > 0, "{w:?}");
     let kinds = w.changes + w.intensities + w.unpaired + w.markers + w.contradictory + w.outside;
     assert_eq!(w.words, kinds);
@@ -323,8 +326,8 @@ fn a_slow_readout_loses_events_where_they_are_counted_and_the_recording_loses_no
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     let c = &summary.counters;
-    assert!(c.events_dropped > 0);
-    assert_eq!(c.events, c.read_out + c.events_dropped);
+    assert!(c.readout.events_dropped > 0);
+    assert_eq!(c.decoding.events, c.readout.read_out + c.readout.events_dropped);
     assert_eq!(recorded(&path).0, sent(3000, 3000));
 }
 
@@ -342,8 +345,8 @@ fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
     let live = Live::start(ANY, options(None), reading(&readout(2.0)), vec![slow]).expect("a port");
     let report = emulate(live.address(), true, presses(1500, 1500));
     let expected = sent(1500, 1500);
-    wait_for(&live, |live| live.counters().read_out == expected.len() as u64);
-    assert_eq!((delivered.lock().expect("not poisoned").len(), live.counters().detections), (1, 0));
+    wait_for(&live, |live| live.counters().readout.read_out == expected.len() as u64);
+    assert_eq!((delivered.lock().expect("not poisoned").len(), live.counters().readout.detections), (1, 0));
     drop(free);
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
@@ -353,7 +356,7 @@ fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
     again.retain(|d| Some(&d.t) < expected.t.last());
     assert!(again.len() > 3, "the presses are detected: {}", again.len());
     assert_eq!(*delivered.lock().expect("not poisoned"), again, "each once, in their order");
-    assert_eq!(summary.counters.detections, again.len() as u64);
+    assert_eq!(summary.counters.readout.detections, again.len() as u64);
 }
 
 #[test]
@@ -386,12 +389,12 @@ fn a_stop_ends_also_while_datagrams_pour_in() {
             sender.push(&[0; 1400]).expect("sent");
         }
     });
-    wait_for(&live, |live| live.counters().decoded > 1000);
+    wait_for(&live, |live| live.counters().decoding.decoded > 1000);
     let summary = live.stop().expect("no error");
     done.store(true, std::sync::atomic::Ordering::Relaxed);
     pouring.join().expect("sent all along");
     let c = summary.counters;
-    assert_eq!(c.capture.datagrams, c.decoded + c.capture.dropped_by_queue);
+    assert_eq!(c.capture.datagrams, c.decoding.decoded + c.capture.dropped_by_queue);
 }
 
 #[test]
@@ -403,7 +406,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     let path = Scratch::new("tare.mcap");
     let setup = ReadoutSetup::Taring(1_000_000, Box::new(readout.clone().into()));
     let live = Live::start(ANY, options(Some(&path)), setup, vec![]).expect("a port");
-    wait_for(&live, |live| live.counters().taring);
+    wait_for(&live, |live| live.counters().readout.taring);
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
     let commands = vec![(260, Command::new(7, 1 << 16).expect("a command"))];
@@ -422,7 +425,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     let start = 260 * 192 / 100 * 100;
     assert_eq!(live.take_markers().iter().map(|m| (m.t, m.start)).collect::<Vec<_>>(), [(start, true)]);
     let tare = live.tare().expect("measured");
-    assert!(!live.counters().taring);
+    assert!(!live.counters().readout.taring);
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     assert_eq!((tare.start_us, tare.stop_us), (0, start));
@@ -458,7 +461,7 @@ fn the_board_takes_commands_and_answers() {
         assert_eq!(answer(None), "taxel-board v1 64x64 16ch");
         assert_eq!(answer(Some((7, 1 << 16))), "ok REG7=0x00010000");
         assert_eq!(answer(Some((2, 301))), "bad REG2 rule 1");
-        wait_for(&live, |live| live.counters().marked_start == Some(true));
+        wait_for(&live, |live| live.counters().board.marked_start == Some(true));
         stop.store(true, std::sync::atomic::Ordering::Relaxed);
         let report = board.join().expect("no panic").expect("sent");
         assert_eq!(report.late.count, report.board.frames);

@@ -111,11 +111,11 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
             }
         }
         send(live.address(), &sent);
-        wait_for(&live, |live| live.counters().decoded == sent.len() as u64);
+        wait_for(&live, |live| live.counters().decoding.decoded == sent.len() as u64);
         let summary = live.stop().expect("a sound way");
         let counters = &summary.counters;
-        assert_eq!((counters.wire_version, counters.wire.bytes), (2, 0));
-        assert_eq!(counters.wire_v2.missing, lost);
+        assert_eq!((counters.decoding.wire_version, counters.decoding.wire.bytes), (2, 0));
+        assert_eq!(counters.decoding.wire_v2.missing, lost);
         let verdict = if lossy {
             format!("LOST: {lost} datagrams lost or damaged on the way")
         } else {
@@ -126,7 +126,7 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
         let read = reader.decode(Pairing::Direct, Stop::never()).expect("sound chunks");
         let expected = decoded(&array, &sent);
         assert_eq!((read.events.t.len(), &read.events), (expected.t.len(), &expected));
-        assert_eq!(read.version_2, counters.wire_v2);
+        assert_eq!(read.version_2, counters.decoding.wire_v2);
         assert_eq!(read.version_2.repaired > 0, lossy);
     }
 }
@@ -160,6 +160,6 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
     }
     let output = live.next(Duration::from_secs(30)).expect("no error").expect("it is output though no event follows");
     assert!(output.detection.t > 1000, "the kernel takes its time: {output:?}");
-    assert_eq!(live.counters().wrong, 0);
+    assert_eq!(live.counters().readout.wrong, 0);
     live.stop().expect("a sound way");
 }

@@ -219,6 +219,22 @@ fn a_writer_that_is_dropped_writes_everything_and_states_that_it_was_not_finishe
 }
 
 #[test]
+fn a_discarded_recording_ends_with_messages_still_waiting() {
+    for k in 0..50 {
+        let folder = Folder::new("discard");
+        let path = folder.0.join("a.mcap");
+        let writer = Writer::create(&path, &header(), WriterOptions::default()).unwrap();
+        for _ in 0..k {
+            writer.note(1_000_000_000_500, None, "before the first datagram").unwrap();
+        }
+        let (done, ended) = std::sync::mpsc::channel();
+        std::thread::spawn(move || done.send(writer.discard()));
+        ended.recv_timeout(std::time::Duration::from_secs(30)).expect("the writing thread ends").unwrap();
+        assert!(!path.exists());
+    }
+}
+
+#[test]
 fn a_full_disk_is_one_error() {
     let options = WriterOptions { overwrite: true, ..WriterOptions::default() };
     let error = Writer::create(Path::new("/dev/full"), &header(), options).err().map(|e| e.to_string());

@@ -5,7 +5,10 @@
 
 use std::sync::Arc;
 
+use super::centre::Coordinates;
 use super::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
+use super::weights::Weights;
+use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::{NOISE_FLOOR, Rest, Value};
 use taxel_core::tracked_rest::TrackedRest;
@@ -41,12 +44,30 @@ pub struct Keyframe {
 /// Where the rest comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RestSource {
-    /// A tare, or the values held at a moment.
+    /// A tare, or the values held at a moment; 0 of pictures of force or pressure.
     Given,
     /// A quiet stretch, from which it is tracked.
     Quiet,
-    /// There was no quiet stretch so far: the taxels' first values, from which it is tracked.
+    /// There was no quiet stretch so far: the taxels' first values, from which it is tracked; 0 of pictures.
     None,
+}
+
+impl RestSource {
+    /// Its name in messages.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Given => "given",
+            Self::Quiet => "quiet",
+            Self::None => "none",
+        }
+    }
+
+    /// The one of a name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Given, Self::Quiet, Self::None].into_iter().find(|one| one.name() == name)
+    }
 }
 
 impl Keyframe {
@@ -75,8 +96,10 @@ pub struct ArrayState {
     places: Arc<[(u16, u16)]>,
     floor: u16,
     columns: usize,
-    /// Whether pictures are shown ([`ArrayState::of_pictures`]).
-    pictures: bool,
+    centre: Coordinates,
+    weights: Weights,
+    /// Where the rest of pictures comes from, if pictures are shown ([`ArrayState::of_pictures`]).
+    pictures: Option<RestSource>,
     held: Held,
     rest: Rest<u16>,
     /// The rest as it is tracked; `None` where it was given.
@@ -99,16 +122,18 @@ pub struct ArrayState {
     restarts: u64,
     events: u64,
     sum: u64,
+    /// The sum by weight, where the taxels do not count alike.
+    weighted: u64,
     sum_x: u64,
     sum_y: u64,
     area: u32,
 }
 
 impl ArrayState {
-    /// State of an array with `columns` columns, begun from a keyframe; its columns of time are `column_us` wide.
+    /// State of an array, begun from a keyframe; its columns of time are `column_us` wide.
     #[must_use]
-    pub fn new(columns: u16, floor: u16, from: &Keyframe, column_us: i64, time_column_bytes: usize) -> Self {
-        let columns = usize::from(columns).max(1);
+    pub fn new(array: &Array, floor: u16, from: &Keyframe, column_us: i64, time_column_bytes: usize) -> Self {
+        let columns = usize::from(array.columns).max(1);
         // An array has 65 535 rows and columns at most.
         #[allow(clippy::cast_possible_truncation)]
         let place = |taxel: usize| ((taxel % columns) as u16, (taxel / columns) as u16);
@@ -116,14 +141,16 @@ impl ArrayState {
             places: (0..from.held.len()).map(place).collect(),
             floor,
             columns,
-            pictures: false,
+            centre: Coordinates::new(array),
+            weights: Weights::default(),
+            pictures: None,
             held: from.held.clone().into(),
             rest: Rest::measured(from.rest.clone()),
             tracked: Some(from.tracked.clone().unwrap_or_else(|| Box::new(tracked_from(columns, &from.rest)))),
             track_at: from.latest.map(next_track),
             rests: 1,
             change: vec![0; from.held.len()],
-            time_columns: TimeColumns::new(from.held.len() / columns, time_column_bytes),
+            time_columns: TimeColumns::new(array, time_column_bytes),
             column_us,
             column: None,
             decay_column: 0,
@@ -132,6 +159,7 @@ impl ArrayState {
             restarts: 0,
             events: from.events,
             sum: 0,
+            weighted: 0,
             sum_x: 0,
             sum_y: 0,
             area: 0,
@@ -143,11 +171,11 @@ impl ArrayState {
         state
     }
 
-    /// The state where pictures are shown: the rest is that of the keyframe, a change without a value is a value that is
-    /// missing from then on, and pictures are counted as events are.
+    /// The state where pictures are shown, whose taxels have these weights: the rest is that of the keyframe until
+    /// [`ArrayState::set_rest`], and known from `source`; a change without a value is a value that is missing from then on, and pictures are counted as events are.
     #[must_use]
-    pub fn of_pictures(mut self, from: &Keyframe) -> Self {
-        self.pictures = true;
+    pub(crate) fn of_pictures(mut self, from: &Keyframe, source: RestSource, weights: Weights) -> Self {
+        (self.pictures, self.weights) = (Some(source), weights);
         (self.tracked, self.track_at) = (None, None);
         self.rest = Rest::measured(from.rest.clone());
         self.sum_above_rest();
@@ -164,7 +192,7 @@ impl ArrayState {
 
     /// Computes the sums above rest from all taxels.
     fn sum_above_rest(&mut self) {
-        (self.sum, self.sum_x, self.sum_y, self.area) = (0, 0, 0, 0);
+        (self.sum, self.weighted, self.sum_x, self.sum_y, self.area) = (0, 0, 0, 0, 0);
         for taxel in 0..self.places.len() {
             self.change_above_rest(taxel, 0, self.above(taxel));
         }
@@ -177,22 +205,22 @@ impl ArrayState {
 
     /// Updates the sums for a taxel that was `before` ticks above rest and is `now`.
     fn change_above_rest(&mut self, taxel: usize, before: u16, now: u16) {
-        let (x, y) = self.places[taxel];
+        let (x, y) = self.centre.get(taxel);
         // A decrease wraps to a large number; the sums are right modulo 2^64.
         let moved = u64::from(now).wrapping_sub(before.into());
         self.sum = self.sum.wrapping_add(moved);
-        self.sum_x = self.sum_x.wrapping_add(moved.wrapping_mul(x.into()));
-        self.sum_y = self.sum_y.wrapping_add(moved.wrapping_mul(y.into()));
+        self.weighted = self.weighted.wrapping_add(self.weights.weighed(taxel, moved));
+        self.sum_x = self.sum_x.wrapping_add(moved.wrapping_mul(x));
+        self.sum_y = self.sum_y.wrapping_add(moved.wrapping_mul(y));
         self.area = self.area + u32::from(now > 0) - u32::from(before > 0);
     }
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
     fn curve(&self) -> Curve {
         if self.sum == 0 {
             return NOTHING;
         }
-        let (x, y) = (self.sum_x as f64 / self.sum as f64, self.sum_y as f64 / self.sum as f64);
-        Curve { sum: self.sum.min(u64::from(u32::MAX)) as u32, area: self.area, x: x as f32, y: y as f32 }
+        let (x, y) = self.centre.centre(self.sum, self.sum_x, self.sum_y);
+        Curve { sum: self.weights.sum(self.sum, self.weighted), area: self.area, x, y }
     }
 
     /// Applies changes in order; those of one time together, because most of the work is per time.
@@ -200,7 +228,7 @@ impl ArrayState {
         for together in changes.chunk_by(|one, next| one.t == next.t) {
             let t = together[0].t;
             self.advance(t);
-            self.events += if self.pictures { 1 } else { together.len() as u64 };
+            self.events += if self.pictures.is_some() { 1 } else { together.len() as u64 };
             together.iter().for_each(|change| self.apply_to_taxel(change));
             let column = match self.column {
                 Some(column) if self.within.contains(&t) => column,
@@ -221,7 +249,7 @@ impl ArrayState {
     #[inline]
     fn apply_to_taxel(&mut self, change: &Change) {
         let taxel = change.taxel as usize;
-        if change.ticks == UNKNOWN && self.pictures {
+        if change.ticks == UNKNOWN && self.pictures.is_some() {
             let above = self.above(taxel);
             self.held.set(taxel, UNKNOWN);
             return self.change_above_rest(taxel, above, 0);
@@ -303,10 +331,9 @@ impl ArrayState {
             None => self.decay_column = decay_column,
             Some(now) if now == column => {}
             Some(now) => {
-                let curve = self.curve();
-                self.time_columns.set_curve(now, curve);
+                self.store_curve(now);
                 if column > now + 1 {
-                    self.time_columns.set_curve(now + 1, curve);
+                    self.store_curve(now + 1);
                 }
             }
         }
@@ -394,10 +421,11 @@ impl ArrayState {
     /// Where the rest comes from.
     #[must_use]
     pub fn rest_source(&self) -> RestSource {
-        match &self.tracked {
-            None => RestSource::Given,
-            Some(tracked) if tracked.quiet().is_some() => RestSource::Quiet,
-            Some(_) => RestSource::None,
+        match (self.pictures, &self.tracked) {
+            (Some(source), _) => source,
+            (None, None) => RestSource::Given,
+            (None, Some(tracked)) if tracked.quiet().is_some() => RestSource::Quiet,
+            (None, Some(_)) => RestSource::None,
         }
     }
 
@@ -456,8 +484,18 @@ impl ArrayState {
     /// Writes the current curve into the current column.
     pub fn update_curve(&mut self) {
         if let Some(now) = self.column {
-            let curve = self.curve();
-            self.time_columns.set_curve(now, curve);
+            self.store_curve(now);
+        }
+    }
+
+    /// Writes the current curve, and the values of channels, into a column.
+    fn store_curve(&mut self, column: i64) {
+        let curve = self.curve();
+        self.time_columns.set_curve(column, curve);
+        let count = self.time_columns.channel_count();
+        if count > 0 {
+            let values: Vec<u16> = (0..count).map(|channel| self.above(channel)).collect();
+            self.time_columns.set_channels(column, &values);
         }
     }
 
@@ -503,7 +541,7 @@ mod tests {
             let back = if random.random_range(0..9) == 0 { random.random_range(0..9000) } else { 0 };
             changes.push(change(t - back, random.random_range(0..taxels), random.random_range(0..300)));
         }
-        let mut whole = ArrayState::new(4, 3, &blank(taxels as usize), us, 1 << 20);
+        let mut whole = ArrayState::new(&Array::unmeasured(3, 4, "small"), 3, &blank(taxels as usize), us, 1 << 20);
         let mut keyframes = vec![];
         for (k, one) in changes.iter().enumerate() {
             if k % 100 == 0 {
@@ -512,7 +550,7 @@ mod tests {
             whole.apply_one(one);
         }
         for (k, keyframe) in keyframes {
-            let mut fresh = ArrayState::new(4, 3, &keyframe, us, 1 << 20);
+            let mut fresh = ArrayState::new(&Array::unmeasured(3, 4, "small"), 3, &keyframe, us, 1 << 20);
             fresh.apply(&changes[k..]);
             assert_eq!(fresh.held(), whole.held());
             assert_eq!(fresh.rest(), whole.rest());
@@ -537,7 +575,7 @@ mod tests {
 
     #[test]
     fn above_rest_is_more_than_the_floor_and_its_centre_is_known() {
-        let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        let mut state = ArrayState::new(&Array::unmeasured(2, 2, "small"), 3, &blank(4), COLUMN_US, 1 << 20);
         for taxel in 0..4 {
             state.apply_one(&change(0, taxel, 48));
         }
@@ -559,7 +597,7 @@ mod tests {
 
     #[test]
     fn a_zeroed_taxel_keeps_its_rest_until_the_rest_of_all_is_set() {
-        let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        let mut state = ArrayState::new(&Array::unmeasured(2, 2, "small"), 3, &blank(4), COLUMN_US, 1 << 20);
         for (t, ticks) in [(0, 40), (100, 60)] {
             (0..4).for_each(|taxel| state.apply_one(&change(t, taxel, ticks)));
         }
@@ -568,8 +606,8 @@ mod tests {
         assert_eq!((state.time_columns().curve(0).sum, state.time_columns().curve(0).area), (60, 3));
         state.apply_one(&change(200, 1, 30));
         state.apply_one(&change(200, 0, 40));
-        // Long after, the others rest where they stay, and it still where it was zeroed.
-        state.advance(500_000_000);
+        // Ten hours after, the others rest where they stay, and it still where it was zeroed.
+        state.advance(36_000_000_000);
         assert_eq!(state.rest(), [40, 60, 60, 60]);
         state.track_rest();
         assert_eq!(state.rest(), [40, 30, 60, 60]);
@@ -577,7 +615,7 @@ mod tests {
 
     #[test]
     fn the_rest_is_given_found_in_a_quiet_stretch_or_none() {
-        let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        let mut state = ArrayState::new(&Array::unmeasured(2, 2, "small"), 3, &blank(4), COLUMN_US, 1 << 20);
         (0..4).for_each(|taxel| state.apply_one(&change(0, taxel, 48)));
         assert_eq!(state.rest_source(), RestSource::None);
         state.advance(1_000_000);
@@ -598,7 +636,7 @@ mod tests {
 
     #[test]
     fn a_taxel_s_first_value_is_its_rest_however_soon_it_changes() {
-        let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        let mut state = ArrayState::new(&Array::unmeasured(2, 2, "small"), 3, &blank(4), COLUMN_US, 1 << 20);
         (0..4).for_each(|taxel| state.apply_one(&change(4000, taxel, 48)));
         state.apply_one(&change(9000, 1, 90));
         // The rest is tracked every 64 ms; what is far is followed slowly.
@@ -609,7 +647,7 @@ mod tests {
 
     #[test]
     fn time_set_back_removes_the_assumed_silence_and_goes_on() {
-        let mut once = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        let mut once = ArrayState::new(&Array::unmeasured(2, 2, "small"), 3, &blank(4), COLUMN_US, 1 << 20);
         let mut stalled = once.clone();
         for t in [0, 40_000] {
             once.apply_one(&change(t, 1, 60));

@@ -1,12 +1,15 @@
-//! Spikes that an encoder makes of the changes in a view: one by one, and counted by column of time.
+//! Spikes that an encoder makes of the changes or the pictures in a view: one by one, and counted by column of time.
 
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::slice;
+use std::sync::Arc;
 
 use serde_json::{Value, json};
 use taxel_core::encode::{Encoder, Stream};
 use taxel_core::{Array, Events, Intensities, Spike, SpikeKind, problem};
 
+use super::keyframe_index::Pictures;
 use super::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::Result;
@@ -18,11 +21,14 @@ const MOST: usize = 4096;
 /// Maximum number of changes converted at a time, which bounds the temporary memory.
 const PIECE: usize = 1 << 16;
 
-/// An encoder applied to the changes of a source.
+/// An encoder applied to the changes of a board, or to the pictures of each source.
 #[derive(Clone)]
 pub(super) struct EncodedSpikes {
     name: String,
-    stream: Box<dyn Stream>,
+    /// One of a board; of pictures one a source.
+    encoders: Vec<OfSource>,
+    /// What is encoded, if it is pictures.
+    pictures: Option<Arc<dyn Pictures>>,
     array: Array,
     column_us: i64,
     /// Spike counts of each row by column of time, ascending by number.
@@ -34,7 +40,40 @@ pub(super) struct EncodedSpikes {
     failed: Option<String>,
 }
 
+/// The encoder of a source.
+#[derive(Clone)]
+struct OfSource {
+    stream: Box<dyn Stream>,
+    /// Number of its first train among those of all sources.
+    first: u32,
+    rows: usize,
+    /// Number of the next picture.
+    next: usize,
+}
+
 impl EncodedSpikes {
+    fn begun(encoder: &Encoder, sensors: &[Array], array: &Array, column_us: i64) -> Result<Self> {
+        let name = json!(encoder)["name"].as_str().unwrap_or_default().to_owned();
+        let (mut encoders, mut first) = (vec![], 0);
+        for sensor in sensors {
+            let stream = encoder.stream(sensor).map_err(|error| problem!("encoder {name}: {error}"))?;
+            let trains = u32::try_from(stream.trains()).map_err(|_| problem!("encoder {name}: too many trains"))?;
+            encoders.push(OfSource { stream, first, rows: sensor.rows.into(), next: 0 });
+            first += trains;
+        }
+        Ok(Self {
+            name,
+            encoders,
+            pictures: None,
+            array: array.clone(),
+            column_us,
+            columns: VecDeque::new(),
+            pending: vec![],
+            left_out: 0,
+            failed: None,
+        })
+    }
+
     /// Begins an encoder at time `since` (us), when the taxels hold these values.
     ///
     /// # Errors
@@ -47,40 +86,82 @@ impl EncodedSpikes {
         held: &[u16],
         since: Option<i64>,
     ) -> Result<Self> {
-        let name = json!(encoder)["name"].as_str().unwrap_or_default().to_owned();
-        let stream = encoder.stream(array).map_err(|error| problem!("encoder {name}: {error}"))?;
-        let mut spikes = Self {
-            name,
-            stream,
-            array: array.clone(),
-            column_us,
-            columns: VecDeque::new(),
-            pending: vec![],
-            left_out: 0,
-            failed: None,
-        };
+        let mut spikes = Self::begun(encoder, slice::from_ref(array), array, column_us)?;
         if let Some(t) = since {
-            // The held values are where the encoder begins, and not changes.
             spikes.push_events(&as_events(held, t, array));
-            spikes.pending.clear();
-            spikes.columns.clear();
+            spikes.forget();
         }
         Ok(spikes)
     }
 
-    /// Encodes the next changes.
+    /// Begins an encoder for each source with its last picture up to `since` (us), or with its first one.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the encoder does not fit a sensor, or the pictures have no times.
+    pub(super) fn of_pictures(
+        encoder: &Encoder,
+        pictures: &Arc<dyn Pictures>,
+        column_us: i64,
+        since: Option<i64>,
+    ) -> Result<Self> {
+        if pictures.numbered() {
+            return Err(problem!(
+                "spikes have times, and these pictures are numbered: say how many there are in a second with --rate-hz"
+            )
+            .into());
+        }
+        let sensors = pictures.sensors();
+        let mut spikes = Self::begun(encoder, &sensors, pictures.array(), column_us)?;
+        spikes.pictures = Some(Arc::clone(pictures));
+        if let Some(t) = since {
+            for (source, of) in spikes.encoders.iter_mut().enumerate() {
+                of.next = pictures.until(source, t).saturating_sub(1);
+            }
+            spikes.push_pictures(t);
+            spikes.forget();
+        }
+        Ok(spikes)
+    }
+
+    /// Encodes the first two pictures of each source.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the encoder does not encode them.
+    pub(super) fn check(mut self) -> Result<()> {
+        if let Some(pictures) = self.pictures.clone() {
+            let second = (0..self.encoders.len()).filter_map(|source| pictures.picture(source, 1));
+            if let Some(t) = second.map(|(t, _)| t).max() {
+                self.push_pictures(t);
+            }
+        }
+        self.failed.map_or(Ok(()), |reason| Err(problem!("{reason}").into()))
+    }
+
+    /// Drops the spikes of what the encoder begins with, which are none of the view.
+    fn forget(&mut self) {
+        self.pending.clear();
+        self.columns.clear();
+    }
+
+    /// Encodes the next changes; pictures are read from their index as time advances.
     pub(super) fn push(&mut self, changes: &[Change]) {
+        if self.pictures.is_some() {
+            return;
+        }
         for piece in changes.chunks(PIECE) {
             let events = self.events(piece);
             self.push_events(&events);
         }
     }
 
-    /// Informs the encoder that no change before `t` (us) will follow.
+    /// Informs the encoder that no change before `t` (us) will follow; pictures up to then are encoded.
     pub(super) fn advance(&mut self, t: i64) {
+        self.push_pictures(t);
         if self.failed.is_none() {
             let from = self.pending.len();
-            self.stream.advance(t, &mut self.pending);
+            self.encoders.iter_mut().for_each(|of| emit(&mut self.pending, of, |stream, out| stream.advance(t, out)));
             self.count(from);
         }
     }
@@ -90,7 +171,28 @@ impl EncodedSpikes {
             return;
         }
         let from = self.pending.len();
-        match self.stream.push_events(events.view(), &mut self.pending) {
+        let push = |of| emit(&mut self.pending, of, |stream, out| stream.push_events(events.view(), out));
+        let pushed = self.encoders.iter_mut().try_for_each(push);
+        self.pushed(pushed, from);
+    }
+
+    /// Encodes the pictures up to `t` (us) that have not been encoded yet.
+    fn push_pictures(&mut self, t: i64) {
+        let Some(pictures) = self.pictures.clone().filter(|_| self.failed.is_none()) else { return };
+        let (from, mut pushed) = (self.pending.len(), Ok(()));
+        for (source, of) in self.encoders.iter_mut().enumerate() {
+            while let Some((at, values)) =
+                pictures.picture(source, of.next).filter(|&(at, _)| at <= t && pushed.is_ok())
+            {
+                of.next += 1;
+                pushed = emit(&mut self.pending, of, |stream, out| stream.push_frame(at, &values, out));
+            }
+        }
+        self.pushed(pushed, from);
+    }
+
+    fn pushed(&mut self, pushed: taxel_core::Result<()>, from: usize) {
+        match pushed {
             Ok(()) => self.count(from),
             Err(error) => self.failed = Some(format!("encoder {}: {error}", self.name)),
         }
@@ -99,7 +201,8 @@ impl EncodedSpikes {
     /// Counts the pending spikes from index `from` on in their columns; only the newest stay pending.
     #[allow(clippy::cast_possible_truncation)]
     fn count(&mut self, from: usize) {
-        let (rows, trains) = (usize::from(self.array.rows), self.stream.trains().max(1));
+        let rows = usize::from(self.array.rows);
+        self.pending[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         for spike in &self.pending[from..] {
             let column = column_of((spike.t * 1000.0).floor() as i64, self.column_us);
             let place = match self.columns.back() {
@@ -112,8 +215,10 @@ impl EncodedSpikes {
                     }
                 },
             };
-            // Trains are assigned to rows evenly: with one train per taxel that is the row of the taxel.
-            let row = (spike.train as usize * rows / trains).min(rows - 1);
+            // The trains of a source are assigned to its rows evenly: with one train per taxel that is the row of the taxel.
+            let of = &self.encoders[self.encoders.partition_point(|of| of.first <= spike.train).saturating_sub(1)];
+            let row = (spike.train - of.first) as usize * of.rows / of.stream.trains().max(1);
+            let row = row.min(rows - 1);
             let cell = &mut self.columns[place].1[row];
             let (ups, downs) = (*cell & 15, *cell >> 4);
             *cell = if spike.value < 0.0 { ups | (downs + 1).min(15) << 4 } else { (ups + 1).min(15) | downs << 4 };
@@ -151,9 +256,10 @@ impl EncodedSpikes {
         if self.pending.is_empty() {
             return None;
         }
+        let stream = &self.encoders.first()?.stream;
         let message = json!({
-            "type": "spikes", "encoder": self.name, "trains": self.stream.trains(), "signed": self.stream.kind() == SpikeKind::Signed,
-            "latency_ms": self.stream.latency_ms(), "left_out": self.left_out,
+            "type": "spikes", "encoder": self.name, "trains": self.encoders.iter().map(|of| of.stream.trains()).sum::<usize>(),
+            "signed": stream.kind() == SpikeKind::Signed, "latency_ms": stream.latency_ms(), "left_out": self.left_out,
             "t_ms": self.pending.iter().map(|s| s.t).collect::<Vec<_>>(),
             "train": self.pending.iter().map(|s| s.train).collect::<Vec<_>>(),
             "value": self.pending.iter().map(|s| s.value).collect::<Vec<_>>(),
@@ -181,4 +287,12 @@ impl EncodedSpikes {
             ..Events::empty(self.array.clone())
         }
     }
+}
+
+/// Appends the spikes that a source's encoder emits, with the numbers of their trains among those of all sources.
+fn emit<T>(pending: &mut Vec<Spike>, of: &mut OfSource, work: impl FnOnce(&mut dyn Stream, &mut Vec<Spike>) -> T) -> T {
+    let from = pending.len();
+    let done = work(&mut *of.stream, pending);
+    pending[from..].iter_mut().for_each(|spike| spike.train += of.first);
+    done
 }

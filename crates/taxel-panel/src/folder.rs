@@ -1,13 +1,17 @@
 //! The folder of recordings: which there are, and their keyframe indices.
 
 use std::collections::HashMap;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::UNIX_EPOCH;
 
+use taxel_core::detect::Detector;
 use taxel_core::problem;
-use taxel_live::Result;
 use taxel_live::locked::lock;
+use taxel_live::{Error, Result};
+use tokio::sync::OwnedMutexGuard;
 
 use super::indexed::Indexed;
 use super::keyframe_index::pictures::PictureIndex;
@@ -24,13 +28,6 @@ pub(super) struct Listed {
     pub(super) modified_ns: u64,
 }
 
-/// Endings of recordings, those of other makers' files among them.
-const ENDINGS: [&str; 12] =
-    [".mcap", ".lsa", ".npz", ".h5", ".csv", ".csv.gz", ".txt", ".txt.gz", ".asc", ".asf", ".lst", ".hea"];
-
-/// Endings of the names of tables beside recordings, which are none.
-const TABLES: [&str; 5] = ["notes.csv", "labels.csv", "events.csv", "steps.csv", "trials.csv"];
-
 /// A file, and its trial where it holds several.
 pub(super) type Key = (PathBuf, Option<String>);
 
@@ -41,46 +38,49 @@ pub(super) struct Folder {
     indices: Mutex<HashMap<Key, (u64, WeakIndex)>>,
     /// The index that was built last.
     last: Mutex<Option<Indexed>>,
+    /// See [`Folder::turn`].
+    turns: Mutex<HashMap<Key, Weak<tokio::sync::Mutex<()>>>>,
 }
 
 impl Folder {
     /// `path` is canonical.
     pub(super) fn new(path: PathBuf) -> Self {
-        Self { path, indices: Mutex::default(), last: Mutex::default() }
+        Self { path, indices: Mutex::default(), last: Mutex::default(), turns: Mutex::default() }
     }
 
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The recordings, newest first.
-    pub(super) fn list(&self) -> Vec<Listed> {
+    /// The recordings of these names, newest first.
+    pub(super) fn list(&self, names: Vec<String>) -> Vec<Listed> {
         let mut files = vec![];
-        for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let (Ok(about), true) = (entry.metadata(), may_be_recording(&name)) else {
-                continue;
-            };
-            if !about.is_file() || checked_name(&name).is_err() {
-                continue;
-            }
+        for name in names.into_iter().filter(|name| checked_name(name).is_ok()) {
+            let path = self.path.join(&name);
+            let (Ok(about), Ok(bytes)) = (path.metadata(), size(&path)) else { continue };
             let modified = about.modified().ok().and_then(|at| at.duration_since(UNIX_EPOCH).ok());
             let modified_ns = modified.map_or(0, |since| u64::try_from(since.as_nanos()).unwrap_or(0));
-            files.push(Listed { name, bytes: about.len(), modified_ns });
+            files.push(Listed { name, bytes, modified_ns });
         }
         files.sort_by_key(|file| std::cmp::Reverse(file.modified_ns));
         files.truncate(MOST_LISTED);
         files
     }
 
-    /// The readouts by name: files that end in `readout.json`.
+    /// The readouts and plain rules by name: the `.json` that begin as one.
     pub(super) fn readouts(&self) -> Vec<String> {
         let names = std::fs::read_dir(&self.path).into_iter().flatten().flatten();
         let mut names: Vec<_> = names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-        names.retain(|name| name.ends_with("readout.json") && checked_name(name).is_ok());
+        names.retain(|name| name.ends_with(".json") && checked_name(name).is_ok() && self.begins_as_readout(name));
         names.sort_unstable();
         names.truncate(MOST_LISTED);
         names
+    }
+
+    fn begins_as_readout(&self, name: &str) -> bool {
+        let mut begin = Vec::with_capacity(256);
+        let read = File::open(self.path.join(name)).and_then(|file| file.take(256).read_to_end(&mut begin));
+        read.is_ok() && Detector::is_begun_by(&begin)
     }
 
     /// Path of a file in the folder, which need not exist.
@@ -100,6 +100,20 @@ impl Folder {
         }
     }
 
+    /// Waits until no other client has this file indexed, which two would read twice.
+    pub(super) async fn turn(&self, key: &Key) -> OwnedMutexGuard<()> {
+        let turn = {
+            let mut turns = lock(&self.turns);
+            turns.retain(|_, turn| turn.strong_count() > 0);
+            turns.get(key).and_then(Weak::upgrade).unwrap_or_else(|| {
+                let turn = Arc::default();
+                turns.insert(key.clone(), Arc::downgrade(&turn));
+                turn
+            })
+        };
+        turn.lock_owned().await
+    }
+
     /// An index that is in memory, of a file of this size.
     pub(super) fn known(&self, key: &Key, bytes: u64) -> Option<Indexed> {
         lock(&self.indices).get(key).filter(|(length, _)| *length == bytes).and_then(|(_, index)| index.upgrade())
@@ -117,10 +131,20 @@ impl Folder {
     }
 }
 
-/// Whether a file may be a recording, by its name.
-fn may_be_recording(name: &str) -> bool {
-    let lower = name.to_lowercase();
-    ENDINGS.iter().any(|ending| lower.ends_with(ending)) && !TABLES.iter().any(|table| lower.ends_with(table))
+/// Size of a recording, bytes: of a bag that is a folder that of its files.
+///
+/// # Errors
+///
+/// `Io` where it cannot be read.
+pub(super) fn size(path: &Path) -> Result<u64> {
+    let failed = Error::file(path);
+    let about = match std::fs::metadata(path) {
+        Ok(about) if about.is_dir() => std::fs::read_dir(path),
+        Ok(about) => return Ok(about.len()),
+        Err(error) => Err(error),
+    };
+    let files = about.map_err(failed)?.flatten().filter_map(|entry| entry.metadata().ok());
+    Ok(files.filter(std::fs::Metadata::is_file).map(|about| about.len()).sum())
 }
 
 /// An index that others hold.

@@ -50,12 +50,16 @@ pub struct UserPresets {
 /// A label of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LabelRow {
-    /// Its text.
+    /// Its text; empty where a note of the recording is to count no more, and no label does in its place.
     pub label: String,
     /// Board time, us.
     pub t_us: i64,
     /// The source that it is of; empty for all of them.
     pub source: String,
+    /// The trial that it is of, where the file holds several; empty for all of them.
+    pub trial: String,
+    /// Time of the recording's own note that it replaces, us.
+    pub replaces_us: Option<i64>,
 }
 
 /// Taxels (column, row) that do not work as they should.
@@ -137,6 +141,9 @@ pub trait RequestHandler: Send + Sync {
     /// Finds taxels that are dead, stuck or noisy.
     fn health(&self, array: &Array, activity: &Activity) -> Reply<UnhealthyTaxels>;
 
+    /// Returns the names of what is a recording in a folder.
+    fn recordings(&self, folder: &Path) -> Reply<Vec<String>>;
+
     /// Reads a recording that is no file of a board's events.
     fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile>;
 
@@ -152,8 +159,8 @@ pub trait RequestHandler: Send + Sync {
     /// Ends the training that runs.
     fn end_training(&self) -> Reply<()>;
 
-    /// Detections of a readout in a recording: label, time, and when it was known, us.
-    fn detect(&self, recording: &Path, readout: &Path) -> Reply<Vec<(String, i64, i64)>>;
+    /// Detections of a readout in a recording, or in a trial of one with several: label, time, and when it was known, us.
+    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Vec<(String, i64, i64)>>;
 
     /// Reads the live source out with this readout from now on.
     fn read_out(&self, readout: &Path) -> Reply<()>;

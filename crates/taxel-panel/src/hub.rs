@@ -112,7 +112,7 @@ impl Hub {
         self.registers_unknown.notify_one();
     }
 
-    /// Whether the board's registers were read, or somebody stated them.
+    /// Whether the board's registers were read or stated.
     pub(super) fn registers_certain(&self) -> bool {
         self.options.registers_stated || self.board().known
     }
@@ -190,7 +190,7 @@ impl Hub {
                 continue;
             }
             let counters = live.handle.counters();
-            if let Some(offset) = counters.offset {
+            if let Some(offset) = counters.board.offset {
                 live.follow_clock(offset);
             }
             self.send_counters(&live, &counters, before.as_ref(), counted.elapsed().as_secs_f64());
@@ -295,8 +295,13 @@ impl Hub {
     }
 
     /// The recordings of the folder.
-    pub(super) fn recordings_message(&self) -> Value {
-        let files = self.folder.list().into_iter().map(|file| {
+    pub(super) async fn recordings_message(&self) -> Value {
+        let folder = self.folder.path().to_owned();
+        let names = self.ask(move |handler| handler.recordings(&folder)).await.unwrap_or_else(|reason| {
+            self.clients.send_json(&messages::warning(reason));
+            vec![]
+        });
+        let files = self.folder.list(names).into_iter().map(|file| {
             let labels = self.labels.count(&file.name);
             json!({ "name": file.name, "bytes": file.bytes, "modified_ns": file.modified_ns, "labels": labels })
         });

@@ -11,6 +11,9 @@ use super::keyframe_index::recording::RecordingIndex;
 use super::messages;
 use super::time_columns::{COLUMN_US, TimeColumns};
 
+/// A label may lie so long before the first event or after the last one, us.
+const LATE_LABEL_US: i64 = 1_000_000;
+
 /// An indexed recording.
 #[derive(Debug, Clone)]
 pub(super) enum Indexed {
@@ -42,6 +45,27 @@ impl Indexed {
         }
     }
 
+    /// Refuses a label outside the recording: a late label of its last touch may lie a little after the last event.
+    pub(super) fn check_label(&self, name: &str, t_us: i64) -> Result<(), String> {
+        let Some((first, last)) = self.index().range() else { return Ok(()) };
+        let late_us = match self {
+            Self::Events(_) => LATE_LABEL_US,
+            // A picture holds until the next one.
+            Self::Pictures(index) => index.picture_us(),
+        };
+        let (beyond, end) = match (first - t_us, t_us - last) {
+            (before, _) if before > late_us => (before, "before the begin"),
+            (_, after) if after > late_us => (after, "after the end"),
+            _ => return Ok(()),
+        };
+        #[allow(clippy::cast_precision_loss)]
+        let far = match self.us() {
+            1 => format!("{:.3} s", beyond as f64 / 1e6),
+            us => format!("{} pictures", beyond / us),
+        };
+        Err(format!("a label {far} {end} of {name}: must lie within it"))
+    }
+
     /// The `overview` message.
     pub(super) fn overview(&self, name: &str) -> Value {
         let (start, step, bins, events) = match self {
@@ -70,6 +94,10 @@ impl Indexed {
         let touch = index.time_columns().and_then(TimeColumns::first_touch);
         let touch_us =
             touch.zip(range).map(|(column, (first, last))| ((column + 1) * COLUMN_US - 1).clamp(first, last));
+        let touch_us = match self {
+            Self::Events(_) => touch_us,
+            Self::Pictures(index) => touch_us.map(|t| index.picture_until(t).unwrap_or(t)),
+        };
         let mut message = json!({
             "type": "opened",
             "name": name,
@@ -89,14 +117,18 @@ impl Indexed {
                     "unfinished": index.unfinished,
                     "registers": header.registers,
                     "frame_us": header.registers.map(|registers| registers.frame_us()),
+                    "pace": index.pace,
                     "pictures": null,
                 });
                 (&index.remarks, more)
             }
             Self::Pictures(index) => {
                 let file = &index.file;
-                let places = index.places().map(|place| {
-                    json!({ "name": place.name, "left": place.left, "rows": place.rows, "columns": place.columns })
+                let places = index.places().map(|(place, rest, falls)| {
+                    json!({
+                        "name": place.name, "left": place.left, "rows": place.rows, "columns": place.columns,
+                        "rest": rest.name(), "falls": falls,
+                    })
                 });
                 let more = json!({
                     "events": 0,
@@ -104,9 +136,10 @@ impl Indexed {
                     "unfinished": false,
                     "registers": null,
                     "frame_us": null,
+                    "pace": null,
                     "pictures": {
-                        "count": index.pictures, "unit": file.unit, "step": index.step, "zero": index.zero,
-                        "picture_us": file.picture_us, "sources": places.collect::<Vec<_>>(),
+                        "count": index.pictures, "unit": file.unit, "step": index.step, "zero": index.zero, "floor": index.floor,
+                        "newtons": index.newtons, "picture_us": file.picture_us, "sources": places.collect::<Vec<_>>(),
                         "trial": file.trial, "trials": file.trials, "left_s": file.left_s,
                     },
                 });
@@ -114,9 +147,17 @@ impl Indexed {
             }
         };
         let us = self.us();
+        let note_sources = match self {
+            Self::Events(_) => &[],
+            Self::Pictures(index) => &index.file.note_sources[..],
+        };
+        let note_sources = note_sources.iter().map(String::as_str).chain(std::iter::repeat(""));
+        let notes = remarks.notes.iter().zip(note_sources);
+        let notes =
+            notes.map(|(n, source)| json!({ "t_us": n.t_us.map(|t| t * us), "text": n.text, "source": source }));
         let detections = remarks.detections.iter().take(messages::MOST_DETECTIONS);
         let more_of_all = json!({
-            "notes": remarks.notes.iter().map(|n| json!({ "t_us": n.t_us.map(|t| t * us), "text": n.text })).collect::<Vec<_>>(),
+            "notes": notes.collect::<Vec<_>>(),
             "markers": remarks.markers.iter().map(|m| json!({ "t_us": m.t * us, "start": m.start })).collect::<Vec<_>>(),
             "zeroed": remarks.zeroings.iter().map(|(_, one)| messages::zeroing(one)).collect::<Vec<_>>(),
             "detections": detections

@@ -9,12 +9,15 @@ pub mod live;
 pub mod pictures;
 pub mod recording;
 
+use std::sync::Arc;
+
 use taxel_core::Array;
 use taxel_live::Result;
 use taxel_live::pipeline::Change;
 
-use super::array_state::Keyframe;
+use super::array_state::{Keyframe, RestSource};
 use super::time_columns::TimeColumns;
+use super::weights::Weights;
 
 pub use activity::Activity;
 
@@ -25,6 +28,8 @@ pub enum Read {
     Changes,
     /// Changes are missing; these are the values held after the gap, and the number of events up to there.
     Held(Vec<u16>, u64),
+    /// The rest of each taxel from here on.
+    Rest(Vec<u16>),
     /// No further change is indexed yet.
     End,
 }
@@ -39,6 +44,31 @@ pub trait ChangeReader: Send {
     fn read(&mut self, out: &mut Vec<Change>) -> Result<Read>;
 }
 
+/// The pictures of several sources, one by one.
+pub trait Pictures: Send + Sync {
+    /// The sensor that joins those of all sources.
+    fn array(&self) -> &Array;
+
+    /// Whether the pictures are numbered, as their times are not known.
+    fn numbered(&self) -> bool;
+
+    /// Where the rest of the sources comes from; none where they differ.
+    fn rest_source(&self) -> RestSource;
+
+    /// How much each taxel counts in the sum.
+    fn weights(&self) -> &Weights;
+
+    /// The sensor of each source.
+    fn sensors(&self) -> Vec<Array>;
+
+    /// Number of pictures of a source up to a time, us.
+    fn until(&self, source: usize, t: i64) -> usize;
+
+    /// A picture of a source: its time (us), and its values in the unit, NaN where one is missing; whole values are those of
+    /// the file, others differ by half a step at most. `None` after the last one.
+    fn picture(&self, source: usize, k: usize) -> Option<(i64, Vec<f32>)>;
+}
+
 /// Keyframes of a source and what reads on from them.
 pub trait KeyframeIndex: Send + Sync {
     /// The sensor.
@@ -47,9 +77,10 @@ pub trait KeyframeIndex: Send + Sync {
     /// The noise floor, ticks above rest.
     fn noise_floor(&self) -> u16;
 
-    /// Whether it holds pictures: then its rest is fixed, and a change without a value is a value that is missing from then on.
-    fn holds_pictures(&self) -> bool {
-        false
+    /// The pictures, if it holds such: then the rest is that of the keyframe and of [`Read::Rest`], and a change without a
+    /// value is a value that is missing from then on.
+    fn pictures(&self) -> Option<Arc<dyn Pictures>> {
+        None
     }
 
     /// First and last time with events, us; `None` without events.

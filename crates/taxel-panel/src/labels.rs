@@ -24,7 +24,39 @@ pub(super) enum LabelChange {
     Delete { id: u64 },
 }
 
+impl LabelRow {
+    /// Whether it only states that a note of the recording counts no more.
+    fn is_removal(&self) -> bool {
+        self.label.is_empty()
+    }
+
+    /// Whether it replaces the same note as another.
+    fn replaces_note_of(&self, other: &Self) -> bool {
+        let of = |row: &Self| (row.replaces_us, row.source.clone(), row.trial.clone());
+        self.replaces_us.is_some() && of(self) == of(other)
+    }
+
+    /// With its times as a client sees them: one us of the file is `us` of the view.
+    pub(super) fn in_view(self, us: i64) -> Self {
+        Self { t_us: self.t_us * us, replaces_us: self.replaces_us.map(|t| t * us), ..self }
+    }
+
+    /// With its times as in the file.
+    pub(super) fn in_file(self, us: i64) -> Self {
+        Self { t_us: self.t_us / us, replaces_us: self.replaces_us.map(|t| t / us), ..self }
+    }
+}
+
 impl LabelChange {
+    /// The time that it sets, us.
+    pub(super) fn t_us(&self) -> Option<i64> {
+        match self {
+            Self::Mark(row) => Some(row.t_us),
+            Self::Move { t_us, .. } => Some(*t_us),
+            Self::Rename { .. } | Self::Delete { .. } => None,
+        }
+    }
+
     /// The same change at a whole multiple of `us`: at a picture, where pictures are numbered.
     pub(super) fn at_whole(self, us: i64) -> Self {
         let whole = |t: i64| t.div_euclid(us) * us;
@@ -38,7 +70,10 @@ impl LabelChange {
     /// Applies it to the labels; a new one gets the number `next_id`.
     fn apply(self, labels: &mut Vec<Label>, next_id: u64) -> Result<(), String> {
         match self {
-            Self::Mark(row) => labels.push(Label { id: next_id, row }),
+            Self::Mark(row) => {
+                labels.retain(|label| !(label.row.is_removal() && label.row.replaces_note_of(&row)));
+                labels.push(Label { id: next_id, row });
+            }
             Self::Rename { id, label } => {
                 let place = place_of(labels, id)?;
                 labels[place].row.label = label;
@@ -47,7 +82,14 @@ impl LabelChange {
                 let place = place_of(labels, id)?;
                 labels[place].row.t_us = t_us;
             }
-            Self::Delete { id } => drop(labels.remove(place_of(labels, id)?)),
+            Self::Delete { id } => {
+                let place = place_of(labels, id)?;
+                match labels[place].row.replaces_us {
+                    // Else its note would count again.
+                    Some(_) => labels[place].row.label.clear(),
+                    None => drop(labels.remove(place)),
+                }
+            }
         }
         Ok(())
     }
@@ -56,8 +98,8 @@ impl LabelChange {
 fn place_of(labels: &[Label], id: u64) -> Result<usize, String> {
     labels
         .iter()
-        .position(|label| label.id == id)
-        .ok_or_else(|| format!("label_id: there is no label {id}; it was deleted, perhaps by somebody else"))
+        .position(|label| label.id == id && !label.row.is_removal())
+        .ok_or_else(|| format!("label_id: there is no label {id}; it was deleted, perhaps by another client"))
 }
 
 /// The labels of the recordings that clients have opened, by the recordings' names.
@@ -86,7 +128,8 @@ pub(super) fn file_of(recording: &str) -> String {
 impl LabelTables {
     /// Number of labels of a recording, once they have been read.
     pub(super) fn count(&self, recording: &str) -> Option<usize> {
-        lock(&self.0).labels.get(recording).map(Vec::len)
+        let counted = |labels: &Vec<Label>| labels.iter().filter(|label| !label.row.is_removal()).count();
+        lock(&self.0).labels.get(recording).map(counted)
     }
 
     pub(super) fn get(&self, recording: &str) -> Vec<Label> {
@@ -135,8 +178,14 @@ impl LabelTables {
 
     /// The `labels` message.
     pub(super) fn message(&self, recording: &str) -> Value {
-        let one = |Label { id, row }: Label| json!({ "label_id": id, "label": row.label, "t_us": row.t_us, "source": row.source });
-        let labels: Vec<_> = self.get(recording).into_iter().map(one).collect();
+        let one = |Label { id, row }: Label| {
+            json!({
+                "label_id": id, "label": row.label, "t_us": row.t_us, "source": row.source, "trial": row.trial,
+                "replaces_us": row.replaces_us,
+            })
+        };
+        let shown = self.get(recording).into_iter().filter(|label| !label.row.is_removal());
+        let labels: Vec<_> = shown.map(one).collect();
         json!({ "type": "labels", "name": recording, "path": file_of(recording), "labels": labels })
     }
 }

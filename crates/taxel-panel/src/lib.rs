@@ -7,6 +7,7 @@
 
 mod array_state;
 pub mod assets;
+mod centre;
 mod clients;
 mod connections;
 mod encoded_spikes;
@@ -33,12 +34,14 @@ mod server;
 mod session;
 mod taxel_history;
 mod time_columns;
+mod weights;
 
+pub use array_state::RestSource;
 pub use handler::{
     BoardLines, Cut, LabelRow, Opening, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler, UnhealthyTaxels,
     UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
-pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace};
+pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource};
 pub use options::PanelOptions;
 pub use server::Panel;

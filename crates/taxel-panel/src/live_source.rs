@@ -72,9 +72,9 @@ impl LiveSource {
         let array = handle.options().array.clone();
         let blank = Keyframe::blank(array.len());
         // Enough for all that a view of the past can show, at the widest columns too.
-        let bytes = TimeColumns::bytes_for(array.rows.into(), REACH_US / COLUMN_US);
+        let bytes = TimeColumns::bytes_for(&array, REACH_US / COLUMN_US);
         Ok(Self {
-            state: Mutex::new(ArrayState::new(array.columns, noise_floor.into(), &blank, COLUMN_US, bytes)),
+            state: Mutex::new(ArrayState::new(&array, noise_floor.into(), &blank, COLUMN_US, bytes)),
             activity: Mutex::new(Activity::new(&array)),
             index: LiveIndex::new(array, noise_floor.into()),
             events: Mutex::new(events),

@@ -42,26 +42,6 @@ pub(super) fn warning(text: impl std::fmt::Display) -> Value {
     json!({ "type": "warning", "text": text.to_string() })
 }
 
-/// Without any datagram for so long a source is quiet, ns.
-const QUIET_NS: i64 = 1_000_000_000;
-
-/// A source with heartbeats is lost after so many of the longest intervals between them, and after this time at least, ns.
-const MISSING_HEARTBEATS: i64 = 3;
-const LOST_NS: i64 = 500_000_000;
-
-/// Whether datagrams arrive, since when none do, and how long they may be missing.
-fn arrival(now: &Counters) -> Value {
-    let silent_ns = now.arrived_ns.map_or(0, |arrived_ns| (now_ns() - arrived_ns).max(0));
-    let lost_ns = now.heartbeat_us.map(|interval| (MISSING_HEARTBEATS * interval * 1000).max(LOST_NS));
-    let state = match (now.arrived_ns, lost_ns) {
-        (None, _) => "nothing",
-        (Some(_), Some(lost_ns)) if silent_ns > lost_ns => "lost",
-        (Some(_), None) if silent_ns > QUIET_NS => "quiet",
-        _ => "arriving",
-    };
-    json!({ "state": state, "since_ns": now.arrived_ns, "silent_s": silent_ns as f64 / 1e9, "heartbeat_us": now.heartbeat_us })
-}
-
 /// `counters` of a live source; rates are those of the last `seconds`, since the counters `before`.
 #[allow(clippy::cast_precision_loss)]
 pub(super) fn counters(
@@ -73,33 +53,37 @@ pub(super) fn counters(
     clients: usize,
 ) -> Map<String, Value> {
     let rate = |now: u64, before: Option<u64>| before.map(|before| now.saturating_sub(before) as f64 / seconds);
-    let damaged = now.wire.skipped + now.wire_v2.checksum + now.wire_v2.short + now.wire_v2.foreign;
+    let damaged = now.decoding.wire.skipped
+        + now.decoding.wire_v2.checksum
+        + now.decoding.wire_v2.short
+        + now.decoding.wire_v2.foreign;
     let message = json!({
         "type": "counters",
         "at_ns": now_ns(),
         "seconds": now.seconds,
-        "board_us": now.board_us,
-        "events": now.events,
-        "events_per_s": rate(now.events, before.map(|b| b.events)),
+        "board_us": now.board.board_us,
+        "events": now.decoding.events,
+        "events_per_s": rate(now.decoding.events, before.map(|b| b.decoding.events)),
         "bytes_per_s": rate(now.capture.bytes, before.map(|b| b.capture.bytes)),
         "datagrams_per_s": rate(now.capture.datagrams, before.map(|b| b.capture.datagrams)),
         "frames_per_s": frame_us.map(|frame_us| 1e6 / frame_us),
-        "arrival": arrival(now),
+        "arrival": now.arrival(now_ns()),
+        "pace": now.board.pace,
         "lost": {
             "kernel": now.capture.dropped_by_kernel,
             "queue": now.capture.dropped_by_queue,
-            "wire": now.wire_v2.missing,
+            "wire": now.decoding.wire_v2.missing,
             "damaged": damaged,
-            "outside": now.wire.outside + now.wire_v2.outside,
-            "readout": now.events_dropped,
+            "outside": now.decoding.wire.outside + now.decoding.wire_v2.outside,
+            "readout": now.readout.events_dropped,
             "panel": live.missing(),
         },
         "queue": now.capture.waiting,
         "latency": { "decode": now.decode_latency, "said": now.output_latency },
-        "wire_version": now.wire_version,
-        "marked_start": now.marked_start,
-        "taring": now.taring,
-        "detections": now.detections,
+        "wire_version": now.decoding.wire_version,
+        "marked_start": now.board.marked_start,
+        "taring": now.readout.taring,
+        "detections": now.readout.detections,
         "reach_us": live.index.range(),
         "reach_bytes": live.index.bytes(),
         "viewers": clients,

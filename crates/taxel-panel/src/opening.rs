@@ -6,10 +6,11 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 use taxel_core::problem;
+use taxel_live::Result;
 use taxel_live::recording::Reader;
-use taxel_live::{Error, Result};
 
 use super::clients::Broadcast;
+use super::folder::size;
 use super::handler::{Opening, PicturesRead, ReadFile, Reply};
 use super::hub::Hub;
 use super::indexed::Indexed;
@@ -28,14 +29,17 @@ const PROGRESS_EVERY: Duration = Duration::from_secs(1);
 /// As [`Folder::file`](super::folder::Folder::file); the reader's reason where it is no recording.
 pub(super) async fn index(hub: &Arc<Hub>, name: &str, trial: Option<&str>) -> Result<Indexed> {
     let path = hub.folder.file(name)?;
-    let bytes = std::fs::metadata(&path).map_err(Error::file(&path))?.len();
+    let bytes = size(&path)?;
     let key = (path.clone(), trial.map(str::to_owned));
+    let _turn = hub.folder.turn(&key).await;
     if let Some(known) = hub.folder.known(&key, bytes) {
         return Ok(known);
     }
     let file = path.clone();
     let failed = || problem!("{name}: failed within taxel; please report it");
-    let own = tokio::task::spawn_blocking(move || of_a_board(&file)).await.map_err(|_| failed())??;
+    let asked = hub.options().open_by_handler && hub.options().open.as_deref() == Some(name);
+    let own = tokio::task::spawn_blocking(move || if asked { Ok(None) } else { of_a_board(&file) });
+    let own = own.await.map_err(|_| failed())??;
     let indexed = match own {
         Some(index) => Indexed::Events(index),
         None => {
@@ -50,10 +54,10 @@ pub(super) async fn index(hub: &Arc<Hub>, name: &str, trial: Option<&str>) -> Re
     Ok(indexed)
 }
 
-/// The index of a file of a board's events; `None` for any other file.
+/// The index of a file of a board's events; `None` for any other file, an MCAP file of other programs among them.
 fn of_a_board(path: &Path) -> Result<Option<Arc<RecordingIndex>>> {
     let events = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("mcap") => Reader::open(path)?.header().pictures.is_none(),
+        Some("mcap") => Reader::open(path).is_ok_and(|recording| recording.header().pictures.is_none()),
         Some("lsa") => true,
         _ => false,
     };

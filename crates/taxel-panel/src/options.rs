@@ -12,9 +12,11 @@ pub struct PanelOptions {
     pub folder: PathBuf,
     /// Recording of the folder to show first.
     pub open: Option<String>,
+    /// Whether that one is read by the request handler even if it is a board's, as it was opened with options.
+    pub open_by_handler: bool,
     /// The board's serial line, which the request handler has connected.
     pub control: Option<String>,
-    /// Whether somebody stated the board's registers; otherwise they are assumed until they are read.
+    /// Whether the board's registers were stated; otherwise they are assumed until they are read.
     pub registers_stated: bool,
     /// Labels of the readout that runs, if one does.
     pub readout: Option<Vec<String>>,

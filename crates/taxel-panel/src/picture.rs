@@ -91,9 +91,19 @@ impl<'a> ShownColumns<'a> {
         self.own.add_raster(own..parts.end, &mut out[begin..]);
     }
 
+    /// The last stored column of a shown one.
+    fn end(&self, column: i64) -> i64 {
+        ((column + 1) * self.factor - 1).min(self.last)
+    }
+
     fn curve(&self, column: i64) -> Curve {
-        let end = ((column + 1) * self.factor - 1).min(self.last);
+        let end = self.end(column);
         self.store(end).curve(end)
+    }
+
+    fn channels(&self, column: i64, out: &mut Vec<u8>) {
+        let end = self.end(column);
+        self.store(end).channels(end, out);
     }
 }
 
@@ -184,6 +194,7 @@ fn write(
     if let Some(spikes) = spikes {
         section(&mut out, 6, &|out| spikes.write(range.clone(), out));
     }
+    section(&mut out, 7, &|out| range.clone().for_each(|column| shown.channels(column, out)));
     let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
     put(0, b"TXP1");
     // The protocol's fields are as wide as the largest array and section need.

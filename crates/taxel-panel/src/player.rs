@@ -65,7 +65,8 @@ impl Player {
     ///
     /// # Errors
     ///
-    /// As [`KeyframeIndex::open`] and [`ChangeReader::read`]; `Core(Problem)` where the encoder does not fit the array.
+    /// As [`KeyframeIndex::open`] and [`ChangeReader::read`]; `Core(Problem)` where the encoder does not fit the array, or
+    /// the pictures.
     pub fn open(index: Arc<dyn KeyframeIndex>, t: i64, options: ViewOptions) -> Result<Self> {
         let (first, last) = index.range().ok_or_else(|| problem!("nothing to show: it holds no events"))?;
         let t = t.clamp(first, last);
@@ -75,21 +76,21 @@ impl Player {
         let dense = index.events_before(t).saturating_sub(index.events_before(t - span)) > HISTORY_CHANGES;
         let before = if stored && (!needs_changes || dense) { 0 } else { span };
         let (keyframe, reader) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
-        let columns = index.array().columns;
         let unit_us = options.column_us.min(COLUMN_US);
-        let bytes = TimeColumns::bytes_for(index.array().rows.into(), span / unit_us);
-        let mut state = ArrayState::new(columns, index.noise_floor(), &keyframe, unit_us, bytes);
-        if index.holds_pictures() {
-            state = state.of_pictures(&keyframe);
+        let bytes = TimeColumns::bytes_for(index.array(), span / unit_us);
+        let mut state = ArrayState::new(index.array(), index.noise_floor(), &keyframe, unit_us, bytes);
+        if let Some(pictures) = index.pictures() {
+            state = state.of_pictures(&keyframe, pictures.rest_source(), pictures.weights().clone());
         }
         let first_own = keyframe.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
         let history = options.watched.map(|taxel| {
             let held = keyframe.held.get(taxel as usize).copied().unwrap_or(UNKNOWN);
             TaxelHistory::new(taxel, held, keyframe.latest, options.column_us)
         });
-        let encoder = options.encoder.as_ref();
-        let spikes =
-            encoder.map(|e| EncodedSpikes::new(e, index.array(), options.column_us, &keyframe.held, keyframe.latest));
+        let spikes = options.encoder.as_ref().map(|encoder| match index.pictures() {
+            Some(pictures) => EncodedSpikes::of_pictures(encoder, &pictures, options.column_us, keyframe.latest),
+            None => EncodedSpikes::new(encoder, index.array(), options.column_us, &keyframe.held, keyframe.latest),
+        });
         let spikes = spikes.transpose()?;
         let mut player =
             Self { index, reader, state, first_own, pending: vec![], applied: 0, t, history, spikes, options };
@@ -138,6 +139,7 @@ impl Player {
             match self.reader.read(&mut self.pending)? {
                 Read::Changes => {}
                 Read::Held(held, events) => self.state.set_held(&held, events),
+                Read::Rest(rest) => self.state.set_rest(rest),
                 Read::End => break,
             }
         }
@@ -164,6 +166,7 @@ impl Player {
             match self.reader.read(&mut self.pending)? {
                 Read::Changes => {}
                 Read::Held(held, events) => self.state.set_held(&held, events),
+                Read::Rest(rest) => self.state.set_rest(rest),
                 Read::End => return Ok(None),
             }
         }
@@ -183,7 +186,7 @@ impl Player {
                 changes.clear();
                 match reader.read(&mut changes)? {
                     Read::Changes => {}
-                    Read::Held(..) => continue,
+                    Read::Held(..) | Read::Rest(_) => continue,
                     Read::End => break,
                 }
                 for change in &changes {

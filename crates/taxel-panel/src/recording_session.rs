@@ -90,7 +90,7 @@ async fn run(hub: Arc<Hub>) {
             return;
         }
         let outcome = record(&hub, &plan).await;
-        hub.clients.send_json(&hub.recordings_message());
+        hub.clients.send_json(&hub.recordings_message().await);
         let mut next = false;
         set(&hub, |state| {
             state.phase = Phase::Idle;

@@ -51,7 +51,10 @@ pub(super) async fn carry_out(
         "note" => board(&hub)?.handle.note(request.text("text", 200)?)?,
         "mark" => {
             let source = request.optional_text("source", 64)?.unwrap_or_default().to_owned();
-            let row = LabelRow { label: label_text(&request)?, t_us: request.time("t_us")?, source };
+            let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
+            let replaces_us = request.has("replaces_us").then(|| request.time("replaces_us")).transpose()?;
+            let (label, t_us) = (label_text(&request)?, request.time("t_us")?);
+            let row = LabelRow { label, t_us, source, trial, replaces_us };
             change_label(&hub, shown, LabelChange::Mark(row)).await?;
         }
         "rename" => {
@@ -68,7 +71,7 @@ pub(super) async fn carry_out(
         "train" => return train(&hub, shown).await.map(Some),
         "train_stop" => hub.ask(|handler| handler.end_training()).await?,
         "read_out" => return read_out(&hub, shown, &request).await,
-        "recordings" => return Ok(Some(hub.recordings_message())),
+        "recordings" => return Ok(Some(hub.recordings_message().await)),
         "rest" => rest(&hub, &request)?,
         "zero" => zero(&hub, &request).await?,
         "places" => return places(&hub).await.map(Some),
@@ -195,9 +198,8 @@ pub(super) async fn read_labels(hub: &Hub, recording: &str, us: i64) -> Answer {
         return Ok(());
     }
     let name = recording.to_owned();
-    let mut rows = hub.ask(move |handler| handler.read_labels(&table, &name)).await?;
-    rows.iter_mut().for_each(|row| row.t_us *= us);
-    hub.labels.replace(recording, rows);
+    let rows = hub.ask(move |handler| handler.read_labels(&table, &name)).await?;
+    hub.labels.replace(recording, rows.into_iter().map(|row| row.in_view(us)).collect());
     Ok(())
 }
 
@@ -214,21 +216,19 @@ async fn change_label(hub: &Hub, shown: Option<&Shown>, change: LabelChange) -> 
     let recorded = hub.recorder.file();
     let name = shown.map(|shown| shown.name.as_str()).or(recorded.as_deref());
     let name = name.ok_or("a label belongs to a recording: open one, or record")?;
-    if shown.is_some_and(|shown| shown.indexed.trial().is_some()) {
-        return Err(
-            format!("{name}: holds several trials; taxel convert {name} FOLDER makes a recording of each").into()
-        );
-    }
     let us = shown.map_or(1, |shown| shown.indexed.us());
     let change = change.at_whole(us);
+    if let Some((shown, t_us)) = shown.zip(change.t_us()) {
+        let outside = |reason| Refusal { reason, field: Some("t_us".to_owned()) };
+        shown.indexed.check_label(name, t_us).map_err(outside)?;
+    }
     let table = hub.folder.file(&file_of(name))?;
     let turn = hub.file_turn().await;
     let (before, rows) = hub.labels.change(name, change)?;
     // The lock is held until the file is written, also if the client disconnects.
     let (written, _turn) = hub
         .ask(move |handler| {
-            let in_file = |row: LabelRow| LabelRow { t_us: row.t_us / us, ..row };
-            let rows: Vec<LabelRow> = rows.into_iter().map(in_file).collect();
+            let rows: Vec<LabelRow> = rows.into_iter().map(|row| row.in_file(us)).collect();
             Ok((handler.write_labels(&table, &rows), turn))
         })
         .await?;
@@ -248,7 +248,7 @@ async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
     let readout = format!("{}.readout.json", name.rsplit_once('.').map_or(&**name, |(stem, _)| stem));
     let (recording, out) = (hub.folder.file(name)?, hub.folder.file(&readout)?);
     let text = hub.ask(move |handler| handler.train(&recording, &out)).await?;
-    hub.clients.send_json(&hub.recordings_message());
+    hub.clients.send_json(&hub.recordings_message().await);
     Ok(json!({ "type": "trained", "name": name, "readout": readout, "text": text }))
 }
 
@@ -256,13 +256,13 @@ async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
 async fn read_out(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> Answer<Option<Value>> {
     let readout = request.text("readout", 110)?;
     let path = hub.folder.file(readout).map_err(|error| Refusal::of("readout", error))?;
-    let Some(Shown { name, .. }) = shown else {
+    let Some(Shown { name, trial, .. }) = shown.cloned() else {
         check_restart(hub)?;
         hub.ask(move |handler| handler.read_out(&path)).await?;
         return Ok(None);
     };
-    let recording = hub.folder.file(name)?;
-    let found = hub.ask(move |handler| handler.detect(&recording, &path)).await?;
+    let recording = hub.folder.file(&name)?;
+    let found = hub.ask(move |handler| handler.detect(&recording, trial.as_deref(), &path)).await?;
     let one = |(label, t, known)| json!({ "label": label, "t_us": t, "known_us": known });
     let found: Vec<_> = found.into_iter().map(one).collect();
     Ok(Some(json!({ "type": "detections", "source": name, "readout": readout, "detections": found })))
@@ -322,6 +322,6 @@ async fn cut(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> Answer<
     let lost = hub
         .ask(move |handler| handler.cut(&Cut { path: &path, trial: trial.as_deref(), out: &out, start_us, stop_us }))
         .await?;
-    hub.clients.send_json(&hub.recordings_message());
+    hub.clients.send_json(&hub.recordings_message().await);
     Ok(json!({ "type": "cut", "name": to, "lost": lost }))
 }

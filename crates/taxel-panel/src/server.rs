@@ -17,6 +17,7 @@ use super::connections::LimitedListener;
 use super::handler::RequestHandler;
 use super::hub::Hub;
 use super::limits::MOST_BYTES;
+use super::opening;
 use super::options::PanelOptions;
 use super::registers::prepare;
 use super::session;
@@ -176,6 +177,13 @@ async fn serve(listener: std::net::TcpListener, gate: Arc<Gate>) {
             prepare(&hub).await;
         }
     });
+    // The recording to show first is read while the browser starts; the client that opens it gets the error, if any.
+    let hub = Arc::clone(&gate.hub);
+    let first = tokio::spawn(async move {
+        if let Some(name) = &hub.options().open {
+            let _ = opening::index(&hub, name, None).await;
+        }
+    });
     let mut end = gate.end.clone();
     let app = Router::new().fallback(respond).with_state(gate);
     let ended = async move {
@@ -189,6 +197,7 @@ async fn serve(listener: std::net::TcpListener, gate: Arc<Gate>) {
     }
     live.abort();
     reads.abort();
+    first.abort();
 }
 
 async fn respond(State(gate): State<Arc<Gate>>, request: Request) -> Response {

@@ -78,7 +78,7 @@ impl Session {
             hub.registers_message(),
             hub.presets_message(),
             hub.recorder.message(),
-            hub.recordings_message(),
+            hub.recordings_message().await,
             hub.zeroed_message(),
         ] {
             self.connection.send_json(&message).await?;

@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
+use taxel_core::Array;
+
 /// Width of a column of time unless a client asks for another, us.
 pub const COLUMN_US: i64 = 4000;
 
@@ -17,6 +19,9 @@ pub const LATE_US: i64 = 120_000;
 
 /// Columns of time in a block of a [`TimeColumns`].
 const BLOCK: i64 = 250;
+
+/// Of channels up to this number each has a curve of its own.
+const MOST_CHANNELS: usize = 64;
 
 /// A touch exceeds the quiet force by this part of the greatest excess: one in so many.
 const TOUCH_SHARE: u32 = 4;
@@ -53,12 +58,41 @@ pub fn is_column(us: i64) -> bool {
 struct Block {
     raster: Vec<u8>,
     curves: Vec<Curve>,
+    channels: Vec<u16>,
+}
+
+/// What a column of time holds of each row, and of each channel.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    rows: usize,
+    channels: usize,
+}
+
+impl Shape {
+    fn of(array: &Array) -> Self {
+        let channels = if array.is_channels() && array.len() <= MOST_CHANNELS { array.len() } else { 0 };
+        Self { rows: array.rows.into(), channels }
+    }
+
+    fn block_bytes(self) -> usize {
+        let curves = std::mem::size_of::<Curve>() + self.channels * std::mem::size_of::<u16>();
+        BLOCK.unsigned_abs() as usize * (self.rows + curves)
+    }
+}
+
+impl Block {
+    /// Repeats the channels of its column `k` up to its end.
+    fn repeat_channels(&mut self, k: usize, channels: usize) {
+        for later in k + 1..BLOCK.unsigned_abs() as usize {
+            self.channels.copy_within(k * channels..(k + 1) * channels, later * channels);
+        }
+    }
 }
 
 /// Raster and curves by column of time, stored in blocks; a stretch without events takes no memory.
 #[derive(Debug, Clone)]
 pub struct TimeColumns {
-    rows: usize,
+    shape: Shape,
     /// Ascending by number. Nearly every access is to the newest block.
     blocks: VecDeque<(i64, Block)>,
     /// First and last known column.
@@ -68,32 +102,35 @@ pub struct TimeColumns {
 }
 
 impl TimeColumns {
-    /// Columns of an array of `rows` rows that take at most about `bytes` bytes: the oldest blocks are dropped.
+    /// Columns of an array that take at most about `bytes` bytes: the oldest blocks are dropped.
     #[must_use]
-    pub fn new(rows: usize, bytes: usize) -> Self {
-        let block = Self::block_bytes(rows);
+    pub fn new(array: &Array, bytes: usize) -> Self {
+        let shape = Shape::of(array);
+        let block = shape.block_bytes();
         Self {
-            rows,
+            shape,
             blocks: VecDeque::new(),
             reach: None,
             max_blocks: (bytes / block).max(SPAN.unsigned_abs() as usize / BLOCK.unsigned_abs() as usize + 2),
         }
     }
 
-    /// Bytes that `columns` columns of an array of `rows` rows take.
+    /// Bytes that `columns` columns of an array take.
     #[must_use]
-    pub fn bytes_for(rows: usize, columns: i64) -> usize {
-        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * Self::block_bytes(rows)
+    pub fn bytes_for(array: &Array, columns: i64) -> usize {
+        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * Shape::of(array).block_bytes()
     }
 
     /// Rows of the array.
     #[must_use]
     pub fn rows(&self) -> usize {
-        self.rows
+        self.shape.rows
     }
 
-    fn block_bytes(rows: usize) -> usize {
-        BLOCK.unsigned_abs() as usize * (rows + std::mem::size_of::<Curve>())
+    /// Number of channels that have a curve each; 0 of any other sensor.
+    #[must_use]
+    pub fn channel_count(&self) -> usize {
+        self.shape.channels
     }
 
     /// First and last known column.
@@ -111,7 +148,7 @@ impl TimeColumns {
     }
 
     fn block(&mut self, column: i64) -> (&mut Block, usize) {
-        let (key, rows) = (column.div_euclid(BLOCK), self.rows);
+        let (key, Shape { rows, channels }) = (column.div_euclid(BLOCK), self.shape);
         let place = match self.place(key) {
             Ok(place) => place,
             Err(mut place) => {
@@ -124,8 +161,11 @@ impl TimeColumns {
                     }
                 }
                 let n = BLOCK.unsigned_abs() as usize;
-                let held = place.checked_sub(1).map_or(NOTHING, |before| self.blocks[before].1.curves[n - 1]);
-                self.blocks.insert(place, (key, Block { raster: vec![0; n * rows], curves: vec![held; n] }));
+                let before = place.checked_sub(1).map(|before| &self.blocks[before].1);
+                let curve = before.map_or(NOTHING, |before| before.curves[n - 1]);
+                let values = before.map_or_else(|| vec![0; channels], |b| b.channels[(n - 1) * channels..].to_vec());
+                let block = Block { raster: vec![0; n * rows], curves: vec![curve; n], channels: values.repeat(n) };
+                self.blocks.insert(place, (key, block));
                 place
             }
         };
@@ -149,9 +189,10 @@ impl TimeColumns {
         if let Ok(place) = self.place(key) {
             let block = &mut self.blocks[place].1;
             let k = usize::try_from(column.rem_euclid(BLOCK)).unwrap_or(0);
-            block.raster[(k + 1) * self.rows..].fill(0);
+            block.raster[(k + 1) * self.shape.rows..].fill(0);
             let curve = block.curves[k];
             block.curves[k + 1..].fill(curve);
+            block.repeat_channels(k, self.shape.channels);
         }
     }
 
@@ -160,7 +201,7 @@ impl TimeColumns {
         if self.reach.is_some_and(|(first, _)| column < first) {
             return;
         }
-        let rows = self.rows;
+        let rows = self.shape.rows;
         let (block, k) = self.block(column);
         let cells = &mut block.raster[k * rows..(k + 1) * rows];
         for (row, up) in changes {
@@ -180,6 +221,34 @@ impl TimeColumns {
         if !same {
             let (block, k) = self.block(column);
             block.curves[k..].fill(curve);
+        }
+    }
+
+    /// Sets the values of all channels, ticks above rest, from this column to the end of its block.
+    pub(super) fn set_channels(&mut self, column: i64, values: &[u16]) {
+        let channels = self.shape.channels;
+        if values.len() == channels && self.channels_at(column).is_none_or(|before| before != values) {
+            let (block, k) = self.block(column);
+            block.channels[k * channels..(k + 1) * channels].copy_from_slice(values);
+            block.repeat_channels(k, channels);
+        }
+    }
+
+    /// The values of all channels at the end of a column; `None` before the first block.
+    fn channels_at(&self, column: i64) -> Option<&[u16]> {
+        let (key, n, channels) = (column.div_euclid(BLOCK), BLOCK.unsigned_abs() as usize, self.shape.channels);
+        let (place, k) = match self.place(key) {
+            Ok(place) => (place, column.rem_euclid(BLOCK).unsigned_abs() as usize),
+            Err(place) => (place.checked_sub(1)?, n - 1),
+        };
+        Some(&self.blocks[place].1.channels[k * channels..(k + 1) * channels])
+    }
+
+    /// Appends the values of all channels at the end of a column, 16 bits each, little-endian.
+    pub fn channels(&self, column: i64, out: &mut Vec<u8>) {
+        match self.channels_at(column) {
+            Some(values) => out.extend(values.iter().flat_map(|value| value.to_le_bytes())),
+            None => out.resize(out.len() + 2 * self.shape.channels, 0),
         }
     }
 
@@ -239,9 +308,10 @@ impl TimeColumns {
         let from = self.blocks.partition_point(|(key, _)| (key + 1) * BLOCK <= columns.start);
         for (key, block) in self.blocks.range(from..).take_while(|(key, _)| key * BLOCK < columns.end) {
             let within = |column: i64| usize::try_from((column - key * BLOCK).clamp(0, BLOCK)).unwrap_or(0);
-            let cells = &block.raster[within(columns.start) * self.rows..within(columns.end) * self.rows];
+            let rows = self.shape.rows;
+            let cells = &block.raster[within(columns.start) * rows..within(columns.end) * rows];
             for (place, cell) in cells.iter().enumerate().filter(|(_, cell)| **cell > 0) {
-                let sum = &mut out[place % self.rows];
+                let sum = &mut out[place % rows];
                 let (ups, downs) = ((*sum & 15) + (cell & 15), (*sum >> 4) + (cell >> 4));
                 *sum = ups.min(15) | downs.min(15) << 4;
             }
@@ -252,8 +322,8 @@ impl TimeColumns {
     pub fn raster(&self, column: i64, out: &mut Vec<u8>) {
         let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
         match self.place(key).map(|place| &self.blocks[place].1) {
-            Ok(block) => out.extend_from_slice(&block.raster[k * self.rows..(k + 1) * self.rows]),
-            Err(_) => out.resize(out.len() + self.rows, 0),
+            Ok(block) => out.extend_from_slice(&block.raster[k * self.shape.rows..(k + 1) * self.shape.rows]),
+            Err(_) => out.resize(out.len() + self.shape.rows, 0),
         }
     }
 }

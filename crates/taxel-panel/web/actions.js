@@ -5,6 +5,7 @@ import { savePicture } from "./image.js";
 import { bindKeys } from "./keys.js";
 import { failed, notify } from "./notice.js";
 import { showTab } from "./tabs.js";
+import { seconds } from "./words.js";
 
 /**
  * The parts of the page that actions concern.
@@ -117,10 +118,16 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
 function pictureOf(player, { values }, maps) {
   /** @type {{ title: string, canvas: HTMLCanvasElement, inset: number }[]} */
   const lanes = [];
-  if (values.showRaster) lanes.push({ title: values.raster === "spikes" ? "Spikes by row" : "Changes by row", canvas: part("raster", HTMLCanvasElement), inset: RASTER_INSET });
+  for (const [id, title] of /** @type {const} */ ([
+    ["raster", values.raster === "spikes" ? "Spikes by row" : "Changes by row"],
+    ["channels", `Channels, ${part("channels-scale", HTMLElement).textContent}`],
+  ])) {
+    const canvas = part(id, HTMLCanvasElement);
+    if (canvas.clientWidth) lanes.push({ title, canvas, inset: RASTER_INSET });
+  }
   for (const [id, on, title] of /** @type {const} */ ([
     ["taxel-lane", values.showTaxel, `Taxel ${maps.named()}`],
-    ["force-lane", values.showForce, "Force and area"],
+    ["force-lane", values.showForce, `${part("force-title", HTMLElement).textContent} and area`],
     ["centre-lane", values.showCentre, "Centre"],
   ])) {
     const canvas = part(id, HTMLElement).querySelector("canvas");
@@ -128,6 +135,6 @@ function pictureOf(player, { values }, maps) {
     if (on && canvas?.clientWidth) lanes.push({ title, canvas, inset: 0 });
   }
   const source = player.transport.source ?? "live";
-  const at = ((player.t_us ?? 0) / 1e6).toFixed(3);
-  return { title: `${source}, ${at} s`, file: `${source.replace(/\.[^.]+$/, "")}-${at}s.png`, lanes };
+  const at = seconds(player.t_us ?? 0);
+  return { title: `${source}, ${at}`, file: `${source.replace(/\.[^.]+$/, "")}-${at.replace(/[ ,]/g, "")}.png`, lanes };
 }

@@ -247,8 +247,6 @@ export class Board {
     this.writable = hello.live && hello.control !== null;
     part("losses", HTMLElement).hidden = !hello.live;
     this.connection.greet(hello);
-    const why = hello.live ? "No control line: registers can be read here, not written. Choose a port above." : "Of a recording: what the registers held.";
-    write(part("registers-why", HTMLElement), this.writable ? "" : why);
     this.enable();
   }
 
@@ -277,8 +275,21 @@ export class Board {
     this.check();
   }
 
+  /**
+   * Shows what the registers held in a recording.
+   * @param {Record<string, number | boolean> | null} values null of one that is of no board, or that does not keep them
+   * @param {number | null} frame_us
+   */
+  showRecorded(values, frame_us) {
+    write(part("registers-why", HTMLElement), values ? "Of a recording: what the registers held." : "This recording holds no registers of a board.");
+    part("registers-held", HTMLElement).hidden = !values;
+    if (values) this.show(values, frame_us, null, true, false);
+  }
+
   /** @param {RegistersMessage} message */
   take(message) {
+    const assumed = message.known || message.stated ? "" : "; these are those of a board at reset";
+    write(part("registers-why", HTMLElement), this.writable ? "" : `No control line: registers are neither read nor set${assumed}. Choose a port above.`);
     this.show(message.values, message.frame_us, message.preset, message.known, message.stated);
   }
 

@@ -1,9 +1,10 @@
 // The counters in the header, and the losses by place.
 
 import { make, part, write } from "./dom.js";
-import { whole } from "./words.js";
+import { short, whole } from "./words.js";
 
 /** @typedef {import("./protocol.js").Counters} CountersMessage */
+/** @typedef {import("./protocol.js").Pace} Pace */
 
 /** @type {Record<string, string>} where data can be lost */
 const LOSSES = {
@@ -29,8 +30,10 @@ export function writeCounters(counters, drawn) {
   const { lost, latency } = counters;
   put("events", number(counters.events_per_s, whole));
   put("data", number(counters.bytes_per_s, (bytes) => (bytes / 1e6).toFixed(2)));
-  put("frames", number(counters.frames_per_s, whole));
-  part("frames", HTMLElement).title = counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : "";
+  // The rate follows from the registers, so it says nothing of a board that is off.
+  const arrives = counters.arrival.state === "arriving";
+  put("frames", number(arrives ? counters.frames_per_s : null, whole));
+  part("frames", HTMLElement).title = counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers say ${whole(counters.frames_per_s)}/s`;
   // Events that only the panel lacks are in every recording and in the readout.
   const all = Object.entries(lost).reduce((sum, [place, count]) => sum + (place === "panel" ? 0 : count), 0);
   put("lost", whole(all));
@@ -50,4 +53,13 @@ export function writeCounters(counters, drawn) {
   }
   put("reach", counters.reach_us ? `the last ${((counters.reach_us[1] - counters.reach_us[0]) / 1e6).toFixed(0)} s can be viewed` : "");
   put("wire", counters.wire_version ? `wire version ${counters.wire_version}` : "");
+}
+
+/**
+ * Writes how the source's clock runs beside this machine's, and how late its datagrams are.
+ * @param {Pace | null} pace of what is shown; null where arrivals say nothing
+ */
+export function writePace(pace) {
+  const delays = pace && pace.delay.p50_us !== null && pace.delay.p99_us !== null ? `; delays beyond the shortest: ${short(pace.delay.p50_us)} (median), ${short(pace.delay.p99_us)} (99 %)` : "";
+  write(part("pace", HTMLElement), pace ? `Clock: drift ${pace.drift_ppm < 0 ? "−" : "+"}${Math.abs(pace.drift_ppm).toFixed(1)} ppm${delays}` : "");
 }

@@ -2,7 +2,7 @@
 
 import { part, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
-import { counted, rounded, seconds, whole } from "./words.js";
+import { rounded, seconds, whole } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
@@ -12,7 +12,7 @@ const WHEEL_HALF = 400;
 const LINE_PX = 30;
 /** From here on a press is a drag, CSS pixels. */
 const DRAG = 4;
-/** Where a press is for somebody else. */
+/** Where a press is for another control. */
 const NOT_TIME = "#label-lane, button";
 
 export class Cursor {
@@ -28,6 +28,10 @@ export class Cursor {
     this.track = part("track", HTMLElement);
     /** Unit of the values, size of a tick in it, and ticks of the value 0. */
     this.values = { unit: "ticks", step: 1, zero: 0 };
+    /** Unit of their sum, and size of a tick in it. */
+    this.sums = { unit: "ticks", step: 1 };
+    /** The sensor that is shown. @type {import("./geometry.js").Geometry | null} */
+    this.sensor = null;
     /** Where a press began, and whether it has become a drag. @type {{ x: number, drags: boolean } | null} */
     this.press = null;
     const lanes = part("lanes", HTMLElement);
@@ -127,13 +131,15 @@ export class Cursor {
     const value = (/** @type {number} */ ticks) => rounded((ticks - zero) * step);
     const now = `${value(last)} ${unit}`;
     write(part("taxel-now", HTMLElement), last === UNKNOWN_VALUE ? "" : least === greatest ? now : `${now} (${value(least)} to ${value(greatest)})`);
-    const sum = step === 1 ? whole(timeline.sum[place]) : rounded(timeline.sum[place] * step);
-    write(part("force-sum", HTMLElement), `${sum} ${unit}`);
-    write(part("force-area", HTMLElement), counted(timeline.area[place], "taxel"));
+    const { sums } = this;
+    const sum = `${sums.step === 1 ? whole(timeline.sum[place]) : rounded(timeline.sum[place] * sums.step)} ${sums.unit}`;
+    write(part("force-sum", HTMLElement), sum);
+    const area = this.sensor?.area(timeline.area[place]) ?? "";
+    write(part("force-area", HTMLElement), area);
     const [x, y] = [timeline.x[place], timeline.y[place]];
-    const centre = Number.isNaN(x) ? "nothing pressed" : `column ${x.toFixed(1)}, row ${y.toFixed(1)}`;
+    const centre = Number.isNaN(x) ? "nothing pressed" : (this.sensor?.centre(x, y) ?? "");
     write(part("centre-now", HTMLElement), centre);
-    const force = `${sum} ${unit} over ${counted(timeline.area[place], "taxel")}`;
-    write(part("picture-info", HTMLElement), `${force}, centre: ${centre}`);
+    const channels = this.sensor?.kind === "channels";
+    write(part("picture-info", HTMLElement), `${sum}${channels ? "" : ` over ${area}, centre (${this.sensor?.axes.join(", ") ?? ""}): ${centre}`}`);
   }
 }

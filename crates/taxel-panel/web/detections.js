@@ -76,6 +76,7 @@ export class Detections {
   mark(timeline) {
     const marks = part("detection-marks", HTMLElement);
     const inside = timeline ? this.shown.filter(({ t_us }) => timeline.share(t_us) !== null).slice(0, MARKED) : [];
+    marks.hidden = !this.shown.length;
     while (marks.children.length > inside.length) marks.lastElementChild?.remove();
     while (marks.children.length < inside.length) marks.append(make("span"));
     inside.forEach(({ label, t_us }, i) => {

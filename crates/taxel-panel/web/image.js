@@ -23,7 +23,7 @@ const heightOf = ({ canvas, inset }) => (canvas.clientHeight * WIDE) / (canvas.c
  */
 export async function savePicture({ title, file, lanes }) {
   const maps = [
-    { name: "pressure", caption: "Pressure above rest", ends: ["0", part("pressure-top", HTMLElement).textContent ?? ""] },
+    { name: "pressure", caption: `${part("pressure-title", HTMLElement).textContent} ${part("pressure-above", HTMLElement).textContent}`, ends: ["0", part("pressure-top", HTMLElement).textContent ?? ""] },
     { name: "change", caption: "Change", ends: [part("change-least", HTMLElement).textContent ?? "", part("change-top", HTMLElement).textContent ?? ""] },
   ].filter(({ name }) => part(`${name}-map`, HTMLCanvasElement).clientWidth > 0);
   const side = (WIDE - 2 * EDGE - BETWEEN) / 2;

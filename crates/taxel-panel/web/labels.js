@@ -2,7 +2,7 @@
 
 import { make, part, write } from "./dom.js";
 import { notify } from "./notice.js";
-import { counted, seconds } from "./words.js";
+import { counted, readTime, seconds, timeUnit, writtenTime } from "./words.js";
 
 /** @typedef {import("./protocol.js").Label} Label */
 /** @typedef {import("./protocol.js").Labels} LabelsMessage */
@@ -45,6 +45,8 @@ export class Labels {
     this.files = new Map();
     /** The recording whose labels are shown. @type {string | null} */
     this.file = null;
+    /** Its trial, where the file holds several. @type {string | null} */
+    this.trial = null;
     /** @type {Map<number, HTMLButtonElement>} */
     this.flags = new Map();
     /** @type {number | null} */
@@ -71,9 +73,10 @@ export class Labels {
     new ResizeObserver(() => this.place()).observe(this.lane);
   }
 
-  /** @returns {Label[]} of the recording shown, by time */
+  /** @returns {Label[]} of the recording or the trial shown, by time */
   get labels() {
-    return (this.file && this.files.get(this.file)?.labels) || [];
+    const all = (this.file && this.files.get(this.file)?.labels) || [];
+    return all.filter(({ trial }) => !trial || trial === this.trial);
   }
 
   /** @param {LabelsMessage} message */
@@ -88,10 +91,10 @@ export class Labels {
     return this.files.get(file)?.labels.length ?? null;
   }
 
-  /** @param {string | null} file */
-  choose(file) {
-    if (this.file === file) return;
-    this.file = file;
+  /** @param {string | null} file @param {string | null} [trial] where the file holds several */
+  choose(file, trial = null) {
+    if (this.file === file && this.trial === trial) return;
+    [this.file, this.trial] = [file, trial];
     this.chosen = this.waiting_us = null;
     this.show();
   }
@@ -105,7 +108,10 @@ export class Labels {
   /** @param {number} clientX @returns {number | null} */
   timeAt(clientX) {
     const box = this.lane.getBoundingClientRect();
-    return this.timeline()?.time(Math.max(0, Math.min(1, (clientX - box.left) / box.width))) ?? null;
+    const t_us = this.timeline()?.time(Math.max(0, Math.min(1, (clientX - box.left) / box.width))) ?? null;
+    const reach = this.player.transport.source === null ? null : this.player.reach;
+    // The columns of time go a little beyond the recording.
+    return t_us === null || !reach ? t_us : Math.max(reach[0], Math.min(reach[1], t_us));
   }
 
   /** Marks where the pointer is; the second click of a double one is no label of its own. @param {MouseEvent} event */
@@ -136,7 +142,7 @@ export class Labels {
 
   /** @param {number} label_id @param {number} t_us */
   move(label_id, t_us) {
-    this.server.request({ type: "move", label_id, t_us: Math.max(0, Math.round(t_us)) }).catch((error) => {
+    this.server.request({ type: "move", label_id, t_us: Math.round(t_us) }).catch((error) => {
       this.failed(error);
       this.show();
     });
@@ -146,8 +152,8 @@ export class Labels {
   remove(label_id) {
     const gone = this.labels.find((label) => label.label_id === label_id);
     if (!gone) return;
-    const { label, t_us } = gone;
-    const undo = () => this.server.request({ type: "mark", label, t_us }).catch(this.failed);
+    const { label, t_us, source, replaces_us } = gone;
+    const undo = () => this.server.request({ type: "mark", label, t_us, ...(source ? { source } : {}), replaces_us }).catch(this.failed);
     this.server.request({ type: "delete", label_id }).then(() => notify(`deleted ${label} at ${seconds(t_us)}`, false, { text: "Undo", action: undo }), this.failed);
   }
 
@@ -176,7 +182,7 @@ export class Labels {
     const place = table ? `Saved in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
     write(part("label-place", HTMLElement), place);
     part("train-line", HTMLElement).hidden = !labels.length;
-    if (this.file) write(part("train-command", HTMLElement), `taxel train ${this.file} --labels notes -o readout.json`);
+    if (this.file) write(part("train-command", HTMLElement), `taxel train ${this.file} --labels notes -o ${this.file.replace(/\.[^.]+$/, "")}.readout.json`);
     const list = part("label-list", HTMLElement);
     // A row in which a person types stays what it is.
     const typing = list.contains(document.activeElement) ? document.activeElement?.closest("li")?.dataset.id : undefined;
@@ -192,16 +198,16 @@ export class Labels {
   }
 
   /** @param {Label} label @returns {HTMLElement} */
-  row({ label_id, label, t_us }) {
+  row({ label_id, label, t_us, source }) {
     const name = make("input", { type: "text", value: label, "aria-label": `name of the label at ${seconds(t_us)}`, maxlength: 200, list: "label-names" });
-    const time = make("input", { type: "text", inputmode: "decimal", value: (t_us / 1e6).toFixed(6).replace(/0{1,3}$/, ""), "aria-label": `time of ${label}, seconds` });
+    const time = make("input", { type: "text", inputmode: "decimal", value: writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0{1,3}$/, "$1"), "aria-label": `time of ${label}, ${timeUnit()}` });
     const go = make("button", { type: "button", class: "small", "aria-label": `go to ${label}, ${seconds(t_us)}` }, "Go");
     const away = make("button", { type: "button", class: "small", "aria-label": `delete ${label}, ${seconds(t_us)}` }, "×");
     name.onchange = () => this.server.request({ type: "rename", label_id, label: name.value.trim() }).catch((error) => this.refused(name, label, error));
     time.onchange = () => {
-      const wanted = Math.round(Number(time.value.replace(",", ".")) * 1e6);
-      if (Number.isFinite(wanted)) this.server.request({ type: "move", label_id, t_us: wanted }).catch((error) => this.refused(time, (t_us / 1e6).toFixed(3), error));
-      else this.refused(time, (t_us / 1e6).toFixed(3), new Error(`${time.value} is no number of seconds`));
+      const wanted = readTime(time.value);
+      if (Number.isFinite(wanted)) this.server.request({ type: "move", label_id, t_us: wanted }).catch((error) => this.refused(time, writtenTime(t_us), error));
+      else this.refused(time, writtenTime(t_us), new Error(`${time.value} is no number of ${timeUnit()}`));
     };
     go.onclick = () => {
       this.chosen = label_id;
@@ -209,7 +215,7 @@ export class Labels {
       this.show();
     };
     away.onclick = () => this.remove(label_id);
-    const row = make("li", {}, name, time, make("span", { class: "unit" }, "s"), go, away);
+    const row = make("li", {}, name, time, make("span", { class: "unit" }, [timeUnit() === "seconds" ? "s" : "", source].filter(Boolean).join(", ")), go, away);
     row.dataset.id = String(label_id);
     return row;
   }

@@ -1,8 +1,9 @@
 // Curves under the raster: the watched taxel, force and area, the centre. All share one time.
 
 import uPlot from "./vendor/uPlot.js";
-import { part, themed } from "./dom.js";
+import { part, themed, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
+import { rounded } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 /** @typedef {(number | null)[]} Curve */
@@ -20,9 +21,12 @@ export class Lanes {
   constructor() {
     /** @type {Map<Name, uPlot>} */
     this.plots = new Map();
-    this.limits = { rows: 64, columns: 64 };
+    /** Least and greatest coordinate of a centre; null of channels, which have neither centre nor area. @type {[number, number] | null} */
+    this.limits = [0, 64];
     /** Size of a tick in the unit of the values, and ticks of the value 0. */
     this.values = { step: 1, zero: 0 };
+    /** Size of a tick in the unit of the sum of the values. */
+    this.sum_step = 1;
     /** Times from the left edge of the window, s, and curves at them. @type {Record<Name, [number[], ...Curve[]]>} */
     this.data = { taxel: [[], [], [], []], force: [[], [], []], centre: [[], [], []] };
     /** The length of the window, s, and where the axis has numbers, s from its left edge. */
@@ -61,10 +65,10 @@ export class Lanes {
     const line = (stroke, scale, dash) => ({ stroke, scale, width: 1.25, points: { show: false }, ...(dash ? { dash } : {}) });
     /** @type {uPlot.Series} the edge of a band */
     const bound = { scale: "value", points: { show: false } };
-    /** @type {uPlot.Scale.Range} */
-    const fromZero = (_, __, most) => [0, Math.max(8 * this.values.step, (most ?? 0) * 1.1)];
-    const { rows, columns } = this.limits;
-    const extent = Math.max(rows, columns);
+    /** @param {() => number} least of its end @returns {uPlot.Scale.Range} */
+    const fromZero = (least) => (_, __, most) => [0, Math.max(least(), (most ?? 0) * 1.1)];
+    const [low, high] = this.limits ?? [0, 1];
+    const areas = this.limits !== null;
     /** @type {Record<Name, { scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }>} */
     const plans = {
       taxel: {
@@ -74,14 +78,14 @@ export class Lanes {
         axes: [time, axis("value", 3, text)],
       },
       force: {
-        scales: { force: { range: fromZero }, area: { range: fromZero } },
-        series: [{}, line(one, "force"), line(two, "area", [5, 3])],
-        axes: [time, axis("force", 3, one), axis("area", 1, two)],
+        scales: { force: { range: fromZero(() => 8 * this.sum_step) }, area: { range: fromZero(() => 8) } },
+        series: [{}, line(one, "force"), { ...line(two, "area", [5, 3]), show: areas }],
+        axes: [time, axis("force", 3, one), { ...axis("area", 1, two), ...(areas ? {} : { values: () => [] }) }],
       },
       centre: {
-        scales: { place: { range: [0, extent] } },
+        scales: { place: { range: [low, high] } },
         series: [{}, line(one, "place"), line(two, "place", [5, 3])],
-        axes: [time, { ...axis("place", 3, text), splits: () => [0, extent / 2, extent] }],
+        axes: [time, { ...axis("place", 3, text), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
       },
     };
     for (const name of NAMES) {
@@ -107,10 +111,15 @@ export class Lanes {
     }
   }
 
-  /** @param {number} rows @param {number} columns */
-  size(rows, columns) {
-    if (this.limits.rows === rows && this.limits.columns === columns) return;
-    this.limits = { rows, columns };
+  /** @param {import("./geometry.js").Geometry} sensor */
+  size(sensor) {
+    const limits = sensor.kind === "channels" ? null : sensor.limits;
+    const [across, down] = sensor.axes;
+    write(part("centre-across", HTMLElement), across);
+    write(part("centre-down", HTMLElement), down);
+    part("area-legend", HTMLElement).hidden = limits === null;
+    if (String(this.limits) === String(limits)) return;
+    this.limits = limits;
     this.make();
   }
 
@@ -145,7 +154,7 @@ export class Lanes {
       least[i] = known ? (history[3 * place] - zero) * step : null;
       greatest[i] = known ? (history[3 * place + 1] - zero) * step : null;
       last[i] = known ? (history[3 * place + 2] - zero) * step : null;
-      force[i] = place >= 0 ? sum[place] * step : null;
+      force[i] = place >= 0 ? sum[place] * this.sum_step : null;
       touched[i] = place >= 0 ? area[place] : null;
       const pressed = place >= 0 && !Number.isNaN(x[place]);
       column[i] = pressed ? x[place] : null;

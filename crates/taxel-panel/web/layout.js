@@ -4,12 +4,14 @@ import { part } from "./dom.js";
 
 /** Room around a map: title, colour bar, scale, CSS pixels. */
 const AROUND_MAP = 50;
-/** The line below the maps. */
-const UNDER = 30;
+/** Below the maps: room for two lines, so that nothing moves where a sentence comes or goes. */
+const UNDER = { above: 41, beside: 50 };
 const GAP = 20;
-/** The least that lanes need: the flags, the axis, and each lane with its title. */
-const FLAGS_AND_AXIS = 64;
-const LANE = { raster: 96, taxel: 72, force: 72, centre: 62 };
+/** Below what is said above the maps. */
+const BELOW_SAID = 8;
+/** The least that lanes need: the flags, the detections, the axis, and each lane with its title. */
+const FLAGS_AND_AXIS = 79;
+const LANE = { raster: 96, channels: 96, taxel: 72, force: 72, centre: 62 };
 /** The least width of lanes that stand beside maps. */
 const LANES_WIDE = 460;
 /** Part of the width that maps beside the lanes may take. */
@@ -30,21 +32,27 @@ export class Layout {
     this.shown = shown;
     this.arranged = arranged;
     this.views = part("views", HTMLElement);
+    /** What is said above the maps, at times. */
+    this.said = part("silence", HTMLElement);
     this.done = "";
-    new ResizeObserver(() => this.arrange()).observe(this.views);
+    const resized = new ResizeObserver(() => this.arrange());
+    resized.observe(this.views);
+    resized.observe(this.said);
   }
 
   /** @returns {{ place: Place, width: number }} of the maps, and of one map, CSS pixels */
   best() {
     const { aspect, maps, lanes } = this.shown();
-    const { clientWidth: wide, clientHeight: high } = this.views;
+    const { clientWidth: wide } = this.views;
+    const said = this.said.offsetHeight;
+    const high = this.views.clientHeight - (said && said + BELOW_SAID);
     const low = FLAGS_AND_AXIS + lanes.reduce((sum, lane) => sum + LANE[lane], 0);
     const beside = Math.min(BESIDE * wide, wide - LANES_WIDE - GAP);
     /** @type {[Place, number][]} */
     const widths = [
-      ["above", Math.min((wide - (maps - 1) * GAP) / maps, Math.max(120, high - low - UNDER - AROUND_MAP) * aspect)],
-      ["beside", Math.min((beside - (maps - 1) * GAP) / maps, (high - UNDER - AROUND_MAP) * aspect)],
-      ["column", Math.min(beside, ((high - UNDER) / maps - AROUND_MAP) * aspect)],
+      ["above", Math.min((wide - (maps - 1) * GAP) / maps, Math.max(120, high - low - UNDER.above - AROUND_MAP) * aspect)],
+      ["beside", Math.min((beside - (maps - 1) * GAP) / maps, (high - UNDER.beside - AROUND_MAP) * aspect)],
+      ["column", Math.min(beside, ((high - UNDER.beside) / maps - AROUND_MAP) * aspect)],
     ];
     const [place, width] = widths.reduce((one, other) => (other[1] > one[1] * 1.05 ? other : one));
     return { place, width };

@@ -2,7 +2,8 @@
 
 import { bindActions } from "./actions.js";
 import { Board } from "./board.js";
-import { writeCounters } from "./counters.js";
+import { Channels } from "./channels.js";
+import { writeCounters, writePace } from "./counters.js";
 import { Cursor } from "./cursor.js";
 import { Detections, recorded } from "./detections.js";
 import { make, part, write } from "./dom.js";
@@ -11,6 +12,7 @@ import { Labels } from "./labels.js";
 import { Lanes } from "./lanes.js";
 import { Layout } from "./layout.js";
 import { Maps } from "./maps.js";
+import { Notes } from "./notes.js";
 import { failed, notify } from "./notice.js";
 import { Player } from "./player.js";
 import { readPicture } from "./protocol.js";
@@ -25,7 +27,7 @@ import { Timeline } from "./timeline.js";
 import { Training } from "./training.js";
 import { View } from "./view.js";
 import { TimeWindow } from "./window.js";
-import { counted, numbering, seconds, short } from "./words.js";
+import { beginning, begun, counted, numbering, rounded, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Message} Message */
 /** @typedef {import("./protocol.js").Hello} Hello */
@@ -39,6 +41,10 @@ const LANES_MS = 33;
 /** How often lanes are drawn for users who prefer reduced motion, ms. */
 const REDUCED_MS = 1000;
 const OVERVIEW_MS = 2000;
+/** The lanes, from top to bottom. */
+const LANES = /** @type {const} */ (["raster", "channels", "taxel", "force", "centre"]);
+/** Of so many channels at most each has a curve. */
+const MOST_CHANNELS = 64;
 
 const settings = new Settings();
 const fragment = new URLSearchParams(location.hash.slice(1));
@@ -51,8 +57,10 @@ const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.c
 const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
 const maps = new Maps(settings, watch);
 const raster = new Raster(part("raster", HTMLCanvasElement));
+const channels = new Channels(part("channels", HTMLCanvasElement));
 const lanes = new Lanes();
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
+const notes = new Notes(server, player, labels);
 const training = new Training(server);
 const layout = new Layout(arrangement, () => {
   lanes.fit();
@@ -61,7 +69,7 @@ const layout = new Layout(arrangement, () => {
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
-const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, notes: timed(opened?.notes ?? []), cut: view.cut }));
+const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, notes: notes.timed, cut: view.cut }));
 
 /** @type {Timeline | null} */
 let timeline = null;
@@ -75,6 +83,8 @@ let counters = null;
 let registers = null;
 /** Taxels of the board that the user has zeroed. @type {import("./protocol.js").Zeroing[]} */
 let zeroed = [];
+/** The recording that is being opened. @type {string | null} */
+let opening = null;
 /** Whether the server is connected, and why not. */
 let connection = { connected: false, why: "" };
 /** @type {import("./protocol.js").Recordings | null} */
@@ -104,12 +114,13 @@ function showConnection(state, why) {
 }
 
 function writeState() {
-  showState(connection, player.transport, hello, opened, recorder.status, counters);
+  showState(connection, player.transport, hello, opened, recorder.status, counters, opening);
+  writePace(opened ? opened.pace : (counters?.pace ?? null));
 }
 
-/** The maps that are shown: of pictures there are no events, so that only their values are. */
+/** The maps that are shown: of pictures there are no events, and of channels no map, so that only their values are. */
 function mapsShown() {
-  return opened?.pictures ? "pressure" : settings.values.maps;
+  return opened?.pictures || maps.geometry.kind === "channels" ? "pressure" : settings.values.maps;
 }
 
 /** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of pictures. */
@@ -120,19 +131,41 @@ function showUnits() {
   lanes.values = { step, zero };
   cursor.values = { unit, step, zero };
   numbering.picture_us = pictures?.picture_us ?? null;
+  numbering.begin_us = beginning(opened?.start_us ?? null);
+  write(part("begun", HTMLElement), begun() && `0 s: ${begun()}`);
   const trials = part("trials", HTMLSelectElement);
   trials.hidden = !pictures?.trials.length;
   trials.replaceChildren(...(pictures?.trials ?? []).map((name) => make("option", { value: name }, name)));
   trials.value = pictures?.trial ?? "";
   part("pressure-alone", HTMLButtonElement).hidden = maps.values.pictures;
+  showSums();
   showLanes();
+}
+
+/** Shows the sum of the values: as force, N, where that is known of a pressure. */
+function showSums() {
+  const { unit, step } = maps.values;
+  const newtons = opened?.pictures?.newtons ?? null;
+  const sums = newtons === null ? { unit, step } : { unit: "N", step: newtons };
+  lanes.sum_step = sums.step;
+  cursor.sums = sums;
+  write(part("force-title", HTMLElement), sums.unit === "N" || sums.unit === "ticks" ? "Force" : "Sum");
 }
 
 /** What the page has to place: see `Layout`. */
 function arrangement() {
   const { values } = settings;
-  /** @type {["raster" | "taxel" | "force" | "centre", boolean][]} */
-  const all = [["raster", values.showRaster && !opened?.pictures], ["taxel", values.showTaxel && maps.taxel !== null], ["force", values.showForce], ["centre", values.showCentre]];
+  const { geometry } = maps;
+  const of = geometry.kind === "channels" ? geometry.count : 0;
+  /** @type {[typeof LANES[number], boolean][]} */
+  const all = [
+    // Of pictures and channels the values say more than their changes.
+    ["raster", values.showRaster && (values.raster === "spikes" || (!opened?.pictures && !of))],
+    ["channels", values.showRaster && of > 0 && of <= MOST_CHANNELS],
+    ["taxel", values.showTaxel && maps.taxel !== null],
+    ["force", values.showForce],
+    ["centre", values.showCentre && !of],
+  ];
   return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: all.flatMap(([name, shown]) => (shown ? [name] : [])) };
 }
 
@@ -154,10 +187,26 @@ function resize(array) {
     timeline = new Timeline(array.rows, hello?.column_us ?? 4000);
     timeWindow.forget();
   }
-  maps.size(array.rows, array.columns, array.exists);
-  lanes.size(array.rows, array.columns);
+  maps.size(array, opened?.pictures?.sources ?? []);
+  lanes.size(maps.geometry);
+  cursor.sensor = maps.geometry;
+  showSums();
+  if (maps.geometry.kind === "channels") showChannels(maps.geometry.there.length, maps.geometry.sources);
   write(part("raster-rows", HTMLElement), String(array.rows - 1));
-  layout.arrange();
+  showLanes();
+}
+
+/**
+ * Names the first and the last channel, or the sources that stand one above the other.
+ * @param {number} count
+ * @param {import("./protocol.js").PictureSource[]} sources
+ */
+function showChannels(count, sources) {
+  part("channels-block", HTMLElement).style.setProperty("--count", String(count));
+  const names = part("channel-names", HTMLElement);
+  const several = sources.length > 1;
+  names.classList.toggle("several", several);
+  names.replaceChildren(...(several ? sources.map(({ name }) => name) : ["0", String(count - 1)]).map((name) => make("span", {}, name)));
 }
 
 /** @param {ArrayBuffer} buffer */
@@ -226,6 +275,7 @@ function receive(message) {
       return move(message);
     case "labels":
       labels.take(message);
+      notes.show();
       labels.offer(hello?.readout ?? []);
       return;
     case "health":
@@ -275,18 +325,32 @@ function greet(message) {
   part("record", HTMLButtonElement).hidden = !message.live;
   part("record-start", HTMLButtonElement).disabled = !message.live;
   part("live-counters", HTMLElement).hidden = !message.live;
+  if (first && !message.live) showTab("labels");
   showDetections(detections.shown);
   document.title = message.live ? "taxel · live" : "taxel · view";
   if (maps.taxel) watch(maps.taxel);
   server.send({ type: "recordings" });
   if (message.live) server.send({ type: "overview" });
   const asked = fragment.get("open") ?? message.open;
-  if (asked && (first || !message.live)) server.request({ type: "open", name: asked }).catch(failed);
+  if (asked && (first || !message.live)) ask(asked);
   player.show();
   writeState();
 }
 
-/** A readout that runs live assumes a frame, where nobody has stated the registers or read them. */
+/** Asks for a recording, or for a trial of it; says so while it is read. @param {string} name @param {string} [trial] */
+async function ask(name, trial) {
+  opening = name;
+  writeState();
+  try {
+    await server.request({ type: "open", name, ...(trial === undefined ? {} : { trial }) });
+  } catch (error) {
+    failed(error);
+  }
+  if (opening === name) opening = null;
+  writeState();
+}
+
+/** A readout that runs live assumes a frame, where the registers were neither stated nor read. */
 function showAssumed() {
   const assumes = hello?.readout && registers && !registers.known && !registers.stated && !opened;
   write(part("assumed", HTMLElement), assumes ? `The readout assumes frames of ${short(registers?.frame_us ?? 0)}: the registers are not known.` : "");
@@ -295,15 +359,15 @@ function showAssumed() {
 /** Shows the registers of the board, or of the recording that is shown. */
 function showRegisters() {
   const values = opened ? opened.registers : (registers?.values ?? null);
-  maps.floor = Number(values?.noise_floor ?? 0);
+  maps.floor = Number(opened?.pictures?.floor ?? values?.noise_floor ?? 0);
   if (opened) {
-    if (!hello?.live) board.show(opened.registers ?? {}, opened.frame_us, null, true, false);
+    if (!hello?.live) board.showRecorded(opened.registers, opened.frame_us);
   } else if (registers && hello?.live) board.take(registers);
 }
 
 /** @param {Opened} message */
 function open(message) {
-  const again = opened?.name === message.name;
+  const again = opened?.name === message.name && opened.pictures?.trial === message.pictures?.trial;
   opened = message;
   player.transport = { ...player.transport, source: message.name, state: "paused" };
   player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
@@ -318,38 +382,19 @@ function open(message) {
     // It opens on something: the first touch.
     if (message.touch_us !== null) player.seek(message.touch_us);
   }
-  if (!hello?.live && !again) showTab("labels");
   training.choose(message.name);
   board.array = message.array;
   maps.health = null;
   showZeroed();
   part("files", HTMLSelectElement).value = message.name;
-  labels.choose(message.name);
+  labels.choose(message.name, message.pictures?.trial);
   view.choose(message.name);
   showDetections(recorded(message.detections));
-  part("notes-block", HTMLElement).hidden = !message.notes.length;
-  part("note-list", HTMLElement).replaceChildren(
-    ...message.notes.map(({ t_us, text }) => {
-      // A note without a time is about the whole recording.
-      if (t_us === null) return make("li", {}, text);
-      const button = make("button", { type: "button", class: "link" }, `${seconds(t_us)}  ${text}`);
-      button.onclick = () => player.seek(t_us);
-      return make("li", {}, button);
-    }),
-  );
+  notes.choose(message.notes);
   server.send({ type: "overview" });
   showRegisters();
   player.show();
   writeState();
-}
-
-/**
- * The notes that have a time.
- *
- * @param {import("./protocol.js").Opened["notes"]} notes
- */
-function timed(notes) {
-  return notes.flatMap(({ t_us }) => (t_us === null ? [] : [{ t_us }]));
 }
 
 /** @param {import("./protocol.js").Transport} transport */
@@ -366,7 +411,7 @@ function move(transport) {
     maps.health = null;
     showZeroed();
     part("files", HTMLSelectElement).value = "";
-    part("notes-block", HTMLElement).hidden = true;
+    notes.choose([]);
     player.reach = counters?.reach_us ?? null;
     labels.choose(recorder.status?.state === "recording" ? recorder.status.file : null);
     view.choose(null);
@@ -431,7 +476,12 @@ function frame(now_ms) {
 /** @param {Timeline} shown */
 function drawLanes(shown) {
   const { values } = settings;
-  if (values.showRaster) raster.draw(shown, values.raster === "spikes" ? "spikes" : "changes");
+  const { geometry } = maps;
+  if (geometry.kind === "channels") {
+    const most = channels.draw(shown, geometry.there, maps.taxel && Math.max(...maps.taxel));
+    write(part("channels-scale", HTMLElement), `each up to ${rounded(most * maps.values.step)} ${maps.values.unit}`);
+  }
+  if (arrangement().lanes.includes("raster")) raster.draw(shown, values.raster === "spikes" ? "spikes" : "changes");
   lanes.draw(shown);
   labels.place();
   mark();
@@ -465,7 +515,7 @@ function applyTheme() {
 function showLanes() {
   const { values } = settings;
   const { lanes: shown } = arrangement();
-  for (const id of /** @type {const} */ (["raster", "taxel", "force", "centre"])) part(`${id}-block`, HTMLElement).hidden = !shown.includes(id);
+  for (const id of LANES) part(`${id}-block`, HTMLElement).hidden = !shown.includes(id);
   for (const name of ["pressure", "change"]) {
     part(`${name}-figure`, HTMLElement).hidden = mapsShown() !== "both" && mapsShown() !== name;
     part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
@@ -492,12 +542,12 @@ matchMedia("(prefers-color-scheme: light)").addEventListener("change", applyThem
 bindActions({ server, player, settings, recorder, labels, view, maps, window: timeWindow }, () => timeline);
 part("files", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
-  if (value) server.request({ type: "open", name: value }).catch(failed);
+  if (value) ask(value);
   else player.follow();
 };
 part("trials", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
-  if (opened) server.request({ type: "open", name: opened.name, trial: value }).catch(failed);
+  if (opened) ask(opened.name, value);
 };
 
 // A narrow page has only what must stay in sight in its header and footer, so that these stay low.

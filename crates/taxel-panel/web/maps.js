@@ -1,12 +1,15 @@
-// Two maps side by side: pressure above rest, and change. One pixel a taxel.
+// Two maps side by side: pressure above rest, and change; of channels, which have no map, a bar each.
 
 import { MAPS, UNKNOWN, changeWords, pressureWords, word } from "./colours.js";
-import { ground, make, part, write } from "./dom.js";
+import { ground, make, part, themed, write } from "./dom.js";
+import { geometry } from "./geometry.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { counted, rounded } from "./words.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
+/** @typedef {import("./geometry.js").Geometry} Geometry */
 /** @typedef {import("./protocol.js").Health} Health */
+/** @typedef {import("./protocol.js").PictureSource} PictureSource */
 /** @typedef {import("./protocol.js").Zeroing} Zeroing */
 /** @typedef {import("./settings.js").Settings} Settings */
 
@@ -41,22 +44,18 @@ class Map2D {
     this.bar = part(`${name}-bar`, HTMLCanvasElement);
     this.lines = part(`${name}-cross`, HTMLElement);
     this.marks = part(`${name}-marks`, HTMLElement);
+    this.sources = part(`${name}-sources`, HTMLElement);
     this.context = ground(this.canvas);
-    this.image = new ImageData(1, 1);
-    this.pixels = new Uint32Array(this.image.data.buffer);
+    /** Colour of each taxel. */
+    this.words = new Uint32Array(0);
   }
 
-  /** @param {number} rows @param {number} columns @param {number} aspect */
-  size(rows, columns, aspect) {
-    [this.canvas.width, this.canvas.height] = [columns, rows];
-    this.frame.style.aspectRatio = String(aspect);
-    part("maps", HTMLElement).style.setProperty("--aspect", String(aspect));
-    this.image = new ImageData(columns, rows);
-    this.pixels = new Uint32Array(this.image.data.buffer);
-  }
-
-  show() {
-    this.context.putImageData(this.image, 0, 0);
+  /** @param {Geometry} sensor */
+  size(sensor) {
+    this.frame.style.aspectRatio = String(sensor.aspect);
+    this.frame.dataset.kind = sensor.kind;
+    part("maps", HTMLElement).style.setProperty("--aspect", String(sensor.aspect));
+    this.words = new Uint32Array(sensor.rows * sensor.columns);
   }
 
   /** @param {Uint32Array} words */
@@ -68,12 +67,18 @@ class Map2D {
   }
 }
 
-/** What the page says of the rest. */
+/** What the page says of the rest: of events, and of pictures, which are in a unit of force or pressure where it is given. */
 const REST_FROM = {
   given: "above the given rest",
   quiet: "above the rest of a quiet stretch",
   none: "rest not known yet: above the first values",
 };
+const REST_OF_PICTURES = {
+  given: "above 0",
+  quiet: "above the rest of a quiet stretch",
+  none: "rest not known: values as they are",
+};
+const FALLS = "values fall from their rest: if less means more pressure, say falls = true in a layout file";
 
 /** The maps, their colours, the crosshair and the marks of unwell taxels. */
 export class Maps {
@@ -86,10 +91,10 @@ export class Maps {
     this.watched = watched;
     this.pressure = new Map2D("pressure");
     this.change = new Map2D("change");
-    this.rows = 0;
-    this.columns = 0;
-    /** @type {string | null} */
-    this.exists = null;
+    this.geometry = geometry({ rows: 1, columns: 1, pitch_mm: null, name: "", exists: null }, []);
+    this.known = "";
+    /** Height of each taxel's bar, where bars are drawn. */
+    this.levels = new Float32Array(0);
     this.floor = 0;
     /** @type {[number, number] | null} */
     this.taxel = null;
@@ -97,6 +102,8 @@ export class Maps {
     this.health = null;
     /** Unit of the values, size of a tick in it, and ticks of the value 0; `pictures` have no events. */
     this.values = { unit: "ticks", step: 1, zero: 0, pictures: false };
+    /** The sources that stand side by side, of pictures. @type {PictureSource[]} */
+    this.sources = [];
     /** Taxels whose rest a person set. @type {Zeroing[]} */
     this.zeroed = [];
     /** @type {Picture | null} */
@@ -109,6 +116,8 @@ export class Maps {
     this.words = { pressure: new Uint32Array(256), change: new Uint32Array(256) };
     /** Of the last picture drawn. */
     this.info = { unknown: 0, value: /** @type {number | null} */ (null), rest: /** @type {number | null} */ (null) };
+    /** Colours of a sensor's ground and edge. */
+    this.theme = { ground: "", edge: "" };
     this.colour();
     for (const map of [this.pressure, this.change]) {
       map.frame.addEventListener("pointerdown", (event) => this.point(this.at(map, event)));
@@ -120,26 +129,46 @@ export class Maps {
     }
   }
 
-  /**
-   * @param {number} rows
-   * @param {number} columns
-   * @param {string | null} exists
-   */
-  size(rows, columns, exists) {
-    this.exists = exists;
-    if (rows === this.rows && columns === this.columns) return;
-    [this.rows, this.columns] = [rows, columns];
-    for (const map of [this.pressure, this.change]) map.size(rows, columns, this.aspect);
-    this.rest = new Uint16Array(rows * columns).fill(UNKNOWN_VALUE);
-    this.picture = null;
+  /** @param {import("./protocol.js").ArrayInfo} array @param {PictureSource[]} sources that stand side by side in it */
+  size(array, sources) {
+    const known = JSON.stringify([array, sources]);
+    if (known === this.known) return;
+    this.known = known;
+    const { rows, columns } = this;
+    this.geometry = geometry(array, sources);
+    this.sources = sources;
+    for (const map of [this.pressure, this.change]) map.size(this.geometry);
+    const channels = this.geometry.kind === "channels";
+    write(part("pressure-title", HTMLElement), channels ? "Channels" : "Pressure");
+    if (rows !== this.rows || columns !== this.columns) {
+      this.levels = new Float32Array(this.rows * this.columns);
+      this.rest = new Uint16Array(this.rows * this.columns).fill(UNKNOWN_VALUE);
+      this.picture = null;
+    }
     this.health = null;
-    if (this.taxel && (this.taxel[0] >= columns || this.taxel[1] >= rows)) this.point(null);
+    if (this.taxel && !this.geometry.has(...this.taxel)) this.point(null);
+    // Channels have no map in which one could be chosen by its place.
+    if (channels && !this.taxel) this.point(this.geometry.middle);
     this.mark();
+  }
+
+  get rows() {
+    return this.geometry.rows;
+  }
+
+  get columns() {
+    return this.geometry.columns;
+  }
+
+  /** Which way round the maps are. */
+  get flips() {
+    return { x: this.settings.values.flipX, y: this.settings.values.flipY };
   }
 
   /** Makes the colours again, after the theme or a setting has changed. */
   colour() {
     const { values, theme } = this.settings;
+    this.theme = { ground: themed("raised"), edge: themed("edge") };
     const name = MAPS.includes(values.map) ? values.map : MAPS[0];
     this.words = { pressure: pressureWords(name, theme, values.gamma), change: changeWords(theme, values.gamma) };
     this.pressure.showBar(this.words.pressure);
@@ -158,8 +187,9 @@ export class Maps {
    * @param {number} now_ms
    */
   draw(now_ms) {
-    const { picture, rows, columns, rest, exists, floor } = this;
-    const { flipX, flipY, contrast } = this.settings.values;
+    const { picture, rows, columns, rest, floor } = this;
+    const { exists } = this.geometry;
+    const { contrast } = this.settings.values;
     if (!picture?.pressure || picture.rows !== rows || picture.columns !== columns) return;
     const { pressure, change } = picture;
     let most = 0;
@@ -171,30 +201,32 @@ export class Maps {
     const scale = this.pressureScale.held(most, now_ms);
     const changes = this.changeScale.held(moved, now_ms);
     const ground = UNKNOWN[this.settings.theme].map(word);
-    const [onPressure, onChange] = [this.pressure.pixels, this.change.pixels];
+    const [onPressure, onChange] = [this.pressure.words, this.change.words];
     const { pressure: pressureWord, change: changeWord } = this.words;
     let unknown = 0;
     for (let y = 0; y < rows; y++) {
       for (let x = 0; x < columns; x++) {
         const from = y * columns + x;
-        const to = (flipY ? rows - 1 - y : y) * columns + (flipX ? columns - 1 - x : x);
         if (exists && exists[from] !== "1") {
-          onPressure[to] = onChange[to] = 0;
+          onPressure[from] = onChange[from] = 0;
           continue;
         }
+        this.levels[from] = 0;
         if (pressure[from] === UNKNOWN_VALUE) {
           unknown++;
-          onPressure[to] = ground[(x + y) & 1];
+          onPressure[from] = ground[(x + y) & 1];
         } else {
           const above = rest[from] === UNKNOWN_VALUE ? 0 : pressure[from] - rest[from];
-          onPressure[to] = pressureWord[above > floor ? Math.min(255, Math.round((255 * contrast * above) / scale)) : 0];
+          this.levels[from] = above > floor ? Math.min(1, (contrast * above) / scale) : 0;
+          onPressure[from] = pressureWord[Math.round(255 * this.levels[from])];
         }
         const moves = change ? Math.max(-127, Math.min(127, (127 * contrast * change[from]) / changes)) : 0;
-        onChange[to] = changeWord[128 + Math.round(moves)];
+        onChange[from] = changeWord[128 + Math.round(moves)];
       }
     }
-    this.pressure.show();
-    this.change.show();
+    for (const { canvas, context, words } of [this.pressure, this.change]) {
+      if (canvas.clientWidth) this.geometry.paint(canvas, context, { words, levels: this.levels, ...this.theme }, this.flips);
+    }
     this.info.unknown = unknown;
     const watched = this.taxel ? this.taxel[1] * columns + this.taxel[0] : -1;
     const value = watched < 0 ? UNKNOWN_VALUE : pressure[watched];
@@ -211,22 +243,32 @@ export class Maps {
     write(part("pressure-top", HTMLElement), `${rounded(scale * step)} ${unit}`);
     write(part("change-least", HTMLElement), `−${Math.round(changes)}`);
     write(part("change-top", HTMLElement), `+${Math.round(changes)} ticks`);
-    write(part("rest-from", HTMLElement), this.picture ? REST_FROM[this.picture.restFrom] : "");
+    write(part("rest-from", HTMLElement), this.restFrom());
+    write(part("pressure-above", HTMLElement), !pictures || this.sources.some(({ rest }) => rest === "quiet") ? "above rest" : "");
     const { unknown } = this.info;
     part("unknown", HTMLElement).hidden = unknown === 0;
     write(part("unknown-count", HTMLElement), pictures ? counted(unknown, "missing value") : counted(unknown, "taxel without events", "taxels without events"));
     write(part("taxel-name", HTMLElement), this.named());
     const { value, rest } = this.info;
-    const above = value === null || rest === null || pictures ? "" : `, ${Math.max(0, value - rest)} above rest`;
+    const above = value === null || rest === null || rest === zero ? "" : `, ${rounded(Math.max(0, value - rest) * step)} above rest`;
     const zeroed = this.zeroed.some(({ taxel: [x, y] }) => x === this.taxel?.[0] && y === this.taxel?.[1]) ? ", zeroed" : "";
     write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? (pictures ? "missing" : "no event yet") : `${rounded((value - zero) * step)} ${unit}${above}${zeroed}`);
   }
 
-  /** @returns {string} row, column and traces of the taxel under the crosshair */
+  /** @returns {string} what the shown values are above, of each source where that differs */
+  restFrom() {
+    if (!this.picture) return "";
+    if (!this.values.pictures) return REST_FROM[this.picture.restFrom];
+    const every = this.sources.map(({ name, rest, falls }) => ({ name, text: falls ? FALLS : REST_OF_PICTURES[rest] }));
+    const all = new Set(every.map(({ text }) => text));
+    return all.size === 1 ? every[0].text : every.map(({ name, text }) => `${name}: ${text}`).join("; ");
+  }
+
+  /** @returns {string} the taxel under the crosshair; of a board its traces, too */
   named() {
     if (!this.taxel) return "none: click a map, or use its arrow keys";
     const [x, y] = this.taxel;
-    return `row ${y}, column ${x} · sense line ${y}, driven line ${x}`;
+    return this.geometry.named(this.taxel) + (this.values.pictures ? "" : ` · sense line ${y}, driven line ${x}`);
   }
 
   /**
@@ -236,12 +278,7 @@ export class Maps {
    */
   at(map, event) {
     const box = map.canvas.getBoundingClientRect();
-    const share = (/** @type {number} */ at, /** @type {number} */ of, /** @type {number} */ count) =>
-      Math.max(0, Math.min(count - 1, Math.floor((at / of) * count)));
-    const x = share(event.clientX - box.left, box.width, this.columns);
-    const y = share(event.clientY - box.top, box.height, this.rows);
-    const { flipX, flipY } = this.settings.values;
-    return [flipX ? this.columns - 1 - x : x, flipY ? this.rows - 1 - y : y];
+    return this.geometry.at((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height, this.flips);
   }
 
   /** @param {KeyboardEvent} event */
@@ -254,21 +291,16 @@ export class Maps {
     const move = moves[event.key];
     if (event.key === "Escape" && this.taxel) this.point(null);
     else if (move) {
-      const [x, y] = this.taxel ?? [this.columns >> 1, this.rows >> 1];
-      const held = (/** @type {number} */ at, /** @type {number} */ count) => Math.max(0, Math.min(count - 1, at));
       const [dx, dy] = [move[0] * far * (flipX ? -1 : 1), move[1] * far * (flipY ? -1 : 1)];
-      this.point(this.taxel ? [held(x + dx, this.columns), held(y + dy, this.rows)] : [x, y]);
+      this.point(this.taxel ? this.geometry.moved(this.taxel, [dx, dy]) : this.geometry.middle);
     } else return;
     event.preventDefault();
     event.stopPropagation();
   }
 
-  /**
-   * @returns {number} width over height of a map on the page; a sensor much longer than wide stays within it, and one of few rows
-   *   can be pointed at: its taxels are no squares then
-   */
+  /** @returns {number} width over height of a map on the page */
   get aspect() {
-    return Math.max(1 / 3, Math.min(8, this.columns / Math.max(1, this.rows)));
+    return this.geometry.aspect;
   }
 
   /** @param {[number, number] | null} taxel */
@@ -280,13 +312,17 @@ export class Maps {
     write(part("taxel-info", HTMLElement), taxel ? this.named() : "no taxel watched");
   }
 
+  /** The name of a source, over its taxels. @param {PictureSource} source @returns {HTMLElement} */
+  nameOf({ name, left, columns }) {
+    const ends = [left, left + columns - 1].map((x) => this.geometry.place([x, 0], this.flips)[0]);
+    const label = make("span", {}, name);
+    label.style.left = `${50 * (ends[0] + ends[1])}%`;
+    return label;
+  }
+
   /** Puts crosshair and marks where they belong. */
   mark() {
-    const { flipX, flipY } = this.settings.values;
-    const place = (/** @type {[number, number]} */ [x, y]) => [
-      ((flipX ? this.columns - 1 - x : x) + 0.5) / this.columns,
-      ((flipY ? this.rows - 1 - y : y) + 0.5) / this.rows,
-    ];
+    const place = (/** @type {[number, number]} */ taxel) => this.geometry.place(taxel, this.flips);
     for (const map of [this.pressure, this.change]) {
       map.lines.hidden = !this.taxel;
       if (this.taxel) {
@@ -296,7 +332,7 @@ export class Maps {
       }
       map.marks.replaceChildren();
       const put = (/** @type {[number, number]} */ taxel, /** @type {string} */ kind, more = "") => {
-        const mark = make("span", { class: `unwell ${kind}`, title: `${kind}: row ${taxel[1]}, column ${taxel[0]}${more}` });
+        const mark = make("span", { class: `unwell ${kind}`, title: `${kind}: ${this.geometry.named(taxel)}${more}` });
         const [left, top] = place(taxel);
         // On the edge it is whole, too.
         mark.style.left = `clamp(6px, ${100 * left}%, 100% - 6px)`;
@@ -305,6 +341,7 @@ export class Maps {
       };
       for (const kind of /** @type {const} */ (["dead", "stuck", "noisy"])) for (const taxel of this.health?.[kind] ?? []) put(taxel, kind);
       for (const { taxel, rest } of this.zeroed) put(taxel, "zeroed", `, rests at ${rest} ticks`);
+      map.sources.replaceChildren(...(this.sources.length > 1 ? this.sources.map((source) => this.nameOf(source)) : []));
     }
   }
 }

@@ -16,9 +16,10 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "presets", built_in: string[], own: Record<string, Record<string, number>>, path: string }} Presets
  * @typedef {{ count: number, p50_us: number | null, p99_us: number | null, max_us: number | null }} Latency
  * @typedef {{ state: "nothing" | "arriving" | "quiet" | "lost", since_ns: number | null, silent_s: number, heartbeat_us: number | null }} Arrival
+ * @typedef {{ drift_ppm: number, delay: Latency, doubt: string | null }} Pace
  * @typedef {{ type: "counters", seconds: number, board_us: number | null, events: number, events_per_s: number | null, bytes_per_s: number | null,
  *   frames_per_s: number | null, lost: Record<string, number>, queue: number | null, latency: Record<string, Latency>, detections: number,
- *   wire_version: number | null, taring: boolean, arrival: Arrival, reach_us: [number, number] | null, reach_bytes: number, viewers: number }} Counters
+ *   wire_version: number | null, taring: boolean, arrival: Arrival, pace: Pace | null, reach_us: [number, number] | null, reach_bytes: number, viewers: number }} Counters
  * @typedef {{ type: "detection", label: string, t_us: number, known_us: number, latency_us: number | null }} Detection
  * @typedef {{ type: "spikes", encoder: string, trains: number, signed: boolean, t_ms: number[], train: number[], value: number[] | null,
  *   left_out: number, latency_ms: number }} Spikes
@@ -27,18 +28,20 @@ export const UNKNOWN_VALUE = 65535;
  *   last: { file: string, verdict: string } | null, error: string | null }} Recorder
  * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileInfo
  * @typedef {{ type: "recordings", folder: string, files: FileInfo[], readouts: string[] }} Recordings
- * @typedef {{ count: number, unit: string, step: number, zero: number, picture_us: number | null,
- *   sources: { name: string, left: number, rows: number, columns: number }[], trial: string | null, trials: string[], left_s: number | null }} Pictures
+ * @typedef {{ name: string, left: number, rows: number, columns: number, rest: "given" | "quiet" | "none", falls: boolean }} PictureSource
+ * @typedef {{ count: number, unit: string, step: number, zero: number, floor: number, newtons: number | null, picture_us: number | null,
+ *   sources: PictureSource[], trial: string | null, trials: string[], left_s: number | null }} Pictures
+ * @typedef {{ t_us: number | null, text: string, source: string }} RecordedNote
  * @typedef {{ type: "loading", name: string, share: number }} Loading
  * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null,
  *   touch_us: number | null, events: number, bytes: number, pictures: Pictures | null,
- *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null,
+ *   verdict: string, unfinished: boolean, pace: Pace | null, registers: Record<string, number | boolean> | null,
  *   frame_us: number | null, markers: { t_us: number, start: boolean }[],
- *   notes: { t_us: number | null, text: string }[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
+ *   notes: RecordedNote[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
  * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[],
  *   force: number[] }} Overview
  * @typedef {{ type: "transport", source: string | null, state: "following" | "playing" | "paused", speed: number, t_us: number | null }} Transport
- * @typedef {{ label_id: number, label: string, t_us: number }} Label
+ * @typedef {{ label_id: number, label: string, t_us: number, source: string, trial: string, replaces_us: number | null }} Label
  * @typedef {{ type: "labels", name: string, path: string, labels: Label[] }} Labels
  * @typedef {[number, number]} Taxel column and row
  * @typedef {{ type: "health", source: string | null, taxels: number, heard: number, dead: Taxel[], stuck: Taxel[], noisy: Taxel[], untold: number }} Health
@@ -82,6 +85,7 @@ export const UNKNOWN_VALUE = 65535;
  * @property {Uint16Array | null} rest
  * @property {"given" | "quiet" | "none"} restFrom where the rest comes from
  * @property {Uint8Array | null} spikes of the encoder, as the raster
+ * @property {Uint16Array | null} channels ticks above rest of each channel, column after column
  */
 
 /**
@@ -133,5 +137,6 @@ export function readPicture(buffer) {
     history: words(4, Uint16Array),
     rest: words(5, Uint16Array),
     spikes: words(6, Uint8Array),
+    channels: words(7, Uint16Array),
   };
 }

@@ -29,7 +29,7 @@ export const FIELDS = [
   { name: "line_period", manual: "row_change_period", register: 1, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Time from one driven line to the next." },
   { name: "line_read", manual: "row_read_duration", register: 2, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Part of line_period in which the line is read." },
   { name: "step_period", manual: "col_change_period", register: 3, low: 0, bits: 16, offset: 0, unit: "10 ns", default: 75, least: 1, greatest: 65535, text: "Time from one multiplexer step to the next." },
-  { name: "step_read", manual: "col_read_duration", register: 3, low: 16, bits: 16, offset: 0, unit: "10 ns", default: 55, least: 1, greatest: 65535, text: "Part of step_period in which the channels are read." },
+  { name: "step_read", manual: "col_read_duration", register: 3, low: 16, bits: 16, offset: 0, unit: "10 ns", default: 55, least: 4, greatest: 65535, text: "Part of step_period in which the channels are read." },
   { name: "ramp", manual: "ramp_time", register: 4, low: 0, bits: 16, offset: 0, unit: "ticks", default: 150, least: 1, greatest: 65534, text: "Duration of the ramp." },
   { name: "threshold_rest", manual: "threshold_rest", register: 4, low: 16, bits: 16, offset: 0, unit: "1/1024", default: 0, least: 0, greatest: 65535, text: "FA-1: theta_0, in ticks after the power law." },
   { name: "threshold_decay", manual: "threshold_decay", register: 5, low: 0, bits: 8, offset: 0, unit: "1/1024 theta_0", default: 0, least: 0, greatest: 255, text: "FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3." },
@@ -78,7 +78,7 @@ export function refused(v) {
   if (step_read > step_period) broken.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
   if (steps * step_period > line_read) broken.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });
   if (ramp >= 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks is not shorter than step_read ${us(step_read)} us = ${3 * step_read} ticks (rule 3)` });
-  if (ramp + 3 > 3 * step_period) broken.push({ rule: 3, text: `ramp ${ramp} ticks leaves no 3 ticks of step_period ${us(step_period)} us = ${3 * step_period} ticks in which it falls (rule 3)` });
+  if (ramp + 5 > 3 * step_period) broken.push({ rule: 3, text: `ramp ${ramp} ticks leaves no 5 ticks of step_period ${us(step_period)} us = ${3 * step_period} ticks in which it falls (rule 3)` });
   if (channels + 10 > step_period) broken.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one a clock and wants ${us(channels + 10)} us (rule 7)` });
   if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `version 1 of the wire names 64 x 64 taxels, the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
   return broken;

@@ -38,14 +38,15 @@ function silence(counters, place) {
  * @param {Opened | null} opened
  * @param {Recorder | null} recorder
  * @param {Counters | null} counters
+ * @param {string | null} opening the recording that is being read
  */
-export function showState({ connected, why }, { source, state }, hello, opened, recorder, counters) {
+export function showState({ connected, why }, { source, state }, hello, opened, recorder, counters, opening) {
   const recording = recorder?.state === "recording" ? recorder : null;
   const silent = connected && source === null && hello?.live ? silence(counters, hello.udp ? `UDP ${hello.udp}` : "the bridge's address") : null;
   const [kind, word] = !connected
     ? ["lost", why ? "No connection" : "Connecting"]
     : source !== null || !hello?.live
-      ? ["replay", source === null ? "No recording" : "Replay"]
+      ? ["replay", opening !== null ? "Opening" : source === null ? "No recording" : "Replay"]
       : state !== "following"
         ? ["held", state === "playing" ? "Earlier" : "Held"]
         : silent
@@ -55,12 +56,13 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const pill = part("state", HTMLElement);
   pill.dataset.kind = recording && kind !== "lost" ? "rec" : kind;
   write(part("state-word", HTMLElement), recording && kind !== "lost" ? `${word === "Live" ? "" : `${word}, `}Recording ${recording.file ?? ""}` : word);
+  const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const banner = part("silence", HTMLElement);
-  banner.hidden = !silent;
-  write(banner, silent?.text ?? "");
+  banner.hidden = !silent && !doubt;
+  write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`].filter(Boolean).join(" "));
   const array = opened?.array ?? hello?.array;
   const shape = array ? `${array.rows} × ${array.columns}` : "";
-  const place = !connected ? why : source !== null ? `${source} · ${opened?.verdict ?? ""}` : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
+  const place = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? `${source} · ${opened?.verdict ?? ""}` : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
   const text = [place, shape].filter(Boolean).join(" · ");
   write(part("source", HTMLElement), text);
   part("source", HTMLElement).title = text;

@@ -1,7 +1,7 @@
 // The whole recording, or the past of the live source as far as it can be viewed: force and marks; click or drag to move there.
 
 import { fitted, ground, part, themed } from "./dom.js";
-import { seconds } from "./words.js";
+import { seconds, writtenTime } from "./words.js";
 
 /** @typedef {import("./protocol.js").Overview} Overview */
 /** @typedef {import("./player.js").Player} Player */
@@ -120,9 +120,9 @@ export class Strip {
   write() {
     const { reach, t_us } = this.player;
     const { canvas } = this;
-    canvas.setAttribute("aria-valuemin", ((reach?.[0] ?? 0) / 1e6).toFixed(3));
-    canvas.setAttribute("aria-valuemax", ((reach?.[1] ?? 0) / 1e6).toFixed(3));
-    canvas.setAttribute("aria-valuenow", ((t_us ?? 0) / 1e6).toFixed(3));
+    canvas.setAttribute("aria-valuemin", writtenTime(reach?.[0] ?? 0));
+    canvas.setAttribute("aria-valuemax", writtenTime(reach?.[1] ?? 0));
+    canvas.setAttribute("aria-valuenow", writtenTime(t_us ?? 0));
     canvas.setAttribute("aria-valuetext", reach ? `${seconds(t_us)} of ${seconds(reach[0])} to ${seconds(reach[1])}` : "nothing yet");
   }
 }

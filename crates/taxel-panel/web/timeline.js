@@ -1,7 +1,7 @@
 // What the lanes show, by columns of time; the window of time that is shown, and the one time cursor that every view shares.
 
 import { UNKNOWN_VALUE } from "./protocol.js";
-import { seconds, short } from "./words.js";
+import { numbering, seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
 /** @typedef {{ share: number, text: string }} Tick */
@@ -27,6 +27,9 @@ export class Timeline {
     this.x = new Float32Array(SPAN);
     this.y = new Float32Array(SPAN);
     this.history = new Uint16Array(SPAN * 3);
+    /** How many channels have a curve each, and their ticks above rest, column after column. */
+    this.channel_count = 0;
+    this.channels = new Uint16Array(0);
     this.number = new Float64Array(SPAN);
     /** The window, us from its left edge to its right one; null before the first picture. @type {[number, number] | null} */
     this.window = null;
@@ -72,7 +75,9 @@ export class Timeline {
       const end = (Math.floor(picture.t_us / this.column_us) + 1) * this.column_us;
       this.window = [end - this.span_us, end];
     }
-    const { first, count, raster, spikes, sums, centres, history } = picture;
+    const { first, count, raster, spikes, sums, centres, history, channels } = picture;
+    const each = channels && count ? channels.length / count : this.channel_count;
+    if (each !== this.channel_count) [this.channel_count, this.channels] = [each, new Uint16Array(SPAN * each)];
     for (let i = 0; i < count; i++) {
       const place = this.place(first + i);
       this.number[place] = first + i;
@@ -85,6 +90,7 @@ export class Timeline {
         this.x[place] = centres[4 * i + 2];
         this.y[place] = centres[4 * i + 3];
       }
+      if (channels) this.channels.set(channels.subarray(i * each, (i + 1) * each), place * each);
       if (history) this.history.set(history.subarray(3 * i, 3 * i + 3), 3 * place);
       else this.history.fill(UNKNOWN_VALUE, 3 * place, 3 * place + 3);
     }
@@ -126,7 +132,7 @@ export class Timeline {
   ticks(most) {
     if (!this.window) return [];
     const [from, to] = this.window;
-    const zero = this.following ? to : 0;
+    const zero = this.following ? to : numbering.begin_us;
     const least = this.span_us / Math.max(2, most);
     const power = 10 ** Math.floor(Math.log10(least));
     const step = Math.max(1, (STEPS.find((times) => times * power >= least) ?? 10) * power);
@@ -134,7 +140,7 @@ export class Timeline {
     const ticks = [];
     for (let k = Math.ceil((from - zero) / step); k * step + zero <= to; k++) {
       const behind = -k * step;
-      ticks.push({ share: (k * step + zero - from) / this.span_us, text: this.following ? (behind ? `−${short(behind)}` : "now") : seconds(k * step, places) });
+      ticks.push({ share: (k * step + zero - from) / this.span_us, text: this.following ? (behind ? `−${short(behind)}` : "now") : seconds(k * step + zero, places) });
     }
     return ticks;
   }

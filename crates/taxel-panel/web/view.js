@@ -105,7 +105,12 @@ export class View {
     if (!name && this.settings.values.raster === "changes") return;
     this.server.request({ type: "encode", encoder: name ? { name } : null }).then(() => {
       this.settings.set("raster", name ? "spikes" : "changes");
-    }, this.failed);
+    }, (error) => {
+      // The server encodes nothing any more.
+      this.encoder.value = "";
+      this.settings.set("raster", "changes");
+      this.failed(error);
+    });
   }
 
   /** @param {"now" | "lowest"} how */

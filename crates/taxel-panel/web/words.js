@@ -1,17 +1,41 @@
 // Numbers as people read them.
 
-/** How times are written: in seconds; of pictures without times, by their numbers, which are so many us apart. */
-export const numbering = { picture_us: /** @type {number | null} */ (null) };
+/** Times from here on are taken to count from 1970, as those of ROS bags do, us: it is 2001-09-09. */
+const SINCE_1970_US = 1e15;
+
+/**
+ * How times are written: in seconds, from `begin_us` on; of pictures without times, by their numbers, which are so many us apart.
+ */
+export const numbering = { picture_us: /** @type {number | null} */ (null), begin_us: 0 };
+
+/** @param {number | null} start_us of a recording @returns {number} where its times are counted from, us: at its begin, if they count from 1970 */
+export const beginning = (start_us) => (start_us !== null && start_us >= SINCE_1970_US ? start_us : 0);
+
+/** @returns {string} date and time at 0 s; "" where times do not count from 1970 */
+export const begun = () => (numbering.begin_us ? `${new Date(numbering.begin_us / 1000).toISOString().replace("T", " ").replace("Z", "")} UTC` : "");
+
+/** @param {number} us @param {number} [places] @returns {string} the number that is written: seconds, or that of a picture */
+export const writtenTime = (us, places = 3) =>
+  numbering.picture_us ? String(Math.floor(us / numbering.picture_us)) : ((us - numbering.begin_us) / 1e6).toFixed(places);
+
+/** @param {string} written @returns {number} us; not a number for other text */
+export const readTime = (written) => {
+  const number = Number(written.replace(",", "."));
+  return numbering.picture_us ? Math.round(number) * numbering.picture_us : Math.round(number * 1e6) + numbering.begin_us;
+};
+
+/** @returns {"pictures" | "seconds"} what a time is a number of */
+export const timeUnit = () => (numbering.picture_us ? "pictures" : "seconds");
 
 /** @param {number | null} us @param {number} [places] @returns {string} seconds, or the number of a picture */
 export const seconds = (us, places = 3) =>
-  us === null ? "–" : numbering.picture_us ? `picture ${whole(Math.floor(us / numbering.picture_us))}` : `${(us / 1e6).toFixed(places)} s`;
+  us === null ? "–" : numbering.picture_us ? `picture ${whole(Math.floor(us / numbering.picture_us))}` : `${writtenTime(us, places)} s`;
 
 /** @param {number} value @returns {string} in three digits, as many as a curve or a map shows */
 export const rounded = (value) => (Math.abs(value) >= 100 ? whole(value) : String(Number(value.toPrecision(3))));
 
 /** @param {number} value @returns {string} a whole number, in groups of three */
-export const whole = (value) => Math.round(value).toLocaleString("en");
+export const whole = (value) => (Math.round(value) || 0).toLocaleString("en");
 
 /**
  * @param {number} count

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::learn::{self as core_learn, ConeX, ConeXFit, Fit, Left, Margin, Round, Row, Stated};
+use taxel_core::learn::{self as core_learn, ConeX, ConeXFit, Fit, GapMultipliers, Left, Margin, Round, Row, Stated};
 use taxel_core::problem;
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
@@ -46,20 +46,31 @@ fn from_row(row: Row) -> Name {
 }
 
 /// Rows and their multipliers.
-type Weighed<'py> = (Vec<Name>, Bound<'py, PyArray1<f64>>);
+pub(crate) type Weighed<'py> = (Vec<Name>, Bound<'py, PyArray1<f64>>);
 
-fn weighed<'py>(py: Python<'py>, rows: &[(Row, f64)]) -> Weighed<'py> {
+pub(crate) fn weighed<'py>(py: Python<'py>, rows: &[(Row, f64)]) -> Weighed<'py> {
     (rows.iter().map(|r| from_row(r.0)).collect(), array(py, rows.iter().map(|r| r.1).collect()))
+}
+
+/// The proof of a gap as Python gets it: multipliers of rows, of B by target, of the l2 term by synapse.
+pub(crate) type ProofOut<'py> =
+    (Weighed<'py>, (Vec<(usize, usize)>, Bound<'py, PyArray1<f64>>), Bound<'py, PyArray1<f64>>);
+
+pub(crate) fn proof_out(py: Python<'_>, proof: GapMultipliers) -> ProofOut<'_> {
+    let (behind, slopes): (Vec<_>, Vec<_>) = proof.behind.into_iter().unzip();
+    (weighed(py, &proof.rows), (behind, array(py, slopes)), array(py, proof.pull))
 }
 
 /// A certificate as Python gets it: rows and multipliers, gap, whether it needs no margin, its explanation.
 type CertificateOut<'py> = (Weighed<'py>, f64, bool, String);
 
 /// A fit as Python gets it: status, weights, objective, parts, gap, violation, margins that hold and were asked for, engine, rounds,
-/// held rows, certificate, why it is stopped; and the exception of a signal that came meanwhile.
+/// held rows, certificate, why it is stopped; the multipliers that prove its gap; and the exception of a signal that
+/// came meanwhile.
 type FitOut<'py> = (
     (&'static str, Bound<'py, PyArray1<f64>>, f64, [f64; 3], f64, f64),
     ([(f64, f64); 2], &'static str, usize, Weighed<'py>, Option<CertificateOut<'py>>, Option<String>),
+    Option<ProofOut<'py>>,
     Option<Py<PyAny>>,
 );
 
@@ -137,7 +148,7 @@ impl ConeXProblem {
             };
             self.problem.fit(&start, &mut report, stop)
         })?;
-        let ConeXFit { fit, violation, margin, asked, reason, held, certificate } = found;
+        let ConeXFit { fit, violation, margin, asked, reason, held, certificate, proof } = found;
         let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
         let parts = [parts.l1, parts.l2, parts.B];
         let certificate = certificate.map(|c| (weighed(py, &c.rows), c.gap, c.at_all, c.text));
@@ -145,6 +156,7 @@ impl ConeXProblem {
         Ok((
             (status.name(), array(py, weights), objective, parts, gap, violation),
             ([margin, asked].map(|m| (m.height, m.slope)), engine.name(), rounds, held, certificate, reason),
+            proof.map(|proof| proof_out(py, proof)),
             signal,
         ))
     }

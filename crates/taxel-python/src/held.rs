@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
 use taxel_core::rest::{Rest, Value, touched_from};
-use taxel_core::touch_counts::{BIN_US, Counts, TouchCounts};
+use taxel_core::touch_counts::{BIN_US, TouchCounts};
 use taxel_core::tracked_rest::TrackedRest;
 use taxel_core::{Error, problem};
 
@@ -100,17 +100,19 @@ fn above_rest<'py>(
     Ok(array(py, found))
 }
 
-/// The rest of pictures that nobody tared: `columns` of the array, its noise floor, and the rest of each taxel to begin
-/// with (NaN where unknown).
+/// The rest of pictures without a tare: `columns` of the array, its noise floor, the rest of each taxel to begin
+/// with (NaN where unknown), and whether values fall from it with pressure.
 #[pyclass(frozen, name = "TrackedRest", module = "taxel._core")]
 struct PyTrackedRest(Shared<TrackedRest>);
 
 #[pymethods]
 impl PyTrackedRest {
     #[new]
-    fn new(columns: usize, noise_floor: f64, begins: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
+    #[pyo3(signature = (columns, noise_floor, begins, falls=false))]
+    fn new(columns: usize, noise_floor: f64, begins: PyReadonlyArray1<'_, f64>, falls: bool) -> PyResult<Self> {
         let begins = slice("begins", &begins)?.iter().map(|&rest| if rest.is_nan() { f64::NO_REST } else { rest });
-        Ok(Self(Shared::new(TrackedRest::new(columns, noise_floor, begins.collect()))))
+        let rest = TrackedRest::new(columns, noise_floor, begins.collect());
+        Ok(Self(Shared::new(if falls { rest.falling() } else { rest })))
     }
 
     /// Reads pictures at `t` us, one after the other in `values` (NaN where a taxel has none); returns them above the
@@ -144,7 +146,7 @@ impl PyTrackedRest {
         self.0.with(py, |rest| rest.quiet())
     }
 
-    /// The rest of each taxel in its first quiet stretch, or in a later one far below it; NaN for one without any.
+    /// The rest of each taxel in its first quiet stretch, or in a later one in which it was released; NaN for one without any.
     #[getter]
     fn begins<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let known = |&rest: &f64| if rest == f64::NO_REST { f64::NAN } else { rest };
@@ -152,14 +154,18 @@ impl PyTrackedRest {
     }
 }
 
-/// Counts of touches as rows of five numbers by taxel: touches, missed, pressed, changed, by itself.
-pub(crate) fn by_taxel(counts: &[Counts]) -> Vec<u32> {
-    counts.iter().flat_map(|c| [c.touches, c.missed, c.pressed, c.changed, c.by_itself]).collect()
+/// The indices of counted taxels, and their counts of touches in rows of five: touches, missed, pressed, changed, by itself.
+pub(crate) type TouchesOut<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
+
+/// Counts of touches for Python; taxels that are not among them have none.
+pub(crate) fn from_touches<'py>(py: Python<'py>, of: &TouchCounts) -> TouchesOut<'py> {
+    let counts = of.counts().iter().flat_map(|c| [c.touches, c.missed, c.pressed, c.changed, c.by_itself]);
+    (array(py, of.taxels().to_vec()), array(py, counts.collect()))
 }
 
-/// The counts of touches of events, by taxel.
+/// The counts of touches of events.
 #[pyfunction]
-fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<TouchesOut<'py>> {
     let events = to_events(events)?;
     let events = events.view()?;
     let counts = enter(py, |stop| {
@@ -176,17 +182,17 @@ fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bo
         if let Some(&last) = events.t.last() {
             counts.advance(last.saturating_add(2 * BIN_US));
         }
-        Ok::<_, Error>(by_taxel(counts.counts()))
+        Ok::<_, Error>(counts)
     })?;
-    Ok(array(py, counts))
+    Ok(from_touches(py, &counts))
 }
 
 /// The change of a picture's value that counts, ticks: above the noise floor of the board's fast presets.
 const NOISE_FLOOR: f32 = 3.0;
 
-/// The counts of touches of pictures in ticks, by taxel; `rest` of all of them, NaN where it is to be tracked.
+/// The counts of touches of pictures in ticks; `rest` of all of them, NaN where it is to be tracked.
 #[pyfunction]
-fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> PyResult<Bound<'py, PyArray1<u32>>> {
+fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> PyResult<TouchesOut<'py>> {
     let frames = to_frames(frames)?;
     let frames = frames.view()?;
     let counts = enter(py, |stop| {
@@ -207,9 +213,20 @@ fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> 
         if let Some(&last) = frames.t.last() {
             counts.advance(last.saturating_add(2 * BIN_US));
         }
-        Ok::<_, Error>(by_taxel(counts.counts()))
+        Ok::<_, Error>(counts)
     })?;
-    Ok(array(py, counts))
+    Ok(from_touches(py, &counts))
+}
+
+/// Number of changes of each taxel of pictures, and of those in the direction of the one before.
+type ChangesOut<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
+
+#[pyfunction]
+fn changes_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>) -> PyResult<ChangesOut<'py>> {
+    let frames = to_frames(frames)?;
+    let frames = frames.view()?;
+    let changes = enter(py, |stop| frames.changes(stop))?;
+    Ok((array(py, changes.number), array(py, changes.on)))
 }
 
 /// What a touched taxel reads above rest at least, for a board's noise floor.
@@ -226,5 +243,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(above_rest, module)?)?;
     module.add_function(wrap_pyfunction!(touches_of_events, module)?)?;
     module.add_function(wrap_pyfunction!(touches_of_frames, module)?)?;
+    module.add_function(wrap_pyfunction!(changes_of_frames, module)?)?;
     module.add_function(wrap_pyfunction!(touched_above, module)?)
 }

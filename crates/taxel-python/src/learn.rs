@@ -7,6 +7,7 @@ use taxel_core::learn as core_learn;
 use taxel_core::learn::{ConeR, ConeRFit, Engine, Fit, Left, Round, Shares, Status, Stdp, StdpNeuron};
 use taxel_core::problem;
 
+use crate::cone_x::{ProofOut, proof_out};
 use crate::convert::{SpikesIn, array, slice, to_spikes};
 use crate::enter::{Shared, enter, enter_keeping};
 use crate::errors::core;
@@ -27,11 +28,12 @@ pub(crate) fn to_online(json: &str) -> PyResult<(ConeR, usize)> {
     Ok((to_cone_r(&Value::Object(given).to_string())?, window))
 }
 
-/// Multipliers as Python holds them: rows, and a share each.
+/// Multipliers of a start as Python holds them: rows, and a share each.
 type MultipliersOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
 type MultipliersIn<'py> = (PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f64>);
 
-/// A fit as Python gets it: weights, objective, parts, gap; rounds, rows, solved, native; unreachable, refires; multipliers.
+/// A fit as Python gets it: weights, objective, parts, gap; rounds, rows, solved, native; unreachable, refires; multipliers
+/// of a start; multipliers that prove the gap.
 type FitOut<'py> = (
     Bound<'py, PyArray1<f64>>,
     f64,
@@ -40,6 +42,7 @@ type FitOut<'py> = (
     (usize, usize, bool, bool),
     (Vec<(usize, usize)>, usize),
     MultipliersOut<'py>,
+    ProofOut<'py>,
 );
 
 /// The rows of one set of examples.
@@ -199,13 +202,13 @@ fn to_start<'a>((weights, multipliers): &'a StartIn<'_>) -> PyResult<(&'a [f64],
 }
 
 fn fit_out(py: Python<'_>, found: ConeRFit) -> FitOut<'_> {
-    let ConeRFit { fit, rows, multipliers, unreachable, refires } = found;
+    let ConeRFit { fit, rows, multipliers, proof, unreachable, refires } = found;
     let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
     let parts = [parts.l1, parts.l2, parts.B, parts.C, parts.D];
     let how = (rounds, rows, status == Status::Solved, engine == Engine::Native);
     let numbers = multipliers.rows.iter().map(|&row| row as i64).collect();
     let multipliers = (array(py, numbers), array(py, multipliers.values));
-    (array(py, weights), objective, parts, gap, how, (unreachable, refires), multipliers)
+    (array(py, weights), objective, parts, gap, how, (unreachable, refires), multipliers, proof_out(py, proof))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

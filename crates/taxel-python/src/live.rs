@@ -239,7 +239,12 @@ impl Live {
 
     /// Counts of what came and what became of it: JSON.
     fn counters(&self, py: Python<'_>) -> PyResult<String> {
-        self.with(py, |pipeline| Ok(json!(pipeline.counters()).to_string()))
+        self.with(py, |pipeline| {
+            let counters = pipeline.counters();
+            let mut all = json!(counters);
+            all["arrival"] = json!(counters.arrival(taxel_live::recording::now_ns()));
+            Ok(all.to_string())
+        })
     }
 
     /// The values that the taxels hold, ticks, by taxel index.

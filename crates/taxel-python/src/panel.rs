@@ -9,19 +9,21 @@ use pyo3::types::PyDict;
 use taxel_core::Array;
 use taxel_core::detect::Detection;
 use taxel_core::held::UNKNOWN;
+use taxel_core::rest::Value;
 use taxel_core::wire::Command;
 use taxel_live::address::of_host;
 use taxel_live::recording::{Note, Remarks};
 use taxel_panel::assets::asset;
 use taxel_panel::{
     Activity, BoardLines, Cut, LabelRow, Opening, Panel as Server, PanelOptions, PictureFile, PictureIndex,
-    PicturePlace, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler, UnhealthyTaxels, UserPreset, UserPresets,
+    PicturePlace, PictureRest, PictureSource, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler, RestSource,
+    UnhealthyTaxels, UserPreset, UserPresets,
 };
 
 use crate::convert::{ArrayParts, array, from_array, slice, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core};
-use crate::held::by_taxel;
+use crate::held::from_touches;
 use crate::live::Live;
 use crate::parameters::parsed;
 use crate::threaded::Threaded;
@@ -83,10 +85,14 @@ impl RequestHandler for PythonHandler {
             let py = handler.py();
             let values = known.then(|| (array(py, activity.values.clone()), array(py, least), array(py, greatest)));
             let counts = (array(py, activity.events.clone()), array(py, activity.moved.clone()));
-            let touches = array(py, by_taxel(activity.touches.counts()));
+            let touches = from_touches(py, &activity.touches);
             handler.call_method1("health", (from_array(sensor), counts.0, counts.1, touches, values))?.extract()
         })?;
         Ok(UnhealthyTaxels { dead, stuck, noisy, untold })
+    }
+
+    fn recordings(&self, folder: &Path) -> Reply<Vec<String>> {
+        self.call(|handler| handler.call_method1("recordings", (folder,))?.extract())
     }
 
     fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile> {
@@ -123,8 +129,8 @@ impl RequestHandler for PythonHandler {
         self.call(|handler| handler.call_method0("end_training").map(drop))
     }
 
-    fn detect(&self, recording: &Path, readout: &Path) -> Reply<Vec<(String, i64, i64)>> {
-        self.call(|handler| handler.call_method1("detect", (recording, readout))?.extract())
+    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Vec<(String, i64, i64)>> {
+        self.call(|handler| handler.call_method1("detect", (recording, trial, readout))?.extract())
     }
 
     fn read_out(&self, readout: &Path) -> Reply<()> {
@@ -132,13 +138,16 @@ impl RequestHandler for PythonHandler {
     }
 
     fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>> {
-        let rows: Vec<(String, i64, String)> =
+        let rows: Vec<(String, i64, String, String, Option<i64>)> =
             self.call(|handler| handler.call_method1("read_labels", (table, recording))?.extract())?;
-        Ok(rows.into_iter().map(|(label, t_us, source)| LabelRow { label, t_us, source }).collect())
+        let row = |(label, t_us, source, trial, replaces_us)| LabelRow { label, t_us, source, trial, replaces_us };
+        Ok(rows.into_iter().map(row).collect())
     }
 
     fn write_labels(&self, table: &Path, labels: &[LabelRow]) -> Reply<()> {
-        let rows: Vec<_> = labels.iter().map(|row| (row.label.as_str(), row.t_us, row.source.as_str())).collect();
+        let row =
+            |row: &LabelRow| (row.label.clone(), row.t_us, row.source.clone(), row.trial.clone(), row.replaces_us);
+        let rows: Vec<_> = labels.iter().map(row).collect();
         self.call(|handler| handler.call_method1("write_labels", (table, rows)).map(drop))
     }
 
@@ -175,40 +184,55 @@ impl RequestHandler for PythonHandler {
     }
 }
 
-/// A source of pictures: name, first column, rows, columns, times (us), values.
-type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>);
+/// A source of pictures: name, first column, rows, columns, times (us), values, rest.
+type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>, RestIn<'py>);
+
+/// The rest of a source: where it is known from, that of each cell (NaN where unknown), ticks by the unit, and
+/// whether values fall from it.
+type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, bool);
 
 /// Pictures as Python has read them: the array of all sources, the sources; unit, time from one picture to the next if they
-/// are numbered (us), notes (time, text) and detections (label, time, known) as JSON, the verdict, the trial and all
+/// are numbered (us), notes (time, text, source) and detections (label, time, known) as JSON, the verdict, the trial and all
 /// trials of the file, how long the rest of the file takes (s).
 type PicturesIn<'py> =
     (ArrayParts, Vec<SourceIn<'py>>, String, Option<i64>, String, String, Option<String>, Vec<String>, Option<f64>);
 
-/// Notes (time, text) and detections (label, time, known) of pictures.
-type RemarksIn = (Vec<(Option<i64>, String)>, Vec<(String, i64, i64)>);
+/// Notes (time, text, source) and detections (label, time, known) of pictures.
+type RemarksIn = (Vec<(Option<i64>, String, String)>, Vec<(String, i64, i64)>);
 
 fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> {
     let (array, sources, unit, picture_us, remarks, verdict, trial, trials, left_s) = pictures;
     let array = to_array(array)?;
     let (notes, detections): RemarksIn = parsed("remarks", &remarks)?;
+    let (notes, note_sources) =
+        notes.into_iter().map(|(t_us, text, source)| (Note { at_ns: 0, t_us, text }, source)).unzip();
     let remarks = Remarks {
-        notes: notes.into_iter().map(|(t_us, text)| Note { at_ns: 0, t_us, text }).collect(),
+        notes,
         detections: detections
             .into_iter()
             .map(|(label, t, known)| (0, Detection { label, t, known, slope: f64::NAN, repaired: false }))
             .collect(),
         ..Remarks::default()
     };
-    let file = PictureFile { unit, picture_us, remarks, verdict, trial, trials, left_s };
+    let file = PictureFile { unit, picture_us, remarks, note_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
-    for (name, left, rows, columns, t, values) in &sources {
-        let (t, values) = (slice("t", t)?, slice("values", values)?);
+    for (name, left, rows, columns, t, values, (rest, rests, ticks_by_unit, falls)) in &sources {
+        let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", rests)?);
         let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
-        if !inside || values.len() != t.len() * usize::from(*rows) * usize::from(*columns) {
+        let cells = usize::from(*rows) * usize::from(*columns);
+        if !inside || values.len() != t.len() * cells || rests.len() != cells {
             return Err(ProblemError::new_err(format!("source {name}: does not fit the array")));
         }
+        let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
+        let rest = PictureRest {
+            source: RestSource::named(rest)
+                .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {rest:?} is none")))?,
+            values: rests.iter().map(known).collect(),
+            ticks_by_unit: *ticks_by_unit,
+            falls: *falls,
+        };
         let place = PicturePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
-        placed.push((place, t.to_vec(), values));
+        placed.push(PictureSource { place, t: t.to_vec(), values, rest });
     }
     enter(py, |_| Ok::<_, taxel_core::Error>(PictureIndex::new(array, file, placed)))
 }
@@ -239,6 +263,7 @@ impl Panel {
         port: u16,
         folder: PathBuf,
         opened: Option<String>,
+        open_by_handler: bool,
         control: Option<String>,
         registers_stated: bool,
         readout: Option<Vec<String>>,
@@ -248,7 +273,8 @@ impl Panel {
         let handle = live.map(|live| live.handle(py)).transpose()?;
         let server = enter(py, |_| {
             let address = of_host(host, port)?;
-            let options = PanelOptions { address, folder, open: opened, control, registers_stated, readout };
+            let options =
+                PanelOptions { address, folder, open: opened, open_by_handler, control, registers_stated, readout };
             Server::start(options, handle, Box::new(PythonHandler(requests)))
         })?;
         Ok(Self(Threaded::new("panel", "panel: has been stopped; begin a new one", server)))

@@ -10,7 +10,7 @@ use serde_json::json;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, wire};
-use taxel_live::clock::BoardClock;
+use taxel_live::clock::{self, BoardClock};
 use taxel_live::recording::{
     BoardChange, Counts, Encoding, Header, LsaWriter, Reader, Track, Writer, WriterOptions, decode_lsa, numbered,
 };
@@ -281,6 +281,22 @@ impl RecordingWriter {
         self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks))
     }
 
+    /// Writes a picture for viewers of values above rest, row by row; white is at least `least`.
+    #[expect(clippy::too_many_arguments, reason = "Python names them")]
+    fn picture_above(
+        &self,
+        py: Python<'_>,
+        at_ns: i64,
+        t_us: i64,
+        above: PyReadonlyArray1<'_, f32>,
+        least: f64,
+        rest: &str,
+        unit: &str,
+    ) -> PyResult<()> {
+        let above = slice("above", &above)?;
+        self.with(py, |writer| writer.picture_above((at_ns, t_us), above, least, rest, unit))
+    }
+
     /// Writes the values that the taxels held when it began, ticks by index, 65 535 of a taxel without any event so far.
     fn held(&self, py: Python<'_>, at_ns: i64, t_us: Option<i64>, ticks: PyReadonlyArray1<'_, u16>) -> PyResult<()> {
         let ticks = slice("ticks", &ticks)?;
@@ -370,6 +386,12 @@ fn clock_lines(
     Ok(lines.into_iter().map(|(middle, o)| (middle, o.board_us, o.host_ns, o.drift_ppm)).collect())
 }
 
+/// Why a drift (ppm) and delays (us: of 99 in 100 datagrams at most, of one in two) cannot be; `None` if they can.
+#[pyfunction]
+fn clock_doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
+    clock::doubt(drift_ppm, delay_us, median_us)
+}
+
 /// The name of a recording in automatic mode: the index appended to the name.
 #[pyfunction]
 fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
@@ -391,6 +413,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(recording_damage, module)?)?;
     module.add_function(wrap_pyfunction!(read_lsa, module)?)?;
     module.add_function(wrap_pyfunction!(clock_lines, module)?)?;
+    module.add_function(wrap_pyfunction!(clock_doubt, module)?)?;
     module.add_function(wrap_pyfunction!(write_lsa, module)?)?;
     module.add_function(wrap_pyfunction!(numbered_path, module)?)
 }

@@ -16,7 +16,7 @@ from taxel._base.limits import DESCRIPTION, UNPACKED, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError
 
-__all__ = ["read_arrays", "stored_names"]
+__all__ = ["read_arrays", "shapes", "stored_names"]
 
 
 def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -36,6 +36,39 @@ def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
     # The errors that zipfile raises on damage are not documented; reading the arrays reports what is wrong.
     except Exception:
         return ()
+
+
+def shapes(path: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the arrays of a .npz, or of the one array of a .npy, whose name is "".
+
+    Raises
+    ------
+    FormatError : damage
+    OSError : the file is not there, or cannot be read
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "two.npz"
+    >>> np.savez(place, t=[1, 2], x=[[3], [4]])
+    >>> shapes(place)
+    {'t': (2,), 'x': (2, 1)}
+    """
+    with open(path, "rb") as file:
+        try:
+            if not zipfile.is_zipfile(file):
+                file.seek(0)
+                return {"": _described(file)[0]}
+            found = {}
+            with zipfile.ZipFile(file) as archive:
+                for name in archive.namelist():
+                    if name.endswith(".npy"):
+                        with archive.open(name) as array:
+                            found[name.removesuffix(".npy")] = _described(array)[0]
+            return found
+        # As in `read_arrays`.
+        except Exception as error:
+            raise FormatError(f"{path}: no whole {Path(path).suffix} ({first_line(error)}); write it again") from None
 
 
 def read_arrays(

@@ -6,6 +6,7 @@ import json
 import math
 import operator
 import os
+import sys
 from collections.abc import Collection, Mapping
 from itertools import chain, islice
 from typing import Any, SupportsIndex, TypeVar
@@ -13,6 +14,7 @@ from typing import Any, SupportsIndex, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taxel._base.messages import plain
 from taxel._core import ProblemError
 
 __all__ = [
@@ -84,8 +86,16 @@ def _lone_surrogate(value: str) -> bool:
 def instance(name: str, value: object, kind: type[T]) -> T:
     """Return a value of the given class; refuse any other."""
     if not isinstance(value, kind):
-        raise ProblemError(f"{name} is {shown(value)}: must be a taxel.{kind.__name__}")
+        raise ProblemError(f"{name} is {shown(value)}: must be a {public_name(kind)}")
     return value
+
+
+def public_name(kind: type[object]) -> str:
+    """Return the name by which a class of taxel is imported: that of the outermost package that has it."""
+    parts = kind.__module__.split(".")
+    packages = [".".join(parts[: k + 1]) for k in range(len(parts))]
+    found = (name for name in packages if getattr(sys.modules.get(name), kind.__name__, None) is kind)
+    return f"{next(found, kind.__module__)}.{kind.__name__}"
 
 
 def several(name: str, values: object) -> list[Any]:
@@ -269,7 +279,7 @@ def window(unit: str, start: object, stop: object) -> tuple[float, float]:
     """Return an interval of time whose start is not after its stop; either may be infinite."""
     first, last = number("start", start, unit), number("stop", stop, unit)
     if not first <= last:
-        raise ProblemError(f"window {first} to {last} {unit}: start must not lie after stop")
+        raise ProblemError(f"window {plain(first)} to {plain(last)} {unit}: start must not lie after stop")
     return first, last
 
 
@@ -305,7 +315,7 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
                 array.dtype.kind, "a whole number that fits"
             )
             fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
-            raise ProblemError(f"{name}{where} is {value}: must be {expected}{fits}")
+            raise ProblemError(f"{name}{where} is {value}: must be {expected}{fits}" + f", in {unit}" * bool(unit))
     return array
 
 

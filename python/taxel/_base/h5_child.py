@@ -1,7 +1,8 @@
 """Reads a .h5 in a child process, which is run by the path of this file (`taxel._base.h5_file`) without taxel.
 
-It writes lines of JSON to its standard output: first that it runs, then the contents of the file; then, for each
-request on its standard input, a line for each piece that it has read into the shared memory, and one at the end.
+It writes lines of JSON to its standard output: first that it runs, then a line for each entry that it has listed and
+one with all of them; then, for each request on its standard input, a line for each piece that it has read into the
+shared memory, and one at the end.
 """
 
 import json
@@ -48,17 +49,44 @@ def whole(value: Any) -> int | None:
 
 
 def entries(h5: Any, h5py: Any) -> dict[str, Any]:
-    """Return the dtype ("text", or "" for a group) and the shape of each entry of the root."""
-    described = {}
-    for name in h5:
-        data = h5[name]
-        if not isinstance(data, h5py.Dataset):
-            described[name] = ["", []]
-        elif h5py.check_string_dtype(data.dtype) is not None:
-            described[name] = ["text", list(data.shape)]
-        else:
-            described[name] = [data.dtype.str if data.dtype.kind in "biuf" else str(data.dtype), list(data.shape)]
+    """Return the dtype ("text", or "" for a group) and the shape of each entry, those within groups by their path."""
+    described: dict[str, Any] = {}
+    # A group may be linked within itself; it is listed by its first path only.
+    seen, left = {place(h5, h5py)}, [("", h5)]
+    while left:
+        before, group = left.pop()
+        inner = []
+        for name in group:
+            # A soft link may lead nowhere; a hard one only in a damaged file.
+            is_hard = isinstance(group.get(name, getlink=True), h5py.HardLink)
+            data, path = group[name] if is_hard else group.get(name), before + name
+            if isinstance(data, h5py.Group):
+                described[path] = ["", []]
+                if (at := place(data, h5py)) not in seen:
+                    seen.add(at)
+                    inner.append((f"{path}/", data))
+            elif isinstance(data, h5py.Dataset):
+                described[path] = [dtype_of(data, h5py), list(data.shape or [])]
+            elif data is not None:
+                described[path] = ["", []]
+            send(listed=path)
+        left += reversed(inner)
     return described
+
+
+def place(group: Any, h5py: Any) -> tuple[int, int]:
+    """Return what tells a group from all others: its file and its address there."""
+    info = h5py.h5o.get_info(group.id)
+    return info.fileno, info.addr
+
+
+def dtype_of(data: Any, h5py: Any) -> str:
+    """Return the dtype of a data set; "text", or "empty" for one without a shape."""
+    if data.shape is None:
+        return "empty"
+    if h5py.check_string_dtype(data.dtype) is not None:
+        return "text"
+    return str(data.dtype.str if data.dtype.kind in "biuf" else data.dtype)
 
 
 def read(data: Any, memory: int, at: int, size: int) -> None:

@@ -30,7 +30,7 @@ PATIENCE_S, BEGIN_S = 10.0, 120.0
 
 @dataclass(frozen=True)
 class Entry:
-    """Describe an entry of the root.
+    """Describe a data set or a group.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Entry:
     @property
     def is_numbers(self) -> bool:
         """Whether it holds numbers."""
-        return self.dtype[:1] in "<>|=" and self.dtype != ""
+        return self.dtype[:1] in tuple("<>|=")
 
 
 class H5File:
@@ -60,7 +60,7 @@ class H5File:
     attributes : dict from str to int or None
         Attributes of the root; None for one that is not a whole number.
     entries : dict from str to Entry
-        Entries of the root.
+        Data sets and groups by their path, those within groups as "run1/pressure".
 
     Raises
     ------
@@ -74,6 +74,7 @@ class H5File:
         with self.path.open("rb"):
             pass
         self._memory = os.memfd_create("h5") if hasattr(os, "memfd_create") else _unnamed()
+        self._filled = 0
         try:
             self._child = subprocess.Popen(
                 [sys.executable, "-P", str(_CHILD), str(self.path), str(self._memory)],
@@ -93,7 +94,8 @@ class H5File:
         try:
             self._order(sys.path)
             self._answer(BEGIN_S)
-            answer = self._answer(PATIENCE_S)
+            while "entries" not in (answer := self._answer(PATIENCE_S)):
+                pass
             self.attributes: dict[str, int | None] = answer["attributes"]
             self.entries = {name: Entry(dtype, tuple(shape)) for name, (dtype, shape) in answer["entries"].items()}
         except BaseException:
@@ -129,15 +131,17 @@ class H5File:
         dtype = np.dtype(entry.dtype)
         size = math.prod(entry.shape) * dtype.itemsize
         unpacked(self._place(name), size)
+        at = self._filled
         try:
-            os.ftruncate(self._memory, max(1, size))
-            shared = mmap.mmap(self._memory, max(1, size))
+            os.ftruncate(self._memory, at + max(1, size))
+            shared = mmap.mmap(self._memory, max(1, size), offset=at)
         except OSError as error:
             raise MemoryError(str(error)) from None
-        self._order({"name": name, "text": False, "at": 0, "size": size})
+        # The next data set begins at the next place that can be mapped, so this one is the array's, without a copy.
+        self._filled += -(-size // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
+        self._order({"name": name, "text": False, "at": at, "size": size})
         self._done()
-        # The memory is reused for the next data set.
-        return np.frombuffer(shared, dtype, math.prod(entry.shape)).reshape(entry.shape).copy()
+        return np.frombuffer(shared, dtype, math.prod(entry.shape)).reshape(entry.shape)
 
     def _place(self, name: str) -> str:
         return f"{self.path}, data set {name}"

@@ -5,59 +5,28 @@ from __future__ import annotations
 import json
 import math
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from datetime import date as day
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown, whole
+from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.calibration._curves import N_PER_KPA_MM2, Curve, Law, Power, Table, Values, above_0, curve_of
+from taxel.calibration._curves import Curve, Law, Power, Table, Values, above_0, curve_of
+from taxel.calibration._loads import UNITS, Laid, Load, Sensor, best_exponent, gains, same, there
 from taxel.frames import Frames
 from taxel.tare import Tare
 
 __all__ = ["Calibration", "Load"]
-
-#: What a calibration may be in: force on a taxel, or pressure at it.
-UNITS = ("N", "kPa")
-#: Range in which an exponent is searched: conductance of a fabric and counts of common sheets lie well within.
-_EXPONENTS = (0.2, 5.0)
-#: Exponents that miss the loads by less than this share (root mean square) count as equally good.
-_ALIKE = 1e-3
-
-
-class Load(NamedTuple):
-    """A known load, and the sensor's readings under it.
-
-    Parameters
-    ----------
-    frames : Frames
-        Recorded under the load; the mean of each taxel is used.
-    load : float, above 0
-    unit : {"N", "kPa"}
-        Force in all, however it is spread, or the same pressure at every taxel.
-    taxel : (int, int), optional
-        Column and row of the only taxel that bears it.
-
-    Raises
-    ------
-    ProblemError : values that are invalid, when `Calibration.fit` gets it
-    """
-
-    frames: Frames
-    load: float
-    unit: str = "N"
-    taxel: tuple[int, int] | None = None
 
 
 class Calibration:
@@ -129,7 +98,7 @@ class Calibration:
             raise ProblemError("gain: must be above 0 and finite at every taxel")
         rest = how.get("rest")
         if isinstance(rest, Tare):
-            _same(array, rest.array, "the tare")
+            same(array, rest.array, "the tare")
             rest = rest.rest
         made.rest = None if rest is None else _by_taxel("rest", rest, array)
         made.floor = number("floor", how.get("floor", 0.0))
@@ -304,23 +273,24 @@ class Calibration:
         curve: Curve = Power(1.0)
         if start is not None:
             instance("start", start, Calibration)
-            _same(array, start.array, "start")
+            same(array, start.array, "start")
             if (start.of, start.unit) != (of, unit):
                 raise ProblemError(f"start turns {start.of} into {start.unit}: must turn {of} into {unit}")
             curve, rest = start._curve, start.rest if rest is None else rest
         whole_fit = cls._made(array, curve, unit, of, {"rest": rest, "floor": floor, "date": date, "note": note})
-        laid = [_Laid.of(load, k, whole_fit) for k, load in enumerate(measured, start=1)]
+        sensor = Sensor(array, of, unit, whole_fit._rest(None), whole_fit.floor)
+        laid = [Laid.of(load, k, sensor) for k, load in enumerate(measured, start=1)]
         differ = len({load.load for load in measured}) > 1
         if exponent is not None:
-            whole_fit._curve = curve.bent(above_0("exponent", exponent))
+            curve = curve.bent(above_0("exponent", exponent))
         elif differ and not isinstance(curve, Table):
-            whole_fit._curve = curve.bent(_best_exponent(whole_fit, curve, laid))
-        gains, gain = _gains(whole_fit, laid, flag("each", each))
-        whole_fit.gain = gains
-        made = [one.made(whole_fit) for one in laid]
-        missed = np.concatenate([one.errors(whole_fit) for one in laid])
+            curve = curve.bent(best_exponent(curve, laid))
+        each_gain, gain = gains(array, curve, laid, flag("each", each))
+        whole_fit._curve, whole_fit.gain = curve, each_gain
+        made = [one.made(curve, each_gain) for one in laid]
+        missed = np.concatenate([one.errors(curve, each_gain) for one in laid])
         unknown = 1 + (differ and exponent is None and not isinstance(curve, Table))
-        unknown += int(np.count_nonzero(gains[_there(array)] != gain)) if each else 0
+        unknown += int(np.count_nonzero(each_gain[there(array)] != gain)) if each else 0
         whole_fit.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
         whole_fit.loads = tuple((load.load, load.unit, value) for load, value in zip(measured, made, strict=True))
         return whole_fit
@@ -343,7 +313,7 @@ class Calibration:
         ------
         ProblemError : pictures of another array, or in another unit; a rest that is not finite
         """
-        _same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.of)
+        same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.of)
         return Frames(self._values(frames.values, self._rest(rest)), frames.t, unit=self.unit, array=frames.array)
 
     def readings(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
@@ -365,14 +335,14 @@ class Calibration:
         ------
         ProblemError : pictures of another array, or in another unit
         """
-        _same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.unit)
+        same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.unit)
         held = np.nan_to_num(self._rest(rest))
         values = self._curve.readings(np.maximum(frames.values, 0.0) / self.gain, held)
         return Frames(_32_bits(values), frames.t, unit=self.of, array=frames.array)
 
     def _rest(self, rest: Tare | ArrayLike | None) -> Values:
         if isinstance(rest, Tare):
-            _same(self.array, rest.array, "the tare")
+            same(self.array, rest.array, "the tare")
             rest = rest.rest
         elif rest is not None and np.isnan(numbers("rest", rest, np.float64)).any():
             raise ProblemError("rest holds NaN: must be finite; give a Tare where the rest of a taxel is not known")
@@ -385,7 +355,7 @@ class Calibration:
     def _values(self, readings: NDArray[Any], rest: Values) -> NDArray[np.float32]:
         known = np.nan_to_num(rest)
         read = np.asarray(readings, np.float64)
-        loaded = (read > known + self.floor) & ~np.isnan(rest) & _there(self.array)
+        loaded = (read > known + self.floor) & ~np.isnan(rest) & there(self.array)
         return _32_bits(np.where(loaded, self.gain * self._curve.values(read, known), 0.0))
 
     def _region(self, columns: slice, rows: slice) -> Calibration:
@@ -551,136 +521,9 @@ class Calibration:
         return f"Calibration({self.described()}, of {size})"
 
 
-class _Laid(NamedTuple):
-    """The equations of a load: its taxels, their weights and the value; from mean readings above the floor."""
-
-    load: float
-    weight: float | Values
-    readings: Values
-    rest: Values
-    chosen: NDArray[np.bool_]
-    alone: bool
-    """Whether each chosen taxel has to make the load by itself."""
-
-    @classmethod
-    def of(cls, load: Load, number_of: int, calibration: Calibration) -> _Laid:
-        frames, place = instance("frames", load.frames, Frames), f"load {number_of}"
-        _same(calibration.array, frames.array, f"the pictures of {place}", frames.unit, calibration.of)
-        value, unit = above_0(place, load.load), checked_text("unit", load.unit, UNITS)
-        if not len(frames):
-            raise ProblemError(f"{place}: no picture while it lies")
-        rest = calibration._rest(None)
-        readings = frames.values.mean(axis=0, dtype=np.float64)
-        chosen = _there(calibration.array) & ~np.isnan(rest)
-        if load.taxel is not None:
-            only = several(f"{place}, taxel", load.taxel)
-            if len(only) != 2:
-                raise ProblemError(f"{place}, taxel is {shown(load.taxel)}: must be a column and a row")
-            x, y = (whole(f"{place}, taxel", n, 0) for n in only)
-            index = int(calibration.array.index(x, y))
-            chosen &= np.arange(chosen.size).reshape(chosen.shape) == index
-        rest = np.nan_to_num(rest)
-        loaded = chosen & (readings > rest + calibration.floor)
-        if not loaded.any():
-            raise ProblemError(
-                f"{place}: no taxel reads more than {calibration.floor:g} {calibration.of} above its rest"
-            )
-        weight: float | Values = 1.0
-        if unit != calibration.unit:
-            areas = calibration.array.area_mm2
-            if areas is None:
-                raise ProblemError(
-                    f"{place}: in {unit}, and the calibration in {calibration.unit}: between them stands the area of "
-                    f"each taxel, which is not known of {calibration.array!r}"
-                )
-            weight = 1 / (areas * N_PER_KPA_MM2) if unit == "kPa" else areas * N_PER_KPA_MM2
-        alone = unit == "kPa" or load.taxel is not None
-        # Uniform pressure is on every taxel: one that reads nothing is broken, and no measure of the others.
-        return cls(value, weight, readings, rest, loaded, alone)
-
-    def by_taxel(self, calibration: Calibration, curve: Curve | None = None) -> Values:
-        """Return the value of each chosen taxel, in the load's own unit; 0 elsewhere."""
-        curve = calibration._curve if curve is None else curve
-        values = self.weight * calibration.gain * curve.values(self.readings, self.rest)
-        return np.where(self.chosen, values, 0.0)
-
-    def made(self, calibration: Calibration, curve: Curve | None = None) -> float:
-        """Return the value of all chosen taxels: the sum of forces, the mean of pressures."""
-        every = self.by_taxel(calibration, curve)[self.chosen]
-        return float(every.mean() if self.alone else every.sum())
-
-    def errors(self, calibration: Calibration) -> Values:
-        """Return the error of each equation, as a share of the load."""
-        if self.alone:
-            return np.asarray(self.by_taxel(calibration)[self.chosen] / self.load - 1.0)
-        return np.array([self.made(calibration) / self.load - 1.0])
-
-
-def _least(made: Sequence[float], loads: Sequence[float]) -> tuple[float, float]:
-    """Return the gain with the least squares of relative error, and their mean."""
-    share = np.array(made) / np.array(loads)
-    gain = float(share.sum() / (share**2).sum()) if (share > 0).any() else 1.0
-    return gain, float(np.mean((gain * share - 1.0) ** 2))
-
-
-def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]) -> float:
-    """Return the exponent whose best gain has the least squares of relative error."""
-    from scipy.optimize import minimize_scalar  # noqa: PLC0415  loads slowly
-
-    loads = [one.load for one in laid]
-
-    def missed(log: float) -> float:
-        bent = curve.bent(math.exp(log))
-        return _least([one.made(calibration, bent) for one in laid], loads)[1]
-
-    # A grid comes first, as the squares may have several minima.
-    grid = np.linspace(math.log(_EXPONENTS[0]), math.log(_EXPONENTS[1]), 33)
-    miss = np.array([np.inf, *map(missed, grid), np.inf])
-    valleys = np.flatnonzero((miss[1:-1] <= miss[:-2]) & (miss[1:-1] < miss[2:]))
-    around = [(grid[max(0, k - 1)], grid[min(len(grid) - 1, k + 1)]) for k in map(int, valleys)]
-    minima = [minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 1e-9}) for bounds in around]
-    best, *others = sorted((float(one.fun), math.exp(float(one.x))) for one in minima)
-    alike = [exponent for squares, exponent in others if squares <= max(4.0 * best[0], _ALIKE**2)]
-    if alike:
-        also = ", ".join(f"{exponent:.3g}" for exponent in alike)
-        warnings.warn(
-            f"loads: an exponent of {best[1]:.3g} is used, but {also} fits them as well; one more load, or exponent, "
-            "would decide",
-            stacklevel=3,
-        )
-    return best[1]
-
-
-def _gains(calibration: Calibration, laid: Sequence[_Laid], each: bool) -> tuple[Values, float]:
-    """Return the gain of each taxel, and the common one."""
-    common, _ = _least([one.made(calibration) for one in laid], [one.load for one in laid])
-    gains = np.full(calibration.array.shape, common)
-    if not each:
-        return gains, common
-    if not any(one.alone for one in laid):
-        raise ProblemError("each: no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
-    share = np.array([one.by_taxel(calibration) / one.load for one in laid if one.alone])
-    squares = (share**2).sum(axis=0)
-    np.divide(share.sum(axis=0), squares, out=gains, where=squares > 0)
-    return gains, common
-
-
 def _32_bits(values: Values) -> NDArray[np.float32]:
     """Return values as float32, as pictures hold them; larger ones become the largest float32."""
     return np.minimum(values, np.finfo(np.float32).max).astype(np.float32)
-
-
-def _there(array: Array) -> NDArray[np.bool_]:
-    return np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists)
-
-
-def _same(own: Array, other: Array, what: str, unit: str | None = None, expected: str | None = None) -> None:
-    """Refuse what has other taxels, or another unit; warn of another pitch."""
-    if not own.fits(other):
-        raise ProblemError(f"{what}: of {other!r}; the calibration is of another array, {own!r}")
-    own._warn_apart(other, what, stacklevel=3)
-    if unit != expected:
-        raise ProblemError(f"{what}: in {unit}; the calibration takes {expected}")
 
 
 def _by_taxel(name: str, value: Any, array: Array) -> Values:

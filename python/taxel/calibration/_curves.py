@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, mapping, number, numbers, parameters, shown
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 
 __all__ = ["N_PER_KPA_MM2", "Curve", "Law", "Power", "Table", "Values", "above_0", "curve_of"]
@@ -69,8 +70,8 @@ class Table:
         if self.x.ndim not in (1, 3) or not self.y.size or len(self.x) != len(self.y):
             points = len(self.x) if self.x.ndim else 0
             raise ProblemError(
-                f"a table of {points} readings and {len(self.y)} values: must be as many, 1 or more, of one taxel "
-                "(points,) or of each (points, rows, columns)"
+                f"a table of {counted(points, 'reading')} and {counted(len(self.y), 'value')}: must be as many, 1 or "
+                "more, of one taxel (points,) or of each (points, rows, columns)"
             )
         for name, column in (("readings", self.x), ("values", self.y)):
             rising = np.isfinite(column) & (np.diff(column, axis=0, prepend=-np.inf) > 0) & (column >= 0)

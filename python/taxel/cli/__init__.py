@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -39,7 +38,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         code = app(arguments, prog_name="taxel", standalone_mode=False)
     except _UsageError as error:
         if not str(error.format_message()).startswith("Usage:"):
-            _end(f"{_plain(error.format_message())}; see {_typed(error.ctx)} --help", WRONG_INPUT)
+            _end(f"{_plain(error)}; see {_typed(error.ctx)} --help", WRONG_INPUT)
         # Without a command, the help is printed.
         typer.echo(error.format_message(), err=True)
         sys.exit(WRONG_INPUT)
@@ -62,14 +61,27 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _plain(message: str) -> str:
-    """Return a message of the parser in the form of our own messages."""
-    message = re.sub(r"^Invalid value for '?(.+?)'?: ", r"\1: ", message)
+def _plain(error: Any) -> str:
+    """Return a message of the parser in the form of our own messages, with the value that was typed."""
+    message = re.sub(
+        r"^Invalid value for '?(.+?)'?: ", lambda m: f"{m[1]}{_given(error)}: ", str(error.format_message())
+    )
     message = re.sub(
         r"^Missing (?:argument|option|parameter) '(.+?)'.*", lambda m: f"{_upper(m[1])} is missing", message
     )
+    message = re.sub(r"^Option '(.+?)' requires an argument", r"\1: needs a value", message)
     message = message.replace("Input should be", "must be").rstrip(".")
     return re.sub(r"must be a valid (\w+)(, .*)?$", lambda m: f"must be {_NUMBERS.get(m[1], m[1])}", message)
+
+
+def _given(error: Any) -> str:
+    """Return the value that was typed, after a blank, where the parser's message leaves it out."""
+    checked = getattr(error.__cause__, "errors", None)
+    if checked is None:
+        return ""
+    value = str(checked()[0]["input"])
+    shown = value if value.isprintable() and value.split() == [value] else repr(value)
+    return "" if f"'{value}'" in error.message else f" {shown[:60]}{' ...' * (len(shown) > 60)}"
 
 
 #: The parser's names of number types, and how our own messages name them.
@@ -99,28 +111,3 @@ def _system_error(error: OSError) -> str:
     if error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return str(error)
-
-
-# One line a command; they stand at the end because each registers itself with `app`.
-for _command in (
-    "bench",
-    "bridge",
-    "calibrate",
-    "convert",
-    "cut",
-    "demo",
-    "detect",
-    "device",
-    "emulate",
-    "encode",
-    "export",
-    "info",
-    "information",
-    "live",
-    "merge",
-    "record",
-    "simulate",
-    "train",
-    "view",
-):
-    import_module(f"taxel.cli.{_command}")

@@ -27,7 +27,7 @@ WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
 
 #: Option of the commands that run until they are stopped.
 SecondsOption = Annotated[
-    float | None, typer.Option(min=0.0, help="End after this many seconds; without it with Ctrl-C.")
+    float | None, typer.Option(min=0.001, help="End after this many seconds; without it with Ctrl-C.")
 ]
 
 
@@ -74,7 +74,18 @@ class _Command(TyperCommand):
             text = options[first[1]] + text[first.end() :]
         if "tare" in options:
             text = re.sub(r"without a tare: .*", "without the taxels' rest: give --tare SECONDS or --tare FILE", text)
-        return text
+        return f"{text}{_laid_out(text)}" if "array" in options else text
+
+
+def _laid_out(text: str) -> str:
+    """Return what an error lacks that refuses a row of channels: the option that lays them out; else ""."""
+    option = "; give --array {}, or rows and columns in a layout file, if they are a grid's taxels row by row"
+    if re.search(r"\d+ x \d+ channels without a pitch$", text):
+        return option.format("ROWSxCOLUMNS")
+    trained = re.match(r"an array of 1 x (\d+) taxels: the readout was trained on (\d+) x (\d+)$", text)
+    if trained and int(trained[1]) == int(trained[2]) * int(trained[3]):
+        return option.format(f"{trained[2]}x{trained[3]}")
+    return ""
 
 
 class App(typer.Typer):
@@ -97,7 +108,7 @@ class App(typer.Typer):
 app = App(
     name="taxel",
     cls=WithAdded,
-    help="Touch as events: from the bytes of a tactile array to decisions that say when.",
+    help="Touch as events: from the bytes of a tactile array to detections with exact times.",
     no_args_is_help=True,
 )
 

@@ -24,4 +24,7 @@ def geometry(size: str, *, of_wire: bool = True) -> Array:
     rows, columns, pitch = int(match[1]), int(match[2]), thesis.pitch_mm if of_wire else None
     pitch = float(match[3]) if match[3] else pitch
     same = (rows, columns, pitch) == (*thesis.shape, thesis.pitch_mm)
-    return thesis if same else Array(rows, columns, pitch_mm=pitch, name=size)
+    try:
+        return thesis if same else Array(rows, columns, pitch_mm=pitch, name=size)
+    except ProblemError as error:
+        raise ProblemError(f"--array {size}: {error}") from None

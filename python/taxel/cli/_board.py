@@ -16,14 +16,15 @@ from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import OUTSIDE, WRONG_INPUT
-from taxel.clock import doubt
 from taxel.live import Remote, Summary, delays
 from taxel.live.options import LiveOptions
 from taxel.tare import Tare
+from taxel.wire import Registers
 
 __all__ = [
     "REDRAW_S",
     "ArrayOption",
+    "BitsOption",
     "CompressionOption",
     "CongestionOption",
     "DifferencesOption",
@@ -34,6 +35,7 @@ __all__ = [
     "OverwriteOption",
     "PortOption",
     "PresetOption",
+    "RateOption",
     "ReadoutOption",
     "RecordOption",
     "SendOption",
@@ -45,6 +47,7 @@ __all__ = [
     "outside",
     "remote",
     "rest_of",
+    "stated_registers",
 ]
 
 #: Interval at which the display is redrawn and the end is checked, s.
@@ -60,6 +63,17 @@ PortOption = Annotated[int, live_option("port")]
 HostOption = Annotated[str, live_option("host")]
 ArrayOption = Annotated[str | None, live_option("array", metavar="ROWSxCOLUMNS[xMM]")]
 PresetOption = Annotated[str | None, live_option("registers")]
+RateOption = Annotated[
+    float | None,
+    typer.Option(
+        min=0.0,
+        help="Frames a second of a sensor of your own, whose events taxel.live.Source sends, with --bits: the "
+        "registers are those that it makes.",
+    ),
+]
+BitsOption = Annotated[
+    int | None, typer.Option(min=1, max=16, help="With --rate-hz: bits of the sensor's values, as of the Source.")
+]
 DifferencesOption = Annotated[bool, live_option("differences", "--differences")]
 TareOption = Annotated[str | None, typer.Option(help=about(LiveOptions, "tare")["help"])]
 RecordOption = Annotated[Path | None, live_option("record")]
@@ -79,6 +93,20 @@ CongestionOption = Annotated[
         "counted). Default: block with --record or --readout, else drop."
     ),
 ]
+
+
+def stated_registers(
+    preset: str | None, rate_hz: float | None, bits: int | None, address: str | None, array: Array | None
+) -> str | Registers | None:
+    """Return the registers that the options state, of a sensor of this array; None if they state none."""
+    if rate_hz is None and bits is None:
+        return preset
+    if rate_hz is None or bits is None:
+        raise ProblemError("--rate-hz and --bits belong together: both are those of the taxel.live.Source that sends")
+    if preset is not None or address is not None:
+        other = "--preset" if preset is not None else "--from"
+        raise ProblemError(f"--rate-hz and {other}: both state the board's registers; give one of them")
+    return Registers._of_source(Array._of(array), rate_hz, bits)[0]
 
 
 def remote(
@@ -118,6 +146,14 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
         return None
     size = f"{array.rows} x {array.columns}"
     return f"{beyond:,} of {words:,} words name taxels outside {size}, and are dropped: give the board's own --array"
+
+
+def doubted(counters: dict[str, Any]) -> Iterator[str]:
+    """Yield why the drift or the delays of a board and of each other source cannot be, where they cannot."""
+    every = {"": counters, **counters["sources"]}
+    for name, one in every.items():
+        if (one.get("pace") or {}).get("doubt"):
+            yield f"{name}: {one['pace']['doubt']}" if name else one["pace"]["doubt"]
 
 
 def exit_code(summary: Summary, array: Array) -> int:
@@ -180,10 +216,10 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         lost = f", {second['missing']:,} on the way"
     board = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
     drift = ""
-    if now["offset"] is not None:
-        ppm = now["offset"]["drift_ppm"]
-        drift = f", drift {ppm:+.1f} ppm"
-        drift += " (wrong: the sender does not keep pace with its clock)" * bool(doubt(ppm, 0.0))
+    pace = now["pace"]
+    if pace is not None:
+        drift = f", drift {pace['drift_ppm']:+.1f} ppm, delays {delays(pace['delay'])}"
+        drift += " (wrong: the sender does not keep pace with its clock)" * bool(pace["doubt"])
     table = Table.grid(padding=(0, 2))
     for name, total, per_second in (
         ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +15,7 @@ from taxel._core import ProblemError
 from taxel.cli._array import geometry
 
 if TYPE_CHECKING:
+    from taxel.array import Array
     from taxel.recording import Recording
 
 __all__ = ["FileOptions", "with_file_options"]
@@ -29,7 +30,8 @@ class FileOptions:
         typer.Option(
             metavar="ROWSxCOLUMNS[xMM]",
             help="Rows, columns and pitch (mm) of the sensor, as 24x20x5, for files without them (.csv, .lsa, ROS "
-            "bags). Default: 64x64x2.67, or a larger array if events lie outside it; of a bag as its messages say. "
+            "bags), and for pictures of a row of as many channels. Default: 64x64x2.67, or a larger array if events "
+            "lie outside it; of a bag as its messages say. "
             "Without mm the pitch is 2.67 for events of the board, else unknown.",
         ),
     ] = None
@@ -71,7 +73,7 @@ class FileOptions:
 
         Raises
         ------
-        ProblemError : an ``--array`` that differs from the sensor that a file holds
+        ProblemError : an ``--array`` that differs from the sensor that a file holds; a ``--rate-hz`` of one with times
         """
         from taxel.recording import open_any  # noqa: PLC0415  the command line starts quickly
 
@@ -86,8 +88,17 @@ class FileOptions:
             ros=self.ros,
         )
         if isinstance(opened, list):
-            return [self._on_array(one) for one in opened]
-        return self._on_array(opened)
+            return [self._timed(self._on_array(one)) for one in opened]
+        return self._timed(self._on_array(opened))
+
+    def words(self) -> list[str]:
+        """Return the options as words of a command line."""
+        words: list[str] = []
+        for one in fields(self):
+            value = getattr(self, one.name)
+            for each in value if isinstance(value, list) else [] if value is None else [value]:
+                words += [f"--{one.name.replace('_', '-')}", str(each)]
+        return words
 
     def names_topic(self, bag: Path) -> bool:
         """Return whether these options, or the layout file of a ROS bag, say which topic to open."""
@@ -105,11 +116,14 @@ class FileOptions:
         from taxel.recording.layout import on_array  # noqa: PLC0415
 
         own, given = recording.array, geometry(self.array[0], of_wire=False)
+        if _is_row_of(recording, given):
+            return type(recording)(on_array(recording._contents, given))
         differs = given.pitch_mm is not None and (own.pitch_mm, own.places) != (given.pitch_mm, None)
         if own.shape != given.shape or differs:
             sizes = ", ".join(self.array)
             raise ProblemError(f"--array {sizes}: {recording.path} holds its own sensor, {own!r}; leave it out")
-        if not recording.has_events or own._is_measured:
+        # A .mcap holds its sensor, whose pitch may be unknown.
+        if not recording.has_events or own._is_measured or recording.kind == "mcap":
             return recording
         # A size without a pitch says nothing of it, and events without one are of the board's wire.
         wire = geometry(self.array[0])
@@ -120,7 +134,7 @@ class FileOptions:
         from taxel.recording.opening import joined  # noqa: PLC0415  the command line starts quickly
 
         opened = self.open(path)
-        return [self._timed(one) for one in joined(opened if isinstance(opened, list) else [opened])]
+        return joined(opened if isinstance(opened, list) else [opened])
 
     def all(self, paths: Sequence[Path]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
@@ -131,7 +145,7 @@ class FileOptions:
 
         opened = (self.open(path) for path in paths)
         every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
-        return [self._timed(one) for each in every for one in sensors(each)]
+        return [one for each in every for one in sensors(each)]
 
     def _timed(self, recording: Recording) -> Recording:
         return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
@@ -148,6 +162,13 @@ class FileOptions:
             some = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
             raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")
         return every[0]
+
+
+def _is_row_of(recording: Recording, given: Array) -> bool:
+    """Return whether pictures are a row of as many channels as a sensor has taxels, as tables and arrays may be."""
+    own, is_one = recording.array, len(recording.sources) < 2
+    row = own.shape == (1, given.rows * given.columns) and given.rows > 1 and own.taxels == own.columns
+    return is_one and row and not own._is_measured and not recording.has_events and not recording.is_stream
 
 
 def with_file_options(work: Callable[..., None]) -> Callable[..., None]:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from itertools import chain, repeat
 from pathlib import Path
+from threading import Event, Thread
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
 
 from taxel._base.messages import counted
+from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.spikes import to_ms
 
@@ -28,6 +33,13 @@ if TYPE_CHECKING:
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
+#: Of fewer pictures the noise is not known.
+_LEAST_PICTURES = 20
+#: Without a terminal a line says the step after so long, then after so long again; the last repeats, s.
+_SAY_S = (2.0, 8.0, 20.0, 30.0)
+#: So long after the last event of a board a label may follow, us, as people mark late; one further than the window of a
+#: score is named, as no detection can lie so near to it.
+_LATE_US, _NEAR_US = 1_000_000, 50_000
 #: Units of pictures that read 0 at rest.
 _RESTS_AT_0 = ("N", "kPa")
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
@@ -95,8 +107,24 @@ def tare_of(value: str | None, recording: Recording) -> Tare | None:
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
     """Return the tare of the time before a recording's first label, or before the board's start marker.
 
-    A label that a person set may be late, so the rest ends a little earlier.
+    A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 pictures come before
+    it, the tare is that of a quiet stretch, if there is one.
     """
+    from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
+    from taxel.recorded import recorded  # noqa: PLC0415
+    from taxel.recording.rest import of_quiet  # noqa: PLC0415
+    from taxel.tare import Tare  # noqa: PLC0415
+
+    source = recorded(recording)
+    first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
+    if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_PICTURES <= len(source):
+        quiet = of_quiet(source).quiet_us
+        if quiet is not None:
+            return Tare.take(source, start_us=quiet[0], stop_us=quiet[1], note=str(recording.path))
+    return _before(labels, recording)
+
+
+def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
     from taxel.events import Events  # noqa: PLC0415
     from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
 
@@ -124,7 +152,7 @@ def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
         nothing = np.zeros((2, *source.array.shape))
         return Tare.take(Frames(nothing, [0, 1], unit=source.unit, array=source.array), note="0, by the unit")
     try:
-        return tare_before(labels, recording)
+        return _before(labels, recording)
     except ProblemError:
         return None
 
@@ -157,10 +185,24 @@ def span_us(recording: Recording) -> tuple[int, int]:
     return int(times.min()), int(times.max())
 
 
-def new_report(folder: Path) -> Path:
-    """Return the path of a report's page in a folder, which is created."""
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder / "report.html"
+def try_report(folder: Path) -> None:
+    """Check that a report's page can be written to a folder, before the work that it will show; leave no folder behind.
+
+    Raises
+    ------
+    FileExistsError : the folder holds a report already
+    OSError : the folder cannot be made
+    """
+    from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
+
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        try_whole(folder / "report.html")
+    finally:
+        for place in missing:
+            with suppress(OSError):
+                place.rmdir()
 
 
 def references(source: str | None, option: str, recordings: Sequence[Recording]) -> list[dict[str, NDArray[np.int64]]]:
@@ -169,29 +211,89 @@ def references(source: str | None, option: str, recordings: Sequence[Recording])
     A table names recordings by path, file name or stem; in one that it does not name nothing happened, unless the
     table also names a recording that is not there.
     """
-    from taxel.labels import Labels  # noqa: PLC0415  the command line starts quickly
+    from taxel.labels import Labels, trial_of  # noqa: PLC0415  the command line starts quickly
 
     if source is None or source == "notes":
-        return [_notes(recording) for recording in recordings]
+        noted = [_notes(recording) for recording in recordings]
+        outside = next((one for one in recordings if any(note.t is not None for note in one.notes)), None)
+        if source is not None and outside is not None and not any(noted):
+            notes = counted(sum(note.t is not None for note in outside.notes), "note")
+            raise ProblemError(f"{outside.title}: has {notes}, none within {_span(outside)}")
+        return noted
     table = Labels(source)
-    if len(recordings) > 1 and any(not row.recording for row in table.rows):
+    # The sources of one file are one recording.
+    count = len({(one.path, trial_of(one.name, one.label)) for one in recordings})
+    if count > 1 and any(not row.recording for row in table.rows):
         raise ProblemError(
-            f"{option} {source}: names no recording, and there are {len(recordings)}; must have the column recording"
+            f"{option} {source}: names no recording, and there are {count}; must have the column recording"
         )
     _check_sources(table, option, recordings)
-    unnamed = [str(recording.path) for recording in recordings if table.named(recording.path) is None]
-    known = {table.named(recording.path) for recording in recordings}
+    named = {one.title: table.named(one.path, trial_of(one.name, one.label), one.label) for one in recordings}
+    unnamed = [title for title, name in named.items() if name is None]
+    known = set(named.values())
     others = [name for name in table.recordings if name not in known]
     if unnamed and (others or len(unnamed) == len(recordings)):
         names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
         raise ProblemError(f"{option} {source}: names no event in {', '.join(unnamed)}; {names}")
+    _warn_of_strangers(table, option, recordings)
     return [_within(table, recording, option) for recording in recordings]
+
+
+def _warn_of_strangers(table: Labels, option: str, recordings: Sequence[Recording]) -> None:
+    """Warn of events of recordings that are not there: their names may be misspelt."""
+    from taxel.labels import trial_of  # noqa: PLC0415  the command line starts quickly
+
+    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
+    known = {
+        name for path, trial, label in trials for name in (table.named(path), table.named(path, trial, label), trial)
+    }
+    strange = [name for name in table.recordings if name not in known]
+    if strange:
+        count = counted(sum(row.recording in strange for row in table.rows), "event")
+        there = _few(dict.fromkeys(one.title for one in recordings))
+        warnings.warn(
+            f"{option} {table.path}: left out {count} of {_few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
+            f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
+            stacklevel=3,
+        )
+
+
+def _few(names: Iterable[str]) -> str:
+    """Return the first five names, and how many more there are."""
+    every = list(names)
+    return ", ".join(every[:5]) + f" and {len(every) - 5} more" * (len(every) > 5)
+
+
+def labelled_trials(source: str | None, recordings: Sequence[Recording]) -> list[Recording]:
+    """Leave out trials of a file that its labels do not name, if they name another: those have no labels.
+
+    A trial without labels would otherwise count as one in which nothing happened.
+    """
+    from taxel.labels import Labels, beside, trial_of  # noqa: PLC0415  the command line starts quickly
+
+    trials: dict[Path, set[str]] = {}
+    for one in recordings:
+        trials.setdefault(one.path, set()).add(trial_of(one.name, one.label))
+    named: dict[Path, set[str]] = {}
+    for path, every in trials.items():
+        table = beside(path) if source in (None, "notes") else Path(str(source))
+        named[path] = every & {row.recording for row in Labels(table).rows} if table.is_file() else set()
+        if 0 < len(named[path]) < len(every):
+            warnings.warn(
+                f"{path}: left out {len(every) - len(named[path])} of its {len(every)} trials, which have no labels",
+                stacklevel=2,
+            )
+    return [one for one in recordings if not named[one.path] or trial_of(one.name, one.label) in named[one.path]]
 
 
 def _check_sources(table: Labels, option: str, recordings: Sequence[Recording]) -> None:
     """Refuse labels of a source that their recording does not have."""
+    from taxel.labels import trial_of  # noqa: PLC0415  the command line starts quickly
+
+    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
+    names = [(label, (table.named(path), table.named(path, trial, label), trial)) for path, trial, label in trials]
     for row in table.rows:
-        labels = {one.label for one in recordings if row.recording == table.named(one.path)}
+        labels = {label for label, every in names if row.recording in every}
         if row.source and labels and row.source not in labels:
             there = ", ".join(sorted(labels))
             raise ProblemError(
@@ -204,45 +306,139 @@ def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
     for note in recording.notes:
         if note.t is not None:
             times.setdefault(note.text, []).append(note.t)
-    return {label: np.sort(np.array(t, np.int64)) for label, t in times.items()}
+    events = {label: np.sort(np.array(t, np.int64)) for label, t in times.items()}
+    return _inside(events, recording, f"the notes of {recording.title}")
 
 
 def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArray[np.int64]]:
-    """Return the events that lie within a recording; those outside are left out, with a warning."""
+    """Return the events of a table that lie within a recording; refuse a table of which none does."""
     from taxel.recording import kind_of_file  # noqa: PLC0415  the command line starts quickly
 
-    first, last = span_us(recording)
     events = table.of(recording)
-    inside = {label: t[(t >= first) & (t <= last + 1_000_000)] for label, t in events.items()}
-    total = sum(map(len, events.values()))
-    outside = total - sum(map(len, inside.values()))
-    span = f"{recording.title} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
-    if total and outside == total:
-        raise ProblemError(f"{option} {table.path}: holds {counted(total, 'event')}, none within {span}")
     if recording.clock is None and any(row.at_ns for row in table.rows):
         warnings.warn(
             f"the {kind_of_file(recording.kind)} holds no arrival times, so host_ns cannot show by how many periods of "
             f"the board's clock (6.5536 s) {table.path} is ahead of it: its times are used unchanged",
             stacklevel=2,
         )
-    if outside:
-        warnings.warn(f"{outside} of the {total} events of {table.path} left out: outside {span}", stacklevel=2)
+    inside = _inside(events, recording, str(table.path))
+    if any(map(len, events.values())) and not any(map(len, inside.values())):
+        held = f"{option} {table.path}: holds {counted(sum(map(len, events.values())), 'event')}"
+        raise ProblemError(f"{held}, none within {_span(recording)}")
     return inside
+
+
+def _span(recording: Recording) -> str:
+    first, last = span_us(recording)
+    more = "" if recording.timed else ", whose pictures are numbered: give --rate-hz"
+    begin = beginning_us(np.array([first]))
+    if begin:
+        more = f"; it begins {begun(begin)}, {begin} us since 1970, and labels must count from 1970 too"
+    return f"{recording.title} ({(first - begin) / 1e6:.3f} to {(last - begin) / 1e6:.3f} s){more}"
+
+
+def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where: str) -> dict[str, NDArray[np.int64]]:
+    """Return the events that lie within a recording; say which are left out as they do not, and which may not.
+
+    A picture holds until the next one would come. A board sends nothing where nothing changes, so that the end of its
+    recording may lie behind its last event: an event soon after that counts, and is named.
+    """
+    total = sum(map(len, events.values()))
+    if not total:
+        return dict(events)
+    first, last = span_us(recording)
+    if recording.has_events:
+        held = recording.events
+        seen = [last, *(t for t, _ in held.markers), *(recording._contents.stretch or ())[1:]]
+        # A heartbeat or a frame without events is a sign of life, too.
+        end = max(seen if recording.clock is None else [*seen, *recording.clock.board_us[-1:].tolist()])
+        near_us, late_us = _NEAR_US, _LATE_US
+    else:
+        pictures = recording.frames().t
+        end = last + (int(np.median(np.diff(pictures))) if len(pictures) > 1 else 0)
+        near_us, late_us = 0, 0
+    inside = {label: t[(t >= first) & (t <= end + late_us)] for label, t in events.items()}
+    behind = sorted((int(one), label) for label, t in inside.items() for one in t[t > end + near_us])
+    if behind:
+        (at, label), begin = behind[0], beginning_us(np.array([first]))
+        warnings.warn(
+            f"{len(behind)} of the {total} events of {where} are behind the last that was recorded, at "
+            f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): they count, and as missed if the "
+            "recording stopped before them",
+            stacklevel=2,
+        )
+    outside = total - sum(map(len, inside.values()))
+    if outside:
+        warnings.warn(f"{outside} of the {total} events of {where} left out: outside {_span(recording)}", stacklevel=2)
+    return {label: t for label, t in inside.items() if len(t) or not len(events[label])}
+
+
+class _Steps:
+    """Holds the current step of a command, and about how long all of them take by the folds that are done."""
+
+    def __init__(self) -> None:
+        self._begun = perf_counter()
+        self._step = "starting"
+        self._fold: tuple[int, int, float] | None = None
+        self._first_fold_s = 0.0
+
+    def update(self, step: str) -> None:
+        """Take the line of the next step."""
+        self._step = step
+        fold = re.fullmatch(r"fold (\d+) of (\d+)", step)
+        if fold is not None:
+            after_s = perf_counter() - self._begun
+            self._first_fold_s = after_s if self._fold is None else self._first_fold_s
+            self._fold = int(fold[1]), int(fold[2]), after_s
+
+    def __str__(self) -> str:
+        """Return the step, how long it is since the beginning, and about how long all take once that is known."""
+        after_s, all_s = perf_counter() - self._begun, 0.0
+        if self._fold is not None and self._fold[0] > 1:
+            number, count, at_s = self._fold
+            # The training on all data and the plain rules take as long as two more folds.
+            all_s = self._first_fold_s + (at_s - self._first_fold_s) / (number - 1) * (count + 2)
+        expected = f"; about {all_s:.0f} s in all" if all_s > after_s else ""
+        return f"{self._step}, after {after_s:.0f} s{expected}"
+
+    def say(self, ended: Event) -> None:
+        """Say where it is on stderr, first after a few seconds and then now and then, until it has ended."""
+        for wait_s in chain(_SAY_S, repeat(_SAY_S[-1])):
+            if ended.wait(wait_s):
+                return
+            typer.echo(f"taxel: {self}", err=True)
 
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Show the current step, and warnings as single lines; on stderr, so that results can be piped."""
+    """Show the current step, and warnings as single lines; on stderr, so that results can be piped.
+
+    Without a terminal a line is said first after 2 s, then after 10 s and every 30 s.
+    """
     from rich.console import Console  # noqa: PLC0415  the command line starts quickly
 
-    console = Console(stderr=True)
+    console, steps = Console(stderr=True), _Steps()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         if quiet:
             yield lambda _: None
-        else:
+        elif console.is_terminal:
             with console.status("") as status:
-                yield status.update
+
+                def show(step: str) -> None:
+                    steps.update(step)
+                    status.update(str(steps))
+
+                yield show
+        else:
+            ended = Event()
+            saying = Thread(target=steps.say, args=(ended,), daemon=True)
+            saying.start()
+            try:
+                yield steps.update
+            finally:
+                ended.set()
+                saying.join()
     # One that holds for several recordings is shown once.
     for message in dict.fromkeys(str(one.message) for one in caught if issubclass(one.category, UserWarning)):
         typer.echo(f"taxel: warning: {message}", err=True)

@@ -8,14 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base.messages import counted
-from taxel.detect import Judged, PlainRule, Score, Trained
+from taxel._base.times import beginning_us
+from taxel.detect import Judged, Score, Trained
 from taxel.detect.advice import Advice
+from taxel.recorded import recorded
 from taxel.recording import Recording
 
 __all__ = ["Result"]
 
 #: How many labels without a pair a line names.
 _NAMED = 5
+#: Where to find the file of a plain rule.
+_RULE_FILE = "--json prints its file as plain_rule.rules (docs/howto.md)"
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ class Result:
             "score": self.scored.together.to_dict(),
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
             "helps": {label: one.helps for label, one in self.advice.items()},
+            "warnings": list(self._warnings()),
         }
         if self.made.alignments:
             result["alignment"] = {label: one.to_dict() for label, one in self.made.alignments.items()}
@@ -84,7 +89,7 @@ class Result:
         lines.append(repr(self.made.readout))
         for label in self.made.readout.labels if self.searched else ():
             point = self.made.recipe.neurons[label]
-            chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key != "search")
+            chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))
             lines.append(f"{label}, chosen: {chosen}")
         lines += [f"\n{one.title}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
         if len(self.scored.scores) > 1:
@@ -92,6 +97,7 @@ class Result:
         lines.append(f"\nwritten to {out}")
         if report is not None:
             lines.append(f"report: {report / 'report.html'}")
+        lines += [f"warning: {one}" for one in self._warnings()]
         return "\n".join(lines)
 
     def _scores(self, label: str) -> Iterator[str]:
@@ -104,16 +110,23 @@ class Result:
         elif rule is None:
             yield f"no plain rule for {label}: none is better than to detect nothing"
         else:
-            yield f"{_line(label, 'plain rule', plain.together[label])}; tuned on all: {_short(rule)}"
+            yield f"{_line(label, 'plain rule', plain.together[label])}; tuned on all: {rule._compared()}"
 
     def _better(self) -> Iterator[str]:
-        """Yield the labels of which the plain rule misses and invents fewer than the neuron, and what was not tried."""
+        """Yield the labels of which the plain rule is better, or as good and sooner; and the rules that are lacking."""
         plain = self.scored.plain
         if plain is None or plain.together is None:
             return
         for label in plain.better(self.scored.together):
             rule, neuron = (of[label].rank[0] for of in (plain.together, self.scored.together))
-            yield f"{label}: the plain rule is better: {rule} missed and false, the neuron {neuron}"
+            yield f"{label}: the plain rule is better: {rule} missed and false, the neuron {neuron}; {_RULE_FILE}"
+        for label in plain.sooner(self.scored.together):
+            mine, its = (of[label] for of in (plain.together, self.scored.together))
+            yield (
+                f"{label}: the plain rule is as good and knows sooner: {mine.rank[0]} missed and false, as the neuron, "
+                f"known {mine.delay.median:+.3g} ms after the label (median), the neuron {its.delay.median:+.3g} ms; "
+                f"{_RULE_FILE}"
+            )
         if plain.lacks:
             yield plain.lacks
 
@@ -123,6 +136,19 @@ class Result:
             one = self.scored.together[label]
             many = f"{one.missed / one.events:.0%} missed, {one.false / one.events:.0%} false"
             yield f"{label}: {many}; what may help is {helps}: {because}"
+
+    def _warnings(self) -> Iterator[str]:
+        """Yield the labels that the readout detects no better than one that detects nothing, and what may help."""
+        for label in self.made.readout.labels:
+            one = self.scored.together[label]
+            if one.rank[0] < one.events:
+                continue
+            which = "labels that it was trained on" if self.why else "held-out labels"
+            yield (
+                f"{label}: do not rely on this readout: {one.found} of {one.events} {which} found, {one.false} false, "
+                "no better than to detect nothing"
+                + (f"; what may help is {self.advice[label].helps}" if label in self.advice else "")
+            )
 
     def _aligned(self) -> Iterator[str]:
         """Yield by how much labels were moved to what the sensor felt, and which found no pair."""
@@ -134,17 +160,13 @@ class Result:
                 f"{label}: labels moved to what the sensor felt: median {one.median_ms:+.3g} ms, largest "
                 f"{one.largest_ms:+.3g} ms"
             )
-            places = [f"{self.opened[k].title} at {t / 1e6:.3f} s" for k, t in one.to_dict()["unpaired"]]
+            unpaired = ((self.opened[k], t) for k, t in one.to_dict()["unpaired"])
+            places = [f"{of.title} at {(t - beginning_us(recorded(of).t)) / 1e6:.3f} s" for of, t in unpaired]
             if places:
                 more = f" and {len(places) - _NAMED} more" if len(places) > _NAMED else ""
                 of = counted(len(places), "label")
                 named = ", ".join(places[:_NAMED]) + more
                 yield f"{label}: nothing was felt within 50 ms of {of}, not learnt: {named}"
-
-
-def _short(rule: PlainRule) -> str:
-    """Return what a rule compares, without its labels."""
-    return repr(rule).removeprefix("PlainRule(").rpartition(": ")[0]
 
 
 def _line(label: str, by: str, one: Score) -> str:

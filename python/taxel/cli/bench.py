@@ -110,7 +110,8 @@ def stale_results(folder: Path, names: Sequence[str]) -> dict[str, list[str]]:
 def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
     stale = stale_results(folder, names)
     for name, parts in stale.items():
-        typer.echo(f"{name}: {', '.join(parts)}")
+        more = f" and {len(parts) - 5} more" if len(parts) > 5 else ""
+        typer.echo(f"{name}: {', '.join(parts[:5])}{more}")
     typer.echo(f"{counted(len(stale), 'stale result')} of {len(files)}" if stale else "no result is stale")
 
 

@@ -86,6 +86,10 @@ def calibrate(
             "--from and --to are the time of --load: give --load",
         ),
         (
+            start is not None and stop is not None and start > stop,
+            f"--from {start} and --to {stop} s: --from must not be after --to",
+        ),
+        (
             load is None and loads is None and not law and table is None,
             "nothing to calibrate by: give --load, --loads, --table or --law",
         ),
@@ -197,7 +201,7 @@ def _loads(path: Path, frames: Frames) -> list[Load]:
         if row.get("x", "").strip() or row.get("y", "").strip():
             x, y = value("x"), value("y")
             if x != int(x) or y != int(y):
-                raise FormatError(f"{place}: taxel {x:g}, {y:g}; must be whole numbers, column and row")
+                raise FormatError(f"{place}: taxel at row {y:g}, column {x:g}; must be whole numbers")
             taxel = (int(x), int(y))
         stretch = (value("from_s"), value("to_s"))
         loads.append(_load(frames, place, value("load"), row["unit"].strip(), stretch, taxel))
@@ -222,13 +226,13 @@ def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.f
     for k, ((x, y), (reading, value)) in enumerate(zip(places, pairs, strict=True), start=2):
         if x != int(x) or y != int(y) or not (0 <= x < array.columns and 0 <= y < array.rows):
             raise FormatError(
-                f"{path.name}, line {k}: taxel {x:g}, {y:g}; the array has {array.columns} x {array.rows}"
+                f"{path.name}, line {k}: taxel at row {y:g}, column {x:g}; the array has {array.rows} x {array.columns}"
             )
         every[np.searchsorted(values, value), int(y), int(x)] = reading
     missing = np.argwhere(np.isnan(every))
     if len(missing):
         point, y, x = missing[0]
         raise FormatError(
-            f"{path.name}: no reading of taxel {x}, {y} under {values[point]:g}; each taxel needs each value"
+            f"{path.name}: no reading of row {y}, column {x} under {values[point]:g}; each taxel needs each value"
         )
     return every, values

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from taxel._core import ProblemError
 from taxel.cli._app import app, with_out
+from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import of_source
 
@@ -57,8 +57,8 @@ def convert(
 
     if target.suffix:
         try_whole(target, overwrite=overwrite)
-    # The status line is shown on a terminal only, and removed at the end.
-    with Console(stderr=True).status(f"{source} to {target}") as status:
+    with bar(as_json) as show:
+        show(f"reading {source}", 0, 0)
         opened = [of_source(one, part) for one in files.joined(source)]
         if target.suffix and len(opened) > 1:
             raise ProblemError(
@@ -69,7 +69,7 @@ def convert(
             try_whole(place, overwrite=overwrite)
         written = []
         for k, (recording, place) in enumerate(zip(opened, places, strict=True)):
-            status.update(f"{recording.name} to {place} ({k + 1} of {len(places)})")
+            show(f"{recording.name} to {place}", k, len(places) if k else 0)
             how: dict[str, Any] = {"frames_hz": frames, "compression": compression, "overwrite": overwrite}
             written.append(
                 {"source": recording.title, "target": str(place), "lost": taxel.convert(recording, place, **how)}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from taxel import _core
+from taxel._base.messages import plain
 from taxel._core import ProblemError
 from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
@@ -58,6 +59,8 @@ def cut(
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
 
+    if start is not None and stop is not None and start > stop:
+        raise ProblemError(f"--from {plain(start)} --to {plain(stop)}: the part must not end before it begins")
     whole = of_source(files.one(recording), source)
     parts = taxel.cut(
         whole,

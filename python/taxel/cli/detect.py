@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,17 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, new_report, progress, references, tare_of
+from taxel.cli._recordings import TARE_HELP, progress, references, tare_of, try_report
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from taxel.detect import Outcome, Score
-    from taxel.detections import Detections
 
 __all__ = ["detect"]
 
@@ -49,7 +50,9 @@ def detect(
             help="Score against a CSV label,t_us or recording,label,t_us, or notes: the recordings' own notes."
         ),
     ] = None,
-    window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
+    window_ms: Annotated[
+        float, typer.Option(min=0.0, help="Largest distance of a detection from its event, ms.")
+    ] = 50.0,
     csv: Annotated[Path | None, typer.Option(help="Write the detections to this .csv.")] = None,
     report: Annotated[
         Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
@@ -66,20 +69,23 @@ def detect(
     from taxel.detect.readout import run_counting  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
 
-    for place in (csv, None if report is None else new_report(report)):
-        if place is not None:
-            try_whole(place, overwrite=overwrite and place == csv)
+    if csv is not None:
+        try_whole(csv, overwrite=overwrite)
+    if report is not None:
+        try_report(report)
     loaded = load(readout)
-    opened = files.all([recording])
     outcomes = []
     with progress(as_json) as update:
+        update(f"reading {recording}")
+        opened = files.all([recording])
         events = [None] * len(opened) if truth is None else references(truth, "--truth", opened)
         if truth is not None and not any(events):
             raise ProblemError(f"--truth {truth}: names no event in {recording}")
         for one, labelled in zip(opened, events, strict=True):
-            update(f"reading {one.title}")
+            update(f"detecting in {one.title}")
             rest = tare_of(tare, one)
-            detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest)
+            with _naming(one.title if len(opened) > 1 else None):
+                detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest)
             # Labels that the readout does not have do not count as missed.
             true = None if labelled is None else {label: labelled.get(label, _NONE) for label in loaded.labels}
             scored = None if true is None else score(detections, true, window_ms)
@@ -100,13 +106,22 @@ def detect(
     for outcome in outcomes:
         if recording.is_dir() or len(outcomes) > 1:
             typer.echo(f"{outcome.name}:")
-        _print(outcome.found)
+        _print(outcome)
         if isinstance(loaded, Readout):
             typer.echo(outcome.outside_text)
     if together is not None:
         typer.echo(f"\nagainst {truth} (window {window_ms:g} ms):\n{together!r}")
     for name, path in places.items():
         typer.echo(f"written to {path}" if name == "written" else f"{name}: {path}")
+
+
+@contextmanager
+def _naming(recording: str | None) -> Iterator[None]:
+    """Name the recording, one of several, that an error is about."""
+    try:
+        yield
+    except ProblemError as error:
+        raise ProblemError(str(error) if recording is None else f"{recording}: {error}") from None
 
 
 def _result(
@@ -117,6 +132,7 @@ def _result(
         {
             "recording": one.name,
             "outside": one.outside,
+            "hint": _hint(one),
             "detections": [
                 {
                     "label": d.label,
@@ -138,6 +154,19 @@ def _result(
     return result if together is None else result | {"window_ms": window_ms, "score": together.to_dict()}
 
 
+def _hint(outcome: Outcome) -> str | None:
+    """Return what may have kept pictures from any detection: values that fall from their rest, if they do."""
+    from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
+    from taxel.recorded import recorded  # noqa: PLC0415
+    from taxel.recording.rest import of_pictures  # noqa: PLC0415
+
+    source = recorded(outcome.example.source)
+    if len(outcome.found) or not isinstance(source, Frames):
+        return None
+    rest = of_pictures(source)
+    return f"rest: {rest}" if rest.falls else None
+
+
 def _table(outcomes: Sequence[Outcome]) -> str:
     """Return the detections as a table; of several recordings each row begins with its recording's name."""
     if len(outcomes) == 1:
@@ -152,13 +181,22 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _print(detections: Detections) -> None:
+def _print(outcome: Outcome) -> None:
+    """Print detections, with times from the recording's beginning on, or what may have kept them away."""
+    from taxel.detections import Detections  # noqa: PLC0415  the command line starts quickly
+
+    found, begin_us = outcome.found, outcome.begin_us
+    detections = Detections._of(found.label, found.t - begin_us, found.known - begin_us, found.slope)
     typer.echo(repr(detections))
     if not len(detections):
+        if (hint := _hint(outcome)) is not None:
+            typer.echo(hint)
         return
+    if begin_us:
+        typer.echo(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
-    typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}  {'slope (mV/ms)':>13}")
     first = detections[:_ROWS]
+    typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}  {'slope (mV/ms)':>13}")
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
         typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}  {slope:>13.4g}")
     if len(detections) > _ROWS:

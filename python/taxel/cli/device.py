@@ -63,7 +63,7 @@ def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption =
         _print(device, device.registers, as_json)
 
 
-@_device.command("set")
+@_device.command("set", short_help="Set registers by name, and print what changed.")
 def set_registers(
     place: PlaceArgument,
     fields: Annotated[
@@ -93,7 +93,7 @@ def set_registers(
             typer.echo(f"warning: {warning}", err=True)
 
 
-@_device.command()
+@_device.command(short_help="Set a board to a preset, and read it back.")
 def apply(
     place: PlaceArgument,
     preset: Annotated[str, typer.Argument(help=f"One of {QUOTED_PRESETS}.")],
@@ -110,7 +110,7 @@ def apply(
         _print(device, device.apply(preset), as_json)
 
 
-@_device.command()
+@_device.command(short_help="Make a board mark the start or stop of a recording.")
 def record(
     place: PlaceArgument,
     what: Annotated[str, typer.Argument(help="The mark: start or stop.")],
@@ -127,7 +127,7 @@ def record(
         _print(device, device.record(what == "start"), as_json)
 
 
-@_device.command()
+@_device.command(short_help="Print the faults that a board reports, as they come.")
 def watch(
     place: PlaceArgument,
     seconds: SecondsOption = None,

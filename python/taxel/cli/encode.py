@@ -40,9 +40,9 @@ def encode(
         raise ProblemError(f"{out}: spikes are written to a .npz")
     try_whole(out, overwrite=overwrite)
     chosen = encoder_of(encoder, values or [])
-    opened = files.one(recording)
     with progress(as_json) as update:
         update(f"reading {recording}")
+        opened = files.one(recording)
         source = opened.events if opened.has_events else opened.frames()
         rest = tare_of(tare, opened)
         if rest is not None:

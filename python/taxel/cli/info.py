@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
 
 from taxel._base.messages import counted
+from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import TARE_HELP, tare_of
 from taxel.cli._topics import listed
+from taxel.clock import doubt
+from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
     from taxel.frames import Frames
@@ -70,8 +74,8 @@ def info(
     for place in (picture, table):
         if place is not None:
             try_whole(place, overwrite=overwrite)
-    # The status line is shown on a terminal only, and removed at the end.
-    with Console(stderr=True).status(f"reading {file}"):
+    with bar(as_json) as show:
+        show(f"reading {file}", 0, 0)
         if file.exists() and is_bag(file) and not files.names_topic(file):
             typer.echo(listed(file, topics(file, files.types, files.ros), as_json))
             return
@@ -156,7 +160,8 @@ def _sources(recording: Recording, tare: str | None, *, drawn: bool) -> dict[str
                 "drift_ppm": clock.drift_ppm - ours.drift_ppm,
             }
         sources[name] = facts
-    return {"file": str(recording.path), "verdict": recording.verdict, "sources": sources}
+    of_all = {"verdict": recording.verdict, "remarks": list(recording.remarks)}
+    return {"file": str(recording.path), **of_all, "sources": sources}
 
 
 def _pages(several: dict[str, Any]) -> str:
@@ -180,6 +185,7 @@ def _page(facts: dict[str, Any]) -> str:
 
     head = f"{facts['file']}: {kind_of_file(facts['kind'])}" + f", from {facts['source']}" * bool(facts["source"])
     rows = [*_contents(facts), *_rates(facts), *_losses(facts), ("verdict", facts["verdict"])]
+    rows += [("remark", line) for line in facts["remarks"]]
     rows += [("left behind", line) for line in facts["lost"]]
     lines = [head, *(f"  {name:<20}{value}" for name, value in rows)]
     lines += [f"{what} written to {facts[what]}" for what in ("picture", "table") if what in facts]
@@ -190,7 +196,9 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
 
     array = Array._from_geometry(facts["array"])
-    size = f"{array.rows} x {array.columns} taxels, {array._apart()}, {array.name}"
+    size = f"{array.rows} x {array.columns} taxels, {array._apart()}"
+    # The default's name, and that of --array, say nothing more.
+    size += "" if re.fullmatch(r"array|\d+x\d+\S*", array.name) else f", {array.name}"
     yield "array", size + (f"; a .{facts['kind']} does not hold it: --array" if facts["array_assumed"] else "")
     for name in ("side", "heel"):
         if facts[name]:
@@ -201,16 +209,22 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "events", f"{facts['events']}, {words}"
     else:
         yield ("samples" if "columns" in facts else "pictures"), f"{facts['pictures']} ({facts['unit']})"
+        yield from _flaws(facts)
     if "columns" in facts:
         yield "columns", ", ".join(facts["columns"])
     if "against" in facts:
         of = facts["against"]
         yield f"clock of {of['source']}", f"{of['offset_us']:+d} us at the beginning, {of['drift_ppm']:+.1f} ppm faster"
+        # A source of events states its own drift, and its doubt, below.
+        if "events" not in facts and (wrong := doubt(of["drift_ppm"], 0.0)):
+            yield "", wrong
     if facts["calibration"] is not None:
         yield "calibration", facts["calibration"]
     if facts["pressure"] is not None:
         yield "rest", facts["rest"]["text"]
-        yield from _pressure(facts["pressure"])
+        yield from _pressure(facts["pressure"], _begin_us(facts))
+    elif facts["rest"] is not None and facts["rest"]["falls"]:
+        yield "rest", facts["rest"]["text"]
     if facts["notes"]:
         yield "notes", str(len(facts["notes"]))
     if facts["detections"]:
@@ -218,23 +232,51 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield from _taxels(facts)
 
 
+def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield what pictures lack: values, times, and loads beyond the sensor's range."""
+    if facts["missing"]["values"]:
+        yield "missing values", f"{facts['missing']['values']} of {facts['missing']['of']}"
+    if (full := facts["full_scale"]) is not None:
+        are = "is" if full["readings"] == 1 else "are"
+        readings = (
+            f"{counted(full['readings'], 'reading')} of {counted(full['taxels'], 'taxel')} {are} at {full['value']:g}"
+        )
+        yield "full scale", f"{readings}, the greatest value: larger loads may be cut off"
+    if (gaps := facts["gaps"]) is not None:
+        longest = f"the longest {to_ms(gaps['longest_us']):g} ms, from {gaps['t_us'] - _begin_us(facts)} us"
+        yield "gaps", f"{gaps['count']} of more than 2.5 intervals between pictures, {longest}"
+
+
 def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield which taxels do not work; people count rows first."""
+
+    def at(places: list[tuple[int, int]], count: int) -> str:
+        shown = ", ".join(f"({y}, {x})" for x, y in places[:8]) + " ..." * (count > 8)
+        return f", at (row, column) {shown}" * bool(places)
+
     for name, places in facts["taxels"].items():
-        shown = ", ".join(f"({y}, {x})" for x, y in places[:8]) + " ..." * (len(places) > 8)
-        yield f"{name} taxels", f"{len(places)}" + f", at (row, column) {shown}" * bool(places)
-    if facts["taxels_untold"]:
-        yield "other taxels", f"{facts['taxels_untold']} not touched enough to say whether they work"
+        yield f"{name} taxels", f"{len(places)}{at(places, len(places))}"
+    if untold := facts["taxels_untold"]:
+        where = at(facts["taxels_untold_at"], untold)
+        yield "other taxels", f"{untold} not touched enough to say whether they work{where}"
 
 
 def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if not facts["timed"]:
         yield "time", "none: pictures are numbered; --rate-hz where a command needs times"
     elif facts["from_us"] is not None:
-        yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
+        begin = _begin_us(facts)
+        yield "board time", f"{facts['from_us'] - begin} to {facts['to_us'] - begin} us ({facts['seconds']:.3f} s)"
+        if begin:
+            yield "from", f"{begun(begin)}, {begin} us since 1970"
 
 
-def _pressure(pressed: dict[str, Any]) -> Iterator[tuple[str, str]]:
+def _begin_us(facts: dict[str, Any]) -> int:
+    """Return the time that text counts times from."""
+    return beginning_us(np.array([] if facts["from_us"] is None else [facts["from_us"]], np.int64))
+
+
+def _pressure(pressed: dict[str, Any], begin_us: int) -> Iterator[tuple[str, str]]:
     for name, words, unit in (
         ("area_mm2", "contact area", "mm2"),
         ("area_taxels", "contact area", "taxels"),
@@ -242,7 +284,9 @@ def _pressure(pressed: dict[str, Any]) -> Iterator[tuple[str, str]]:
         ("force_n", "force", "N") if "force_n" in pressed else ("sum", "sum", pressed["unit"]),
     ):
         if name in pressed:
-            yield words, f"at most {pressed[name]['most']:g} {unit}, at {pressed[name]['t_us']} us"
+            most = pressed[name]["most"]
+            size = counted(int(most), "taxel") if unit == "taxels" else f"{most:g} {unit}"
+            yield words, f"at most {size}, at {pressed[name]['t_us'] - begin_us} us"
     for unit, more in (("mm", " mm"), ("taxels", ""), ("places", " in units of the places")):
         across, down = ("column", "row") if unit == "taxels" else ("x", "y")
         if pressed.get(f"centre_{unit}") is not None:
@@ -271,7 +315,8 @@ def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in ("datagrams", "bytes", "received", "dropped_by_kernel", "dropped_by_queue", "missing_numbers"):
         if counts.get(name) is not None:
             yield name.replace("_", " "), str(counts[name])
-    no_loss = ("bytes", "words", "changes", "intensities", "markers")
-    for name, n in {**counts.get("decoder", {}), **facts["rebuilt"]}.items():
-        if n and name not in no_loss:
-            yield name.replace("_", " "), str(n)
+    no_loss = ("bytes", "words", "changes", "intensities", "markers", "datagrams", "intact", "events", "states")
+    for found in (counts.get("decoder", {}), counts.get("decoder_version_2", {}), facts["rebuilt"]):
+        for name, n in found.items():
+            if n and name not in no_loss:
+                yield name.replace("_", " "), str(n)

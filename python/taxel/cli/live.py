@@ -16,13 +16,14 @@ from rich.live import Live as Display
 from rich.text import Text
 
 from taxel._base.files import try_whole
-from taxel._base.messages import counted
+from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import SecondsOption, app, with_typed
 from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
+    BitsOption,
     CongestionOption,
     DifferencesOption,
     FromOption,
@@ -30,19 +31,22 @@ from taxel.cli._board import (
     HostOption,
     PortOption,
     PresetOption,
+    RateOption,
     ReadoutOption,
     RecordOption,
     SendOption,
     TareOption,
     asked_to_end,
     counters_table,
+    doubted,
     exit_code,
     outside,
     remote,
     rest_of,
+    stated_registers,
 )
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
-from taxel.cli._recordings import new_report
+from taxel.cli._recordings import try_report
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.detect import PlainRule, Readout, load
 from taxel.detections import Detection
@@ -55,6 +59,9 @@ from taxel.tare import Tare
 from taxel.wire import Registers
 
 __all__ = ["live"]
+
+#: How long a board may take to send its first datagram, s.
+_FIRST_WITHIN_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -72,17 +79,8 @@ class _Typed:
         ),
     ] = None
     preset: PresetOption = None
-    rate_hz: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            help="Frames a second of a sensor of your own, whose events taxel.live.Source sends, with --bits: the "
-            "registers are those that it makes.",
-        ),
-    ] = None
-    bits: Annotated[
-        int | None, typer.Option(min=1, max=16, help="With --rate-hz: bits of the sensor's values, as of the Source.")
-    ] = None
+    rate_hz: RateOption = None
+    bits: BitsOption = None
     differences: DifferencesOption = LiveOptions.differences
     address: FromOption = None
     congestion: CongestionOption = None
@@ -140,25 +138,28 @@ def live(typed: _Typed) -> None:
     """
     spikes = spikes_of(typed.to, typed.encoder, typed.values)
     _together(typed)
-    registers = _registers(typed)
     trained = None if typed.readout is None else load(typed.readout)
+    # The wire's pitch is that of the board; a sensor of one's own has the one that is stated, or none.
+    given = None if typed.array is None else geometry(typed.array, of_wire=typed.rate_hz is None)
+    stated = None if trained is None else trained.array
+    stated = stated if given is None else given
+    registers = stated_registers(typed.preset, typed.rate_hz, typed.bits, typed.address, stated)
     rest = rest_of(typed.tare)
     _fresh(typed, rest)
     if typed.report is not None:
         if typed.record is None or typed.record.suffix != ".mcap":
             raise ProblemError("--report is made from the recording: give --record FILE.mcap")
-        try_whole(new_report(typed.report))
+        try_report(typed.report)
     console = Console(stderr=True, quiet=typed.as_json)
-    with contextlib.ExitStack() as at_rest:
+    with contextlib.ExitStack() as connected, contextlib.ExitStack() as at_rest:
         if typed.control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
         lossless = typed.record is not None or trained is not None
-        board = at_rest.enter_context(remote(typed.address, typed.congestion, lossless=lossless))
+        board = connected.enter_context(remote(typed.address, typed.congestion, lossless=lossless))
         if trained is not None and registers is None and board is None:
-            array = trained.array if typed.array is None else geometry(typed.array)
-            frame_us = Registers(array=Array._of(array)).frame_us
+            frame_us = Registers(array=Array._of(stated)).frame_us
             console.print(
-                f"the readout assumes frames of {frame_us:g} us, as of a board at reset; state others by "
+                f"the readout assumes frames of {plain(frame_us)} us, as of a board at reset; state others by "
                 "--preset, or by --rate-hz and --bits",
                 soft_wrap=True,
             )
@@ -166,7 +167,7 @@ def live(typed: _Typed) -> None:
             typed.port,
             host=typed.host,
             remote=board,
-            array=None if typed.array is None else geometry(typed.array),
+            array=given,
             registers=registers,
             differences=typed.differences,
             readout=trained,
@@ -224,7 +225,8 @@ def _shown(
             shows = shown.enter_context(
                 Panel(pipeline, control=control, folder=typed.folder, host=typed.panel_host, port=typed.panel_port)
             )
-            announce(shows, typed.opens, console)
+            # Standard output has the lines of --json; whoever reads them needs the address too.
+            announce(shows, typed.opens, Console(stderr=True))
         external = viewers(shown, pipeline if shows is None else shows, typed.to or (), spikes)
         _watch(pipeline, shows, external, typed.seconds, console, at_rest, fresh=fresh, control=later)
     return pipeline if shows is None or shows.live is None else shows.live, external
@@ -258,6 +260,8 @@ def _print_summary(summary: Summary, guard_frames: float) -> None:
         )
     if counters["events_dropped"]:
         typer.echo(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
+    for why in doubted(counters):
+        typer.echo(why)
     if summary.path is not None:
         typer.echo(f"recorded to {summary.path}")
     typer.echo(summary.verdict)
@@ -294,21 +298,6 @@ def _fresh(typed: _Typed, rest: Tare | float | None) -> None:
         raise ProblemError("--control without a fresh tare: give --tare SECONDS, or --panel")
 
 
-def _registers(typed: _Typed) -> str | Registers | None:
-    """Return the registers that the options state; None if they state none."""
-    if typed.rate_hz is None and typed.bits is None:
-        return typed.preset
-    if typed.rate_hz is None or typed.bits is None:
-        raise ProblemError("--rate-hz and --bits belong together: both are those of the taxel.live.Source that sends")
-    if typed.preset is not None or typed.address is not None:
-        other = "--preset" if typed.preset is not None else "--from"
-        raise ProblemError(f"--rate-hz and {other}: both state the board's registers; give one of them")
-    array = geometry(typed.array) if typed.array is not None else None
-    if array is None and typed.readout is not None:
-        array = load(typed.readout).array
-    return Registers._of_source(Array._of(array), typed.rate_hz, typed.bits)[0]
-
-
 def _warn_of_unknown(tare: Tare) -> None:
     """Warn if a fresh tare has the rest of few taxels: encoders ignore the others."""
     known = int(np.count_nonzero(~np.isnan(tare.rest)))
@@ -342,7 +331,7 @@ def _watch(
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as asked, display:
-        before, warned = None, False
+        before, warned, silence = None, False, ""
         while not asked.is_set() and (before is None or seconds is None or before["seconds"] < seconds):
             try:
                 if panel is not None and panel.live is not None and panel.live is not pipeline:
@@ -360,6 +349,10 @@ def _watch(
                     raise
                 # A client of the panel ended this receiver, to begin another.
                 continue
+            # Where the display is not shown, each silence is one line.
+            if not console.is_terminal and bool(now_silent := _silence(now, pipeline.place)) != bool(silence):
+                silence = now_silent
+                console.print(silence or "datagrams arrive", soft_wrap=True)
             if not now["taring"]:
                 at_rest.close()
                 if panel is not None and control is not None:
@@ -373,7 +366,7 @@ def _watch(
                 warned = True
             if now["seconds"] - before["seconds"] >= REDRAW_S:
                 lines = [Text(state_of(viewer)) for viewer in external]
-                display.update(Group(counters_table(before, now), _state(now), *lines))
+                display.update(Group(counters_table(before, now), _state(now, pipeline.place), *lines))
                 before = now
 
 
@@ -390,8 +383,27 @@ def _drain(pipeline: Live, console: Console, echo: Callable[[str], None]) -> Non
         _print(detection, console, echo)
 
 
-def _state(now: dict[str, Any]) -> Text:
-    """Return the lines below the table: the tare, and losses of lines and events."""
+def _silence(now: dict[str, Any], place: str) -> str:
+    """Return a line that says that nothing arrives, since when; "" while it does."""
+    arrival = now.get("arrival")
+    if arrival is None or arrival["state"] == "arriving":
+        return ""
+    if arrival["state"] == "nothing":
+        if now["seconds"] < _FIRST_WITHIN_S:
+            return ""
+        return f"nothing has arrived on {place} so far: is the board on, and does it send to this address and port?"
+    since = f"nothing for {arrival['silent_s']:.1f} s"
+    if arrival["state"] == "quiet":
+        return f"quiet: {since}"
+    within_ms = to_ms(arrival["heartbeat_us"])
+    return f"lost: {since} from the board, though it sent a heartbeat every {within_ms:g} ms or sooner"
+
+
+def _state(now: dict[str, Any], place: str) -> Text:
+    """Return the lines below the table: silence, the tare, and losses of lines and events."""
+    silence = _silence(now, place)
+    if silence:
+        return Text(silence)
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
     sent = "".join(f"\n{counted(one['lost'], 'line')} lost to {one['to']}" for one in now["sent"] if one["lost"])

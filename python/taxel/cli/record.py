@@ -22,6 +22,7 @@ from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
     ArrayOption,
+    BitsOption,
     CompressionOption,
     DifferencesOption,
     FromOption,
@@ -30,11 +31,14 @@ from taxel.cli._board import (
     OverwriteOption,
     PortOption,
     PresetOption,
+    RateOption,
     SourceOption,
     counters_table,
+    doubted,
     exit_code,
     outside,
     remote,
+    stated_registers,
 )
 from taxel.cli._noting import noting
 from taxel.live import Live, Summary
@@ -54,6 +58,8 @@ def record(
     host: HostOption = LiveOptions.host,
     array: ArrayOption = None,
     preset: PresetOption = None,
+    rate_hz: RateOption = None,
+    bits: BitsOption = None,
     address: FromOption = None,
     seconds: SecondsOption = None,
     markers: Annotated[bool, typer.Option("--markers", help="End at the board's stop marker.")] = False,
@@ -63,7 +69,7 @@ def record(
     overwrite: OverwriteOption = LiveOptions.overwrite,
     differences: DifferencesOption = LiveOptions.differences,
     length: Annotated[
-        float | None, typer.Option(min=0.0, help="Automatic mode: record trials of this length, s.")
+        float | None, typer.Option(min=0.001, help="Automatic mode: record trials of this length, s.")
     ] = None,
     countdown: Annotated[int, typer.Option(min=0, help="Automatic mode: countdown before each trial, s.")] = 3,
     start_index: Annotated[
@@ -95,11 +101,12 @@ def record(
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
     if length is not None and seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
+    sensor = None if array is None else geometry(array, of_wire=rate_hz is None)
     live: dict[str, Any] = {
         "port": port,
         "host": host,
-        "array": None if array is None else geometry(array),
-        "registers": preset,
+        "array": sensor,
+        "registers": stated_registers(preset, rate_hz, bits, address, sensor),
         "compression": compression,
         "overwrite": overwrite,
         "differences": differences,
@@ -278,4 +285,6 @@ def _print(summary: Summary, as_json: bool) -> None:
             received = counted(counts["lines"], "line")
         trouble = counts.get("trouble")  # sources of lines alone have this key
         typer.echo(f"  {name}: {received}" + (f"; {trouble}" if trouble else ""))
+    for why in doubted(counters):
+        typer.echo(why)
     typer.echo(summary.verdict)

@@ -19,19 +19,18 @@ from taxel.cli._recordings import (
     SET_HELP,
     TARE_HELP,
     assignments,
-    new_report,
+    labelled_trials,
     progress,
     references,
     tare_before,
     tare_if_any,
     tare_of,
+    try_report,
 )
 
 if TYPE_CHECKING:
     from taxel.cli._trained import Result
     from taxel.detect import Example, Judged, Outcome, PlainScore, Readout, Recipe
-    from taxel.events import Events
-    from taxel.frames import Frames
     from taxel.recording import Recording
     from taxel.tare import Tare
 
@@ -51,10 +50,11 @@ def train(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="The recipe to start from: touch (events of a board), gait_plate (counts), gait_insole (N), "
-            "gait_channel (others); or a TOML or JSON file (a path with a dot or a slash): [encoder] or "
-            "[encoders.NAME], [learner], [neurons.LABEL], run_threshold, align. Default, without --encoder: that which "
-            "fits the recording."
+            help="The recipe to start from: touch (events of a board; contact and lift on any grid; other labels on a "
+            "grid of more than 32 taxels that no other fits), gait_plate (counts), gait_insole (N), gait_channel "
+            "(others); or a TOML or JSON file (a path with a dot or a slash): "
+            "[encoder] or [encoders.NAME], [learner], [neurons.LABEL], run_threshold, align. Default, without "
+            "--encoder: that which fits the recording and its labels."
         ),
     ] = None,
     encoder: Annotated[
@@ -102,29 +102,37 @@ def train(
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
     from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect import recipes  # noqa: PLC0415
+    from taxel.detect.floors import measured_floor  # noqa: PLC0415
+    from taxel.recorded import recorded  # noqa: PLC0415
 
     try_whole(out, overwrite=overwrite)
     if report is not None:
-        try_whole(new_report(report))
+        try_report(report)
     if folds == 1:
         raise ProblemError("--folds 1: must be 2 or more, or 0 for none")
     changes = assignments(values or [])
     changes |= {key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None}
     _planned(recipe, changes)  # reports errors of the recipe before the recordings are read
-    opened = files.all(recordings)
     with progress(as_json) as update:
-        update("reading")
+        update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3))
+        opened = labelled_trials(labels, files.all(recordings))
         labelled = references(labels, "--labels", opened)
         if not any(labelled):
-            raise ProblemError(f"--labels {labels}: names no event in {', '.join(one.title for one in opened)}")
+            table = "; give --labels FILE, a table label,t_us" if labels == "notes" else ""
+            raise ProblemError(f"--labels {labels}: names no event in {', '.join(one.title for one in opened)}{table}")
         names = sorted({label for events in labelled for label in events})
-        recipe, plan = _planned(recipe, changes, _source(opened[0]), names)
+        if recipe is None and "encoder.name" not in changes:
+            recipe, why = recipes.chosen(recorded(opened[0]), names)
+            update(f"recipe {recipe}, chosen for {why}")
+        plan = _planned(recipe, changes, names)
         assert plan is not None
-        if recipe is not None:
-            update(f"starting from the recipe {recipe}")
         if search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
             raise ProblemError("--search: the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
-        training = _Training(opened, _examples(opened, labelled, tare, plan), search, window_ms, update)
+        examples = _examples(opened, labelled, tare, plan)
+        plan = _planned(recipe, changes, names, measured_floor(examples))
+        assert plan is not None
+        training = _Training(opened, examples, search, window_ms, update)
         result, outcomes = training.result(plan, folds)
     result.made.readout.save(out, overwrite=overwrite)
     if report is not None:
@@ -139,24 +147,17 @@ def train(
 def _planned(
     recipe: str | None,
     changes: Mapping[str, Any],
-    source: Events | Frames | None = None,
     labels: Sequence[str] | None = None,
-) -> tuple[str | None, Recipe | None]:
-    """Return the name of the recipe, if it has one, and the recipe: that which fits the source if none is named."""
-    from taxel.detect import Recipe, recipes  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect.recipe import changed  # noqa: PLC0415
+    noise_floor: float | None = None,
+) -> Recipe | None:
+    """Return the recipe that is named, or that of the encoder that is; None of neither."""
+    from taxel.detect import Recipe  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect.recipe import changed, with_floor  # noqa: PLC0415
 
     if recipe is None and "encoder.name" in changes:
-        return None, Recipe.from_dict(changed({}, changes))
-    if recipe is None and source is not None:
-        recipe = recipes.fitting(source)
-    return recipe, None if recipe is None else Recipe.load(recipe, changes, labels)
-
-
-def _source(recording: Recording) -> Events | Frames:
-    from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
-
-    return recorded(recording)
+        values = changed({}, changes)
+        return Recipe.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
+    return None if recipe is None else Recipe.load(recipe, changes, labels, noise_floor)
 
 
 def _examples(
@@ -174,7 +175,7 @@ def _examples(
     else:
         rest = tare_before if rests else tare_if_any
     return [
-        Example(one, events, rest(events, one), one.title.removesuffix(one.label))
+        Example(one, events, rest(events, one), one.title.removesuffix(one.label), one.title)
         for one, events in zip(opened, labelled, strict=True)
     ]
 
@@ -220,7 +221,7 @@ class _Training:
         if scored is None:
             own = replace(own, plain=self._plain_score(plan, [one.example.labels for one in outcomes]))
         scored = own if scored is None else scored
-        advice = advised(made, self.examples, scored.together, own.together, a_point_s)
+        advice = advised(made, self.examples, scored.together, own.together, a_point_s, scored.plain)
         return Result(self.opened, made, scored, why, advice, self.window_ms, self.search), outcomes
 
     def _plain_score(self, plan: Recipe, truths: Sequence[Mapping[str, Any]]) -> PlainScore:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -13,9 +14,15 @@ from rich.console import Console
 
 from taxel._core import ProblemError
 from taxel.cli._app import SecondsOption, app
+from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._paneling import PanelHostOption, PanelPortOption, announce
+from taxel.cli._topics import listed
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
+from taxel.formats.ros import is_bag, topics
 from taxel.live import Panel
+from taxel.recording import Recording
+from taxel.recording.opening import recordings_in
+from taxel.recording.sidecars import calibrated_by
 
 __all__ = ["view"]
 
@@ -24,13 +31,23 @@ _CHECK_EVERY = 0.1
 
 
 @app.command()
+@with_file_options
 def view(
     recording: Annotated[
         Path,
         typer.Argument(
-            help="A recording, a file of another maker, or a folder. The page can open others in its folder."
+            help="A recording, a file of another maker, or a folder, for each file of which the options hold. The page "
+            "can open others in the folder."
         ),
     ],
+    files: FileOptions,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Show pictures in N or kPa by this calibration (taxel calibrate). Default: that beside the recording.",
+        ),
+    ] = None,
     panel_host: PanelHostOption = "127.0.0.1",
     panel_port: PanelPortOption = 0,
     opens: Annotated[
@@ -55,14 +72,27 @@ def view(
     Labels are saved beside the recording, in NAME.notes.csv; the recording itself is never changed.
 
     Example: taxel view walk.mcap
+    Example: taxel view grasp.bag --topic /palm --array 24x32
+    Example: taxel view press.csv --calibration press.calibration.json
     Example: taxel view walk.mcap --to rerun --speed 0.1 --encoder fa1
     """
     spikes = spikes_of(to, encoder, values)
     if speed is not None and not to:
         raise ProblemError("--speed belongs to a viewer: give --to VIEWER; the panel has its own")
     console = Console(stderr=True, quiet=as_json)
+    reading = _opening(files, calibration, recording)
     with contextlib.ExitStack() as shown:
-        panel = shown.enter_context(Panel(recording, host=panel_host, port=panel_port))
+        panel = shown.enter_context(
+            Panel(
+                recording,
+                host=panel_host,
+                port=panel_port,
+                opens=reading,
+                layout=files.layout,
+                options=files.words(),
+                rate_hz=files.rate_hz,
+            )
+        )
         external = viewers(shown, panel, to or (), spikes, 1.0 if speed is None else speed)
         if as_json:
             where = {"to": [viewer.place for viewer in external]} if external else {}
@@ -83,3 +113,26 @@ def view(
                         del reported[viewer]
                         console.print(f"shown to its end in {state_of(viewer)}", soft_wrap=True)
     report_viewers(external, quiet=as_json)
+
+
+def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> Callable[[Path], list[Recording]] | None:
+    """Return how files are opened where options say it, else None; what they do not fit is refused now."""
+    every = recordings_in(recording, files.layout) if recording.is_dir() and not is_bag(recording) else [recording]
+    if not every:
+        return None
+    first = every[0]
+    bag = is_bag(first)
+    if bag and not files.names_topic(first):
+        raise ProblemError(listed(first, topics(first, files.types, files.ros), as_json=False))
+    if not files.words() and calibration is None and not bag:
+        return None
+
+    def opens(file: Path) -> list[Recording]:
+        opened = files.joined(file)
+        if calibration is None:
+            return opened
+        return [Recording(calibrated_by(one._contents, calibration)) for one in opened]
+
+    # What was opened now, so that the errors are those of the command, is what the panel asks for first.
+    opened = {first.absolute(): opens(first)}
+    return lambda file: opened.pop(file.absolute(), None) or opens(file)

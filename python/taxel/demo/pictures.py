@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from taxel._base.messages import counted
 from taxel.demo.evaluation import Evaluation
 from taxel.demo.judging import LABELS, Judged
 from taxel.events import Events
@@ -217,7 +218,7 @@ def noise(evaluation: Evaluation) -> Figure:
         for k, at in enumerate(evaluation.detections[label].t):
             axis.axvline((at - evaluation.start_us) * 1e-6, color=_COLOURS[label], label=f"{label} detected" * (k == 0))
     axis.legend()
-    counts: Sequence[str] = [f"{len(evaluation.detections[label])} times {label}" for label in LABELS]
+    counts: Sequence[str] = [f"{counted(len(evaluation.detections[label]), 'time')} {label}" for label in LABELS]
     axis.set_xlim(0.0, seconds[-1] + 1.0)
     axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: detected {' and '.join(counts)}")
     return figure

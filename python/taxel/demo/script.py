@@ -49,7 +49,7 @@ def drawn(seed: int, index: int) -> Scene:
 
 
 def left_to_rest(seed: int, index: int) -> Scene:
-    """Draw scene `index` of a seed on a level array, on columns of foam, where nobody catches the ball."""
+    """Draw scene `index` of a seed on a level array, on columns of foam, where the ball bounces on."""
     return Scene.draw(seed, index, left_to_rest=True)
 
 

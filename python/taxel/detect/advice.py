@@ -1,4 +1,4 @@
-"""What helps a training of which many events are missed or false: more labels, another tare, or a search."""
+"""What helps a training of which many events are missed or false: another tare or recipe, the plain rule, a search."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from taxel import _core
 from taxel._base.messages import counted
+from taxel.detect import recipes
 from taxel.detect.examples import Example
+from taxel.detect.loads import lacks_neighbours
+from taxel.detect.plain_score import PlainScore
 from taxel.detect.scoring import Score
 from taxel.detect.training import Trained
-from taxel.encode import Encoder
+from taxel.encode import ContactArea, Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -32,18 +36,25 @@ _TOUCH = 2
 class Advice(NamedTuple):
     """What may help a label, and how that is known."""
 
-    helps: Literal["more labels", "another tare", "--search"]
+    helps: Literal["more labels", "another tare", "--search", "--array", "--recipe touch", "the plain rule"]
     because: str
 
 
 def advised(
-    made: Trained, examples: Sequence[Example], scored: Score, own: Score, search_s: float | None
+    made: Trained,
+    examples: Sequence[Example],
+    scored: Score,
+    own: Score,
+    search_s: float | None,
+    plain: PlainScore | None = None,
 ) -> dict[str, Advice]:
     """Return what may help each label of which more than 5 % are missed or false.
 
     Another tare where taxels read above their rest before touches begin, or nothing was felt of most labels that are
-    missed. Else more labels, where on its own training data the readout makes at most half the mistakes, as it learnt
-    by heart what these data have. Else a search of other parameters, if the recipe lists any.
+    missed. Else the plain rule, where it makes at most half the mistakes on the same labels; or the recipe that learns
+    from the same quantities, if this one does not. For contact and lift of channels their distance. Else more labels,
+    where on its own training data the readout makes at most half the mistakes, as it learnt by heart what these data
+    have. Else a search of other parameters, if the recipe lists any.
 
     Parameters
     ----------
@@ -54,6 +65,8 @@ def advised(
         Held out, and on the training data.
     search_s : float, s, optional
         How long a search tries one set of parameters of every label; None after a search.
+    plain : PlainScore, optional
+        Of the plain rules, on the labels that `scored` is of.
     """
     many = [
         label
@@ -61,10 +74,27 @@ def advised(
         if label in made.readout.labels and max(one.missed, one.false) > _MANY * one.events
     ]
     loaded = loaded_at_rest(examples, made.recipe.encoder) if many else 0
-    return {label: _advice(made, label, scored[label], own[label], loaded, search_s) for label in many}
+    better = (
+        {} if plain is None or plain.together is None else {one: plain.together[one] for one in plain.better(scored)}
+    )
+    channels = lacks_neighbours(examples)
+    return {
+        label: _advice(made, label, scored[label], own[label], loaded, search_s, better.get(label), channels=channels)
+        for label in many
+    }
 
 
-def _advice(made: Trained, label: str, scored: Score, own: Score, loaded: int, search_s: float | None) -> Advice:
+def _advice(
+    made: Trained,
+    label: str,
+    scored: Score,
+    own: Score,
+    loaded: int,
+    search_s: float | None,
+    rule: Score | None,
+    *,
+    channels: bool,
+) -> Advice:
     points = len(made.recipe.points_of(label))
     wrong, learnt = scored.missed + scored.false, own.missed + own.false
     unfelt = int(made.alignments[label].unpaired.sum()) if label in made.alignments else 0
@@ -72,9 +102,29 @@ def _advice(made: Trained, label: str, scored: Score, own: Score, loaded: int, s
         return Advice("another tare", f"{loaded} taxels read above theirs while nothing touches them")
     if 2 * unfelt > wrong:
         return Advice("another tare", f"nothing was felt of {counted(unfelt, 'label')}, unless they are wrong")
+    if rule is not None and 2 * rule.rank[0] <= wrong:
+        return _by_rule(made, rule.rank[0], wrong)
+    if channels and _for_touch(made):
+        because = "channels in a row at a known distance have neighbours; then the recipe touch fits"
+        return Advice("--array", f"{because}, as --array 1x24x5mm")
     if search_s is not None and 2 * learnt > wrong and points > 1:
         return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
     return Advice("more labels", f"of those that it learnt {own.missed} are missed, and {own.false} are false")
+
+
+def _for_touch(made: Trained) -> bool:
+    """Whether all labels are those of the recipe `touch`, contact and lift: not contact and foot off."""
+    return all(recipes.knows("touch", label) for label in made.readout.labels)
+
+
+def _by_rule(made: Trained, left: int, wrong: int) -> Advice:
+    """Return the recipe that has the inputs of plain rules, if this one has not; else the rule itself."""
+    because = f"leaves {left} missed and false on the same labels, the neuron {wrong}"
+    if _for_touch(made) and not any(isinstance(one, ContactArea) for one in made.recipe.encoder._each()):
+        return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}")
+    return Advice(
+        "the plain rule", f"it {because}; taxel train --json prints its file (docs/howto.md), and taxel detect runs it"
+    )
 
 
 def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:
@@ -93,11 +143,12 @@ def _loaded(example: Example, encoder: Encoder) -> int:
     times = np.sort(np.concatenate([*example.labels.values(), np.empty(0, np.int64)])).astype(np.int64) - _BEFORE_US
     if example.tare is None or not floors or isinstance(source, SpikeTrains) or not len(times):
         return 0
+    above = _core.touched_above(max(map(float, floors)))
     least = [
         np.min([example.tare.off(_at(source, int(t))).values for t in ends], axis=0)
         for ends in (times[:_LABELS], times[-_LABELS:])
     ]
-    return max(int(np.count_nonzero(values > max(floors) + 0.5)) for values in least)
+    return max(int(np.count_nonzero(values >= above)) for values in least)
 
 
 def _at(source: Events | Frames, t_us: int) -> Frames:

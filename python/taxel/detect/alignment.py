@@ -13,19 +13,20 @@ from taxel._base.arguments import whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.detect.followed import Followed
 from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
 from taxel.encode import Encoder
 from taxel.spikes import SpikeTrains, to_us
 
-__all__ = ["Alignment", "align"]
+__all__ = ["Alignment", "align", "aligned_to"]
 
 #: How far from its label an input spike may lie, either way, ms.
 _WINDOW_MS = 50.0
 #: Trains with more spikes a label than that are not compared with the labels: they fire throughout.
 _MOST_A_LABEL = 4
 #: Trains are alike that have so many missed and false more than the best one, or that share of the labels.
-_ALIKE, _ALIKE_SHARE = 2, 0.1
+_ALIKE, _ALIKE_SHARE = 2, 0.05
 #: Of those alike, trains whose median distance from the labels is within this of the least, ms.
 _ALIKE_MS = 2.0
 
@@ -165,7 +166,7 @@ def align(
     """
     for k, pattern in enumerate(patterns):
         if len(pattern) != len(patterns[0]):
-            raise ProblemError(f"example {k} has {len(pattern)} trains, example 0 has {len(patterns[0])}")
+            raise ProblemError(f"example {k} has {counted(len(pattern), 'train')}, example 0 has {len(patterns[0])}")
     example = np.repeat(np.arange(len(given)), [len(times) for times in given])
     # One after the other, so far apart that nothing of one pairs with another, wherever the clock of each began.
     shift = [k * APART_US - round(to_us(pattern.start)) for k, pattern in enumerate(patterns)]
@@ -189,6 +190,24 @@ def align(
     if best is not None:
         moved[scores[best].pairs[:, 1]] = scores[best].errors_ms
     return Alignment(label, best, example, np.concatenate([*given]), moved)
+
+
+def aligned_to(followed: Followed | None, label: str, given: Sequence[NDArray[np.int64]]) -> Alignment:
+    """Return by how much labels move to the onsets of the quantity that follows them; none where there is none.
+
+    Parameters
+    ----------
+    followed : Followed, optional
+        Of the patterns that the labels belong to.
+    label : str
+    given : sequence of int64, shape (events,), us
+        The labels of each pattern, ascending.
+    """
+    example = np.repeat(np.arange(len(given)), [len(times) for times in given])
+    moved = np.zeros(len(example)) if followed is None else np.full(len(example), np.nan)
+    if followed is not None:
+        moved[followed.score.pairs[:, 1]] = followed.score.errors_ms
+    return Alignment(label, None if followed is None else followed.train, example, np.concatenate([*given]), moved)
 
 
 def _best(scores: Mapping[int, Score], labels: int) -> int | None:

@@ -288,7 +288,8 @@ def read(path: str | os.PathLike[str], what: str, of_text: Callable[[str], _D]) 
     except UnicodeDecodeError:
         raise FormatError(f"{path}: not text, so no {what}") from None
     except FormatError as error:
-        raise FormatError(f"{path}: {error}") from None
+        right = f"; must be a {what} as taxel writes it" if "not JSON" in str(error) else ""
+        raise FormatError(f"{path}: {error}{right}") from None
 
 
 def tare_text(tare: Tare | None) -> str | None:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taxel._base.arguments import column, instance, shown, text
+from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.scoring import Score
@@ -19,10 +20,10 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
 
-__all__ = ["Example", "Outcome", "array_of", "checked"]
+__all__ = ["Example", "Outcome", "array_of", "called", "checked"]
 
 
 class Example(NamedTuple):
@@ -38,6 +39,8 @@ class Example(NamedTuple):
         The rest of the taxels, where the encoder needs it.
     group : str
         Examples of one group, as the two feet of a walk, share a fold; "": the example is alone.
+    name : str
+        What errors call it; "": a recording's title, else its number ("example 3").
 
     Raises
     ------
@@ -54,6 +57,12 @@ class Example(NamedTuple):
     labels: Mapping[str, Any]
     tare: Tare | None = None
     group: str = ""
+    name: str = ""
+
+
+def called(k: int, example: Example) -> str:
+    """Return what errors call the example k."""
+    return example.name or f"example {k}"
 
 
 class Outcome(NamedTuple):
@@ -79,6 +88,12 @@ class Outcome(NamedTuple):
     outside: int | None = None
 
     @property
+    def begin_us(self) -> int:
+        """The time that text counts its times from, us: its first if they count from 1970, else 0."""
+        source = recorded(self.example.source)
+        return beginning_us(np.array([int(to_us(source.start))]) if isinstance(source, SpikeTrains) else source.t)
+
+    @property
     def outside_text(self) -> str:
         """How many detections have an input outside the range that it had in training, in words."""
         what = "with an input outside what was seen in training"
@@ -99,7 +114,7 @@ def checked(examples: Sequence[Example]) -> list[Example]:
         raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        whole = isinstance(example, tuple) and len(example) in (2, 3, 4)
+        whole = isinstance(example, tuple) and len(example) in (2, 3, 4, 5)
         source = recorded(example[0]) if whole else None
         if not isinstance(source, Events | Frames | SpikeTrains):
             raise ProblemError(
@@ -107,12 +122,15 @@ def checked(examples: Sequence[Example]) -> list[Example]:
                 "and labels"
             )
         _, labels, *rest = example
+        given: list[Any] = [None, "", ""]
+        given[: len(rest)] = rest
+        tare, group, name = given
+        name = text(f"example {k}: name", name) or str(getattr(example[0], "title", f"example {k}"))
         if not isinstance(labels, Mapping):
-            raise ProblemError(f"example {k}: labels is {shown(labels)}: must be times (us) by label")
+            raise ProblemError(f"{name}: labels is {shown(labels)}: must be times (us) by label")
         times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
-        tare, group = (*rest, None, "")[:2] if len(rest) < 2 else rest
-        tare = None if tare is None else instance(f"example {k}: tare", tare, Tare)
-        sound.append(Example(source, times, tare, text(f"example {k}: group", group)))
+        tare = None if tare is None else instance(f"{name}: tare", tare, Tare)
+        sound.append(Example(source, times, tare, text(f"{name}: group", group), name))
     return sound
 
 
@@ -127,7 +145,8 @@ def array_of(examples: Sequence[Example]) -> Array | None:
     first = arrays[0]
     for k, array in enumerate(arrays):
         if (array is None) != (first is None) or (array is not None and first is not None and not first.fits(array)):
-            raise ProblemError(f"example {k} is of {array!r}, example 0 of {first!r}: must have the same taxels")
+            of = f"{called(k, examples[k])} is of {array!r}, {called(0, examples[0])} of {first!r}"
+            raise ProblemError(f"{of}: must have the same taxels")
     if first is not None:
         # One line for all, as every second recording may be of the other foot.
         any(first._warn_apart(array, "examples", stacklevel=3) for array in arrays if array is not None)

@@ -6,7 +6,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from itertools import pairwise
 from operator import add
 from typing import Any, NamedTuple
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import callback, finite, flag, instance, several, shown, whole, window
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.loads import Clock, clock_of
@@ -22,7 +23,7 @@ from taxel.detect.plain_score import PlainScore, floor_of, plain_score
 from taxel.detect.readout import Readout, run
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import Fitting, Trained, encoded, learn, readout_of, rows_of
+from taxel.detect.training import Encoded, Fitting, Known, Trained, encoded, learn, possible, readout_of, rows_of
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -158,8 +159,8 @@ def judge(
     search = flag("search", search)
     ways, how = _folds(examples, k)
     whole = instance("recipe", recipe, Recipe)
-    recipe = whole._narrowed(recipe._labels(examples), search=search)
-    patterns = encoded(examples, recipe, report)
+    recipe = possible(whole, examples)
+    patterns = Encoded(examples, recipe, report, search=search)
     array = array_of(examples)
     detections: dict[int, list[Detections]] = {}
     trained = []
@@ -168,10 +169,12 @@ def judge(
         plan = recipe
         if search:
             inner = fold.inner or _split(examples, fold.train, INNER)
-            plan = _chosen(examples, patterns, recipe, inner, window, clocks, report)
+            chosen = _chosen(examples, patterns.patterns, patterns.plan, inner, window, clocks, report)
+            plan = replace(recipe, neurons=chosen.neurons)
         with _quiet():
-            made = learn([_of(part, patterns) for part in fold.train], plan, array, report)
-        trained.append(made._replace(recipe=replace(whole, neurons=plan.neurons)))
+            parts_of = partial(_parts_of, fold.train)
+            made = learn(patterns.part(parts_of), plan, array, report)
+        trained.append(made._replace(recipe=replace(whole, neurons=plan.neurons)._at(made.recipe.neurons)))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, clocks))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
@@ -213,7 +216,7 @@ def choose(
     recipe : Recipe
         As in `judge`.
     k : int, 2 or more; or sequence of Fold
-        How many folds; of fewer examples than that, as many as there are. Or the folds themselves.
+        How many folds; of fewer recordings than that, as many as there are. Or the folds themselves.
     window_ms : float, ms
     frame_us : float, us, optional
     progress : function of a str, optional
@@ -241,7 +244,8 @@ def choose(
     report = _reporting(progress)
     if isinstance(k, int | np.integer):
         k = whole("k", k, 2, 2**31)
-        k = min(k, len(examples)) if len(examples) > 1 else k
+        recordings = len(_grouped(examples, [Part(n) for n in range(len(examples))]))
+        k = min(k, recordings) if recordings > 1 else k
     ways, _ = _folds(examples, k)
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
     chosen = _chosen(examples, encoded(examples, narrowed, report), narrowed, ways, window, clocks, report)
@@ -261,11 +265,12 @@ def _chosen(
     best: dict[str, Mapping[str, Any]] = {}
     for label in recipe._labels(examples):
         points = recipe.points_of(label)
-        best[label] = points[0]
+        choices = {key: value for key, value in recipe.neurons.get(label, {}).items() if key == "choose"}
+        best[label] = points[0] | choices
         if len(points) > 1:
             plans = [replace(recipe, neurons={label: point}) for point in points]
             marks = _marks(_only(examples, label), _only(patterns, label), plans, label, folds, window, clocks, report)
-            best[label] = points[marks.index(min(marks))]
+            best[label] = points[marks.index(min(marks))] | choices
     return replace(recipe, neurons=best)
 
 
@@ -291,6 +296,7 @@ def _marks(
     for n, fold in enumerate(folds):
         training = [_of(part, patterns) for part in fold.train]
         rows: Fitting | None = None
+        known: Known = {}
         for m in in_turn:
             plan = plans[m]
             report(f"trying point {m + 1} of {len(plans)} for {label}, fold {n + 1} of {len(folds)}")
@@ -298,7 +304,7 @@ def _marks(
                 continue
             if rows is None or not rows.fits(plan):
                 try:
-                    rows = Fitting(training, plan, label, array, lambda _: None)
+                    rows = Fitting(training, plan, label, array, lambda _: None, known=known)
                 except ProblemError:  # as where two labels lie within a longer refractory time
                     if m == 0:
                         raise
@@ -337,8 +343,8 @@ def _quiet() -> Any:
 
 
 def _detected(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
-    (source, _, tare, _), (frame_us, version) = examples[part.example], clocks[part.example]
-    detections = run(readout, source, tare=tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
+    one, (frame_us, version) = examples[part.example], clocks[part.example]
+    detections = run(readout, one.source, tare=one.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
     return detections[(detections.t >= part.start) & (detections.t < part.stop)]
 
 
@@ -351,6 +357,10 @@ def _of(part: Part, patterns: Sequence[Example]) -> Example:
     return pattern._replace(
         source=trains.between(start, max(start, stop)), labels={label: t for label, t in inside.items() if len(t)}
     )
+
+
+def _parts_of(parts: Sequence[Part], patterns: Sequence[Example]) -> list[Example]:
+    return [_of(part, patterns) for part in parts]
 
 
 def _inside(times: NDArray[np.int64], part: Part) -> NDArray[np.int64]:
@@ -499,7 +509,10 @@ def _between_events(times: NDArray[np.int64], count: int) -> Iterator[float]:
     """Yield where a part is cut: in the longest pause near each share of its events, us."""
     reach = max(1, len(times) // (2 * count))
     if len(times) < 2 * count:
-        raise ProblemError(f"folds is {count}: one recording with {len(times)} events has room for {len(times) // 2}")
+        raise ProblemError(
+            f"folds is {count}: one recording with {counted(len(times), 'event')} has room for {len(times) // 2}, as "
+            "each holds two events or more"
+        )
     for n in range(1, count):
         near = np.arange(max(1, n * len(times) // count - reach + 1), min(len(times), n * len(times) // count + reach))
         widest = near[np.argmax(times[near] - times[near - 1])]

@@ -138,6 +138,11 @@ def lacks_noise(examples: Sequence[Example]) -> bool:
     return any(one.tare is None or bool(np.isnan(one.tare.noise).all()) for one in examples)
 
 
+def lacks_neighbours(examples: Sequence[Example]) -> bool:
+    """Whether an example is of channels: their taxels have no known neighbours, and rules count those beside one."""
+    return any(not one.source.array._has_neighbours for one in examples if not isinstance(one.source, SpikeTrains))  # type: ignore[union-attr]
+
+
 def _first(example: Example) -> int:
     """Return the time of an example's first event or picture, us."""
     source = example.source

@@ -47,14 +47,15 @@ class PlainRule(_Detector):
         Names of onset and end, default "contact" and "lift"; with `age_ms` of the kinds below the threshold and not
         below it. None: those are not reported.
     noise_floor : float, 0 or more, in the sensor's unit (ticks)
-        The board's: a taxel is loaded above its rest by more than this and half a tick.
+        The board's: a taxel is loaded above its rest by more than this and half a tick, or half of a floor below 1.
     tare : Tare, optional
         The taxels' rest. It belongs to a board and a day and may be given later.
 
     Raises
     ------
-    ProblemError : parameters that are invalid or do not fit together (names the parameter); when it runs by the local
-        load with a tare that has no noise of the taxels, as an older taxel saved it
+    ProblemError : parameters that are invalid or do not fit together (names the parameter); when it runs, channels, of
+        which no taxel is known to have neighbours, or the local load with a tare that has no noise of the taxels, as an
+        older taxel saved it
 
     Notes
     -----
@@ -67,7 +68,7 @@ class PlainRule(_Detector):
     --------
     >>> from taxel import Frames, Tare
     >>> from taxel.detect import run
-    >>> frames = Frames([[[v, v]] for v in (0.0, 0.0, 9.0, 9.0, 9.0, 0.0, 0.0)], range(0, 70_000, 10_000))
+    >>> frames = Frames([[[v, v], [0.0, 0.0]] for v in (0.0, 0.0, 9.0, 9.0, 9.0, 0.0, 0.0)], range(0, 70_000, 10_000))
     >>> rule = PlainRule("area", 2, frames=2)
     >>> found = run(rule, frames, tare=Tare.take(frames, stop_us=20_000))
     >>> found
@@ -168,6 +169,10 @@ class PlainRule(_Detector):
             return f"PlainRule({self.quantity} {self.threshold:g} at {self.age_ms:g} ms: {kinds})"
         found = ", ".join(f"{name} {label}" for name, label in (("onset", first), ("end", second)) if label is not None)
         return f"PlainRule({self.quantity} >= {self.threshold:g}, release {self.release:g}, {frames}: {found})"
+
+    def _compared(self) -> str:
+        """Return what the rule compares, without its labels."""
+        return repr(self).removeprefix("PlainRule(").rpartition(": ")[0]
 
 
 def _labels(labels: object, age: float | None) -> list[str | None]:

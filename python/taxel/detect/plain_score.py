@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
-from taxel.detect.examples import Example
-from taxel.detect.loads import Clock, Loads, Stretch
+from taxel.detect.examples import Example, called
+from taxel.detect.loads import Clock, Loads, Stretch, lacks_neighbours
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.scoring import Score, score_together
 from taxel.detect.tuning import best_rules
@@ -46,6 +46,34 @@ class PlainScore:
     together: Score | None
     lacks: str = ""
 
+    def sooner(self, than: Score) -> tuple[str, ...]:
+        """Return the labels of which the rule has as few missed and false as another score and is known sooner.
+
+        Parameters
+        ----------
+        than : Score
+            Of a readout, on the same labels.
+
+        Returns
+        -------
+        tuple of str
+
+        Raises
+        ------
+        ProblemError : no Score
+
+        Examples
+        --------
+        >>> from taxel.detect import score
+        >>> true, early, late = {"contact": [1000]}, Detections(["contact"], [1100], [1200]), [1500]
+        >>> plain = PlainScore({"contact": PlainRule("area", 2)}, score(early, true))
+        >>> plain.sooner(score(Detections(["contact"], [1100], late), true))
+        ('contact',)
+        """
+        return self._where(
+            than, lambda a, b: a.rank[0] == b.rank[0] and bool(a.found) and a.delay.median < b.delay.median
+        )
+
     def better(self, than: Score) -> tuple[str, ...]:
         """Return the labels of which the rule has fewer missed and false than another score.
 
@@ -70,13 +98,14 @@ class PlainScore:
         >>> plain.better(score(Detections([], [], []), true))
         ('contact',)
         """
-        neuron = instance("than", than, Score)
+        return self._where(than, lambda a, b: a.rank[0] < b.rank[0])
+
+    def _where(self, than: Score, holds: Callable[[Score, Score], bool]) -> tuple[str, ...]:
+        """Return the labels with a rule whose score, and then the other one, are as asked."""
+        others = instance("than", than, Score).by_label
         mine = {} if self.together is None else self.together.by_label
-        return tuple(
-            label
-            for label, one in neuron.by_label.items()
-            if self.rules.get(label) is not None and mine[label].rank[0] < one.rank[0]
-        )
+        ruled = [label for label in others if self.rules.get(label) is not None]
+        return tuple(label for label in ruled if holds(mine[label], others[label]))
 
     def to_dict(self, than: Score) -> dict[str, Any]:
         """Return the rules, their score, and the labels of which they are better, as plain values.
@@ -98,6 +127,7 @@ class PlainScore:
             "rules": {label: None if rule is None else dict(rule._parts) for label, rule in self.rules.items()},
             "score": None if self.together is None else self.together.to_dict(),
             "better": list(self.better(than)),
+            "sooner": list(self.sooner(than)),
             "lacks": self.lacks,
         }
 
@@ -136,8 +166,10 @@ def plain_score(
     """
     lacking = [k for k, one in enumerate(examples) if one.tare is None or isinstance(one.source, SpikeTrains)]
     if lacking:
-        why = f"example {lacking[0]} has no tare" if len(examples) > 1 else "there is no tare"
+        why = f"{called(lacking[0], examples[lacking[0]])} has no tare" if len(examples) > 1 else "there is no tare"
         return PlainScore(dict.fromkeys(labels), None, f"{why} to measure a load from")
+    if lacks_neighbours(examples):
+        return PlainScore(dict.fromkeys(labels), None, "plain rules need neighbours on a grid, and these are channels")
     loads = Loads(examples, clocks, noise_floor, report)
     lacks = "" if "local_load" in loads.quantities else "no rule by local load: the tare has no noise of the taxels"
     report("tuning plain rules")

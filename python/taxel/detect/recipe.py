@@ -7,10 +7,10 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from taxel._base.arguments import finite, flag, instance, mapping, number, parameters, several, shown, text
+from taxel._base.arguments import finite, flag, instance, mapping, number, parameters, several, shown, text, whole
 from taxel._core import ProblemError
 from taxel.detect import recipes
 from taxel.detect.examples import Example
@@ -19,11 +19,14 @@ from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import to_us
 
-__all__ = ["Recipe", "changed", "learner_from"]
+__all__ = ["Recipe", "changed", "learner_from", "with_floor"]
 
 
 #: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
-_OF_THE_FILE = ("fits", "other")
+_OF_THE_FILE = ("fits", "also", "other")
+
+#: Keys of a neuron that list other points of it.
+_LISTS = ("search", "choose")
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,10 @@ class Recipe:
         trained to fire, the encoder's latency apart. Of a composite encoder also `inputs`: the names of the parts
         whose trains a neuron receives, in any order; all where there is none.
     neurons : mapping of str to mapping
-        The same by label, before those for all; a `search` lists other points, each as changes of that neuron. Where
-        there are any, only these labels are learnt.
+        The same by label, before those for all; a `search` lists other points, each as changes of that neuron, and
+        `choose` points that every training tries in turn: one counts if it leaves so many `fewer` events of the
+        training data missed or false than the best before it, by default three and 5 % of the labels. Where there are
+        any neurons, only these labels are learnt.
     run_threshold : float, above 0
         See `taxel.Readout`.
     about, source : str
@@ -84,8 +89,10 @@ class Recipe:
         learner_from("learner", self.learner)
         for label in self.neurons:
             self.learner_of(text("label", label))
-            for point in self.points_of(label):
-                self._checked(f"neurons.{label}.search", {**self.learner, **point})
+            for key, points in (("search", self.points_of(label)), ("choose", self._choices_of(label))):
+                for point in points:
+                    self._checked(f"neurons.{label}.{key}", {**self.learner, **point})
+            self._fewer_of(label)
 
     def learner_of(self, label: str) -> tuple[ConeR, float]:
         """Return the learner of a label, not yet fitted, and the delay with which it is trained.
@@ -167,14 +174,18 @@ class Recipe:
         aged = any(getattr(part, "ages_ms", None) is not None for part in self._received(self._of(label))._each())
         return delay_ms + (learner.neuron.step_ms if aged and learner.neuron is not None else 0.0)
 
-    def _narrowed(self, labels: Sequence[str], *, search: bool = False) -> Recipe:
+    def _narrowed(self, labels: Sequence[str], *, search: bool = False, choices: bool = True) -> Recipe:
         """Return the recipe without the parts of a composite encoder that no neuron of these labels receives.
 
-        Without `search` that is a working copy: points that it would try may name parts that are left out.
+        Without `search` or `choices` that is a working copy: points to try may name parts that are left out.
         """
         if not isinstance(self.encoder, Composite):
             return self
-        points = [{**self.learner, **p} for label in labels for p in self.points_of(label)[: None if search else 1]]
+        own = [
+            self.points_of(label)[: None if search else 1] + self._choices_of(label)[: None if choices else 1]
+            for label in labels
+        ]
+        points = [{**self.learner, **point} for each in own for point in each]
         received = {name for point in points for name in point.get("inputs", self.encoder.parts)}
         parts = {name: part for name, part in self.encoder.parts.items() if name in received}
         narrowed = copy(self)
@@ -203,9 +214,44 @@ class Recipe:
         >>> recipe.points_of("contact")
         [{'ub': 2.0}, {'ub': 3.0}]
         """
-        own = dict(self.neurons.get(text("label", label), {}))
-        listed = several(f"neurons.{label}.search", own.pop("search", ()))
-        return [own, *({**own, **mapping(f"neurons.{label}.search", point)} for point in listed)]
+        return self._points(label, "search")
+
+    def _choices_of(self, label: str) -> list[dict[str, Any]]:
+        """Return the parameters of a label's neuron, and behind them those that every training tries."""
+        points = self._points(label, "choose")
+        return [{key: value for key, value in point.items() if key != "fewer"} for point in points]
+
+    def _fewer_of(self, label: str) -> list[int | None]:
+        """Return of each point that every training tries how many fewer mistakes make it count; None: as usual."""
+        place = f"neurons.{label}.choose: fewer"
+        stated = [point.get("fewer") for point in self._points(label, "choose")[1:]]
+        return [None if fewer is None else whole(place, fewer, 0) for fewer in stated]
+
+    def _points(self, label: str, key: str) -> list[dict[str, Any]]:
+        """Return the parameters of a label's neuron, and behind them the others that it lists under a key."""
+        whole = self.neurons.get(text("label", label), {})
+        own = {name: value for name, value in whole.items() if name not in _LISTS}
+        listed = several(f"neurons.{label}.{key}", whole.get(key, ()))
+        return [own, *({**own, **mapping(f"neurons.{label}.{key}", point)} for point in listed)]
+
+    def _with_point(self, label: str, point: Mapping[str, Any]) -> Recipe:
+        """Return the recipe for one label, with these parameters and without others to try."""
+        return replace(self, neurons={label: point})
+
+    def _at(self, points: Mapping[str, Mapping[str, Any]]) -> Recipe:
+        """Return the recipe with these parameters of its neurons, and with the points that it lists."""
+        lists = {label: {key: own[key] for key in _LISTS if key in own} for label, own in self.neurons.items()}
+        return replace(self, neurons={label: {**point, **lists.get(label, {})} for label, point in points.items()})
+
+    def _without_choices(self, part: str) -> Recipe:
+        """Return the recipe without the points to choose from whose neuron receives an encoder of this name."""
+
+        def left(label: str, own: Mapping[str, Any]) -> dict[str, Any]:
+            points = [self._received({**self.learner, **point}) for point in self._choices_of(label)[1:]]
+            kept = [one for one, got in zip(own.get("choose", ()), points, strict=True) if got.name != part]
+            return {**own, "choose": kept} if kept else {key: value for key, value in own.items() if key != "choose"}
+
+        return replace(self, neurons={label: left(label, own) for label, own in self.neurons.items()})
 
     def _labels(self, examples: Sequence[Example]) -> tuple[str, ...]:
         """Return the labels that are learnt: the recipe's, or where it has none those of the examples."""
@@ -251,6 +297,7 @@ class Recipe:
         recipe: str | os.PathLike[str],
         changes: Mapping[str, Any] | None = None,
         labels: Sequence[str] | None = None,
+        noise_floor: float | None = None,
     ) -> Recipe:
         """Load one of `taxel.detect.recipes.names`, or a TOML or JSON file, whose path holds a dot or a slash.
 
@@ -262,6 +309,8 @@ class Recipe:
             one neuron, those of ``neurons.LABEL`` before all.
         labels : sequence of str, optional
             What is to be learnt: a recipe that has parameters for any `other` label gets a neuron for each.
+        noise_floor : float, above 0, in the sensor's unit, optional
+            That of the encoders for which the recipe states none, instead of a board's 3 ticks.
 
         Raises
         ------
@@ -284,7 +333,8 @@ class Recipe:
         values = recipes.read(recipe)
         if labels is not None:
             values = recipes.for_labels(values, several("labels", labels))
-        return cls.from_dict(changed(values, {} if changes is None else changes))
+        values = changed(values, {} if changes is None else changes)
+        return cls.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
 
 
 def _encoder_of(values: Mapping[str, Any]) -> Encoder:
@@ -309,6 +359,25 @@ def _encoder_of(values: Mapping[str, Any]) -> Encoder:
         except ProblemError as error:
             raise ProblemError(f"recipe: encoders.{name}: {error}") from None
     return Composite(parts)
+
+
+def with_floor(values: Mapping[str, Any], noise_floor: float) -> dict[str, Any]:
+    """Return a recipe's plain values with a noise floor in each encoder that has one and does not state it.
+
+    The least noise of a taxel belongs to the floor: it is a tenth of it, as .3 is of the board's 3 ticks.
+    """
+    own = {"noise_floor": number("noise_floor", noise_floor), "least_noise": number("noise_floor", noise_floor) / 10.0}
+
+    def stated(table: Mapping[str, Any]) -> dict[str, Any]:
+        known = inspect.signature(Encoder._by_name.get(str(table.get("name")), Encoder)).parameters
+        return {**{name: value for name, value in own.items() if name in known}, **table}
+
+    encoders = {name: stated(table) for name, table in values.get("encoders", {}).items()}
+    return {
+        **values,
+        **({"encoders": encoders} if encoders else {}),
+        **({"encoder": stated(values["encoder"])} if "encoder" in values else {}),
+    }
 
 
 def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

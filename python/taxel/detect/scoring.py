@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, floats, instance, numbers, shown
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.spikes import to_us
@@ -280,7 +281,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
     widths = numbers("window_ms", window_ms, np.float64, "ms")
     if widths.ndim > 1 or (widths.ndim == 1 and len(widths) != len(labels)):
         raise ProblemError(
-            f"window_ms has shape {widths.shape}: must be one number, or one each of {len(labels)} events"
+            f"window_ms has shape {widths.shape}: must be one number, or one each of {counted(len(labels), 'event')}"
         )
     wrong = ~((widths >= 0) & (widths <= 3_600_000))
     if wrong.any():

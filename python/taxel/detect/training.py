@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from copy import copy
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +17,18 @@ from taxel._base.arguments import callback, instance, parameters, shown
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.alignment import Alignment, ages_of, align
-from taxel.detect.examples import Example, array_of, checked
+from taxel.detect.alignment import Alignment, ages_of, align, aligned_to
+from taxel.detect.examples import Example, array_of, called, checked
+from taxel.detect.followed import FOLLOWED_MS, Followed, follow, only, silence
+from taxel.detect.loads import lacks_noise
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
+from taxel.detect.scoring import score_together
 from taxel.detect.seen import seen
-from taxel.encode import Composite
+from taxel.detections import Detections
+from taxel.encode import Composite, LocalLoad
 from taxel.learn import ConeR
-from taxel.spikes import SpikeTrains, to_ms
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
 __all__ = ["Trained", "train"]
 
@@ -34,13 +41,25 @@ _NOT_OF_ROWS = (
 )  # fmt: skip
 
 
+#: How many fewer events a point must leave missed or false to count before the first of those to choose from.
+_FEWER = 3
+#: ... and that share of the labels: of many labels some were never felt.
+_FEWER_SHARE = 0.05
+#: With so many of the quantities that follow the labels best a point is tried.
+_FOLLOWED = 2
+
+
+#: Which quantities follow the labels of one name in the same examples, by the inputs that they are among.
+Known: TypeAlias = dict[tuple[str, ...], list[Followed]]
+
+
 class Trained(NamedTuple):
     """What one training made.
 
     Attributes
     ----------
     recipe : Recipe
-        In a fold with the points that a search chose.
+        With the points that were chosen, in a fold by its search too.
     learners : mapping of str to ConeR
         The fitted learners, by label.
     readout : Readout
@@ -103,8 +122,59 @@ def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str
     """Train a readout as `train` does, and return how its labels were aligned as well."""
     sound = checked(examples)
     report = (lambda _: None) if progress is None else callback("progress", progress)
-    narrowed = instance("recipe", recipe, Recipe)._narrowed(recipe._labels(sound))
-    return learn(encoded(sound, narrowed, report), narrowed, array_of(sound), report)._replace(recipe=recipe)
+    possibly = possible(instance("recipe", recipe, Recipe), sound)
+    made = learn(Encoded(sound, possibly, report), possibly, array_of(sound), report)
+    return made._replace(recipe=recipe._at(made.recipe.neurons))
+
+
+def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
+    """Return the recipe without the points to choose from that (checked) examples do not allow.
+
+    The local load requires a tare with the noise of the taxels, which an older taxel did not save.
+    """
+    return recipe._without_choices(LocalLoad.name) if lacks_noise(examples) else recipe
+
+
+class Encoded:
+    """The (checked) examples as spike trains of a recipe's encoder; what only points to choose from need when they do.
+
+    Parameters
+    ----------
+    search : bool
+        Whether the points of a search are needed too; then all is encoded at once.
+    """
+
+    def __init__(
+        self, examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object], *, search: bool = False
+    ) -> None:
+        labels = recipe._labels(examples)
+        given = search or any(isinstance(one.source, SpikeTrains) for one in examples)
+        #: The recipe with the parts of `patterns`.
+        self.plan = recipe._narrowed(labels, search=search, choices=given)
+        #: The examples as the trains that the first points receive.
+        self.patterns = encoded(examples, self.plan, report)
+        self._others: dict[str, Sequence[Example]] = {}
+        self._encode: Callable[[Recipe], Sequence[Example]] = lambda plan: encoded(examples, plan, report)
+
+    def receiving(self, plan: Recipe) -> tuple[Recipe, Sequence[Example]]:
+        """Return a recipe for one point of one label with the parts that the trains are of, and these trains."""
+        (label,) = plan.neurons
+        own = plan._narrowed([label])
+        have, need = (one.encoder._each() for one in (self.plan, own))
+        if all(part in have for part in need):
+            return replace(plan, encoder=self.plan.encoder), self.patterns
+        key = own.encoder.to_json()
+        if key not in self._others:
+            self._others[key] = self._encode(own)
+        return own, self._others[key]
+
+    def part(self, of: Callable[[Sequence[Example]], list[Example]]) -> Encoded:
+        """Return a part of all examples, which shares their trains."""
+        mine = copy(self)
+        mine.patterns = of(self.patterns)
+        mine._others = {}
+        mine._encode = lambda plan: of(self.receiving(plan)[1])
+        return mine
 
 
 def encoded(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> list[Example]:
@@ -135,16 +205,81 @@ def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | Non
     return Readout(encoder, learners, array=array, delay_ms=delays, run_threshold=threshold, inputs=inputs)
 
 
-def learn(patterns: Sequence[Example], recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
+def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
     """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
     learners, alignments, ranges = {}, {}, {}
-    for label in _labels_to_learn(patterns, recipe):
-        fitting = Fitting(patterns, recipe, label, array, report)
-        learners[label] = fitting.fit(recipe)
+    points = dict(recipe.neurons)
+    for label in _labels_to_learn(examples.patterns, recipe):
+        _, fitting, learners[label], points[label], _ = _best(examples, recipe, label, array, report)
         ranges[label] = fitting.seen(learners[label])
         if fitting.alignment is not None:
             alignments[label] = fitting.alignment
-    return Trained(recipe, learners, readout_of(learners, recipe, array)._with_seen(ranges), alignments)
+    made = replace(recipe, neurons=points) if recipe.neurons else recipe
+    return Trained(made, learners, readout_of(learners, made, array)._with_seen(ranges), alignments)
+
+
+class _Fit(NamedTuple):
+    """One point of a label's neuron, fitted."""
+
+    wrong: int
+    """Events of the training data missed or false; 0 where nothing is chosen."""
+    fitting: Fitting
+    learner: ConeR
+    point: Mapping[str, Any]
+    caught: list[warnings.WarningMessage]
+
+
+def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, report: Callable[[str], object]) -> _Fit:
+    """Return the first of the points to choose from, or a later one that leaves fewer events missed or false.
+
+    They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
+    `_FEWER_SHARE` of the labels, as some more or less are chance; with 0 it counts if it leaves no more. Where an
+    encoder has quantities that labels may follow, a point is tried with each of the `_FOLLOWED` that follow them best.
+    A later point that cannot be learnt is left out. Warnings are those of the point that counts.
+    """
+    points = recipe._choices_of(label)
+    known: Known = {}
+
+    def fitted(point: Mapping[str, Any], place: int) -> _Fit:
+        plan, patterns = examples.receiving(recipe._with_point(label, point))
+        return _fitted(patterns, plan, label, array, report, point, place, known, count=len(points) > 1)
+
+    best = fitted(points[0], 0)
+    usual = max(_FEWER, _FEWER_SHARE * sum(len(one.labels.get(label, ())) for one in examples.patterns))
+    for point, stated in zip(points[1:], recipe._fewer_of(label), strict=True):
+        fewer = usual if stated is None else stated
+        if best.wrong < fewer:
+            continue
+        others = []
+        followed = recipe._received(recipe._with_point(label, point)._of(label))._quantities()
+        for place in range(_FOLLOWED if followed else 1):
+            with contextlib.suppress(ProblemError):
+                others.append(fitted(point, place))
+        other = min(others, key=lambda one: one.wrong, default=best)
+        best = other if other.wrong <= best.wrong - fewer else best
+    for one in best.caught:
+        warnings.warn(one.message, stacklevel=5)
+    return best
+
+
+def _fitted(
+    patterns: Sequence[Example],
+    plan: Recipe,
+    label: str,
+    array: Array | None,
+    report: Callable[[str], object],
+    point: Mapping[str, Any],
+    place: int,
+    known: Known,
+    *,
+    count: bool,
+) -> _Fit:
+    """Fit the point that a recipe has of a label's neuron; `count` what it leaves missed and false."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fitting = Fitting(patterns, plan, label, array, report, place, known)
+        learner = fitting.fit(plan)
+    return _Fit(fitting.wrong(learner, plan.run_threshold) if count else 0, fitting, learner, point, caught)
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
@@ -162,9 +297,12 @@ def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, 
 class Fitting:
     """The rows of one label's learner on encoded examples, for a recipe and all others that need the same.
 
+    Of an encoder with quantities that labels may follow it has those of one alone: the best, or `place` behind it.
+    Which follow the labels is `known` from other fits to the same examples, and is added to it.
+
     Raises
     ------
-    ProblemError : no example has such an event, or one lies outside its example (names it)
+    ProblemError : no example has such an event, or one lies outside its example (names it); too few quantities
     """
 
     def __init__(
@@ -174,28 +312,56 @@ class Fitting:
         label: str,
         array: Array | None,
         report: Callable[[str], object],
+        place: int = 0,
+        known: Known | None = None,
     ) -> None:
         self._label = label
         self._needs = rows_of(recipe, label)
         learner, _ = recipe.learner_of(label)
         received = recipe._received(recipe._of(label))
         self._shift_ms = received.latency_ms + recipe._trained_delay_of(label)
-        given = [_times(k, one, label) for k, one in enumerate(examples)]
+        given = self._given = [_times(k, one, label) for k, one in enumerate(examples)]
         count = sum(map(len, given))
         if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         sources = [_inputs(k, one, recipe, label, array) for k, one in enumerate(examples)]
-        self._sources, self._graded = sources, received.kind == "graded"
-        ages = ages_of(received, array)
-        self.alignment = align(sources, label, given, received.latency_ms, ages) if recipe.align else None
+        self._graded = received.kind == "graded"
+        quantities = received._quantities() if recipe.align else {}
+        followed = None
+        self.alignment: Alignment | None = None
+        if quantities:
+            known = {} if known is None else known
+            inputs = recipe.inputs_of(label)
+            if inputs not in known:
+                known[inputs] = follow(sources, label, given, received.latency_ms, list(quantities))
+            every = known[inputs]
+            if len(every) <= place and place:
+                raise ProblemError(f"{label}: {counted(len(every), 'quantity', 'quantities')} follow it")
+            followed = every[place] if every else None
+            self.alignment = aligned_to(followed, label, given)
+        elif recipe.align:
+            self.alignment = align(sources, label, given, received.latency_ms, ages_of(received, array))
+        self._names = [called(k, one) for k, one in enumerate(examples)]
+        self._sources = sources if followed is None else [only(one, quantities[followed.train]) for one in sources]
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
         self._targets = [to_ms(times) + self._shift_ms for times in felt]
-        trains = [_until(source, targets) for source, targets in zip(sources, self._targets, strict=True)]
+        trains = [_until(source, targets) for source, targets in zip(self._sources, self._targets, strict=True)]
+        for k, (train, times) in enumerate(zip(trains, self._targets, strict=True)):
+            if len(times) and not len(train.times):
+                where = called(k, examples[k]) if len(trains) > 1 else "the recording"
+                raise ProblemError(
+                    f"{label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; taxel "
+                    "info shows what was touched; falls = true in a layout file turns readings that fall with pressure"
+                )
+        silent = None
+        if followed is not None:
+            grid = learner._on_grid()
+            silent = silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, grid.step_ms)
         self._what = f"learning {label} from {counted(count, 'event')}"
         self._report = report
         report(self._what)
         try:
-            self._rows = learner.prepare(trains, self._targets)
+            self._rows = learner.prepare(trains, self._targets, silence=silent)
         except ProblemError as error:
             raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
@@ -203,6 +369,23 @@ class Fitting:
     def fits(self, recipe: Recipe) -> bool:
         """Whether the learner that a recipe describes needs these rows."""
         return self._needs == rows_of(recipe, self._label)
+
+    def _unpaired(self) -> list[NDArray[np.float64]]:
+        """Return the labels of each example that were not aligned, ms."""
+        of = self.alignment
+        assert of is not None
+        return [to_ms(of.given[of.unpaired & (of.example == k)]) for k in range(len(self._given))]
+
+    def wrong(self, cone: ConeR, run_threshold: float) -> int:
+        """Return how many labels, as given, a fitted learner misses on these examples, and how many it invents."""
+        neuron = cone._on_grid()
+        neuron.set_params(theta_0=run_threshold * neuron.theta_0)
+        found, truths = [], []
+        for source, given in zip(self._sources, self._given, strict=True):
+            t = np.rint(to_us(neuron.run(cone.weights_, source) - self._shift_ms)).astype(np.int64)
+            found.append(Detections([self._label] * len(t), t, t))
+            truths.append({self._label: given})
+        return score_together(found, truths, FOLLOWED_MS).rank[0]
 
     def seen(self, cone: ConeR) -> dict[str, Any]:
         """Return the range of the inputs of a fitted learner's neuron."""
@@ -220,7 +403,7 @@ class Fitting:
                     f"{self._what}, round {n}: within {gap:.1e} of the least"
                 ),
             )
-        for text_of in _remarks(cone, self._targets, self._shift_ms, caught):
+        for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, caught):
             warnings.warn(f"{self._label}: {text_of}", stacklevel=5)
         return cone
 
@@ -234,7 +417,8 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
     if len(outside):
         raise ProblemError(
-            f"example {k}: {label} at {outside[0]:g} ms lies outside it, {source.start:g} to {source.stop:g} ms"
+            f"{called(k, example)}: {label} at {outside[0]:.3f} ms lies outside it, {source.start:.3f} to "
+            f"{source.stop:.3f} ms"
         )
     return events
 
@@ -254,17 +438,22 @@ def _inputs(k: int, example: Example, recipe: Recipe, label: str, array: Array |
         return trains
     places = encoder.places(names, array or Array(1, 1))
     if len(places) != len(trains):
-        raise ProblemError(f"example {k}: {len(trains)} trains, the encoders make {len(places)}: must be equally many")
+        made = f"{counted(len(trains), 'train')}, the encoders make {len(places)}"
+        raise ProblemError(f"{called(k, example)}: {made}: must be equally many")
     return trains.select(places)
 
 
 def _remarks(
-    cone: ConeR, targets: Sequence[NDArray[np.float64]], shift_ms: float, caught: Sequence[warnings.WarningMessage]
+    cone: ConeR,
+    targets: Sequence[NDArray[np.float64]],
+    names: Sequence[str],
+    shift_ms: float,
+    caught: Sequence[warnings.WarningMessage],
 ) -> Iterator[str]:
     """Yield the warnings of a fit, which name events and examples."""
     missed = cone.unreachable_
     if missed:
-        places = [f"{targets[p][k] - shift_ms:.10g} ms" + f" of example {p}" * (len(targets) > 1) for p, k in missed]
+        places = [f"{targets[p][k] - shift_ms:.10g} ms" + f" of {names[p]}" * (len(targets) > 1) for p, k in missed]
         listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
         yield (
             f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too few input spikes come before "

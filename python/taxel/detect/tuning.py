@@ -87,7 +87,7 @@ def tune(
 
     Raises
     ------
-    ProblemError : examples that are invalid, or without a tare
+    ProblemError : examples that are invalid, without a tare, or of channels, which have no neighbours
 
     Notes
     -----
@@ -97,7 +97,7 @@ def tune(
     Examples
     --------
     >>> from taxel import Frames, Tare
-    >>> frames = Frames([[[v, v]] for v in (0.0, 0.0, 9.0, 9.0, 9.0, 0.0, 0.0)], range(0, 70_000, 10_000))
+    >>> frames = Frames([[[v, v], [0.0, 0.0]] for v in (0.0, 0.0, 9.0, 9.0, 9.0, 0.0, 0.0)], range(0, 70_000, 10_000))
     >>> example = Example(frames, {"touch": [20_000], "removal": [50_000]}, Tare.take(frames, stop_us=20_000))
     >>> rules = tune([example], window_ms=5.0)
     >>> rules["touch"], rules["removal"]

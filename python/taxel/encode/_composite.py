@@ -71,40 +71,9 @@ class Composite(Encoder):
         return [self.parts[name] for name in sorted(self.parts)]
 
     def with_tare(self, tare: Tare) -> Self:
-        """Return the same encoders with this tare; a part without a parameter `tare` is unchanged.
-
-        Parameters
-        ----------
-        tare : Tare
-            The taxels' rest.
-
-        Returns
-        -------
-        Composite
-            A copy; this encoder is not changed.
-
-        Raises
-        ------
-        ProblemError : no tare
-        """
         return type(self)({name: part.with_tare(tare) for name, part in self.parts.items()})
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
-        """Return the spikes of a whole recording; a part's tare in seconds is measured at its beginning.
-
-        Parameters
-        ----------
-        x : Events, Frames or Recording
-            As in `Encoder.encode`.
-
-        Returns
-        -------
-        SpikeTrains
-
-        Raises
-        ------
-        ProblemError : as `Encoder.encode` of each part
-        """
         held = recorded(x)
         parts = {n: part._with_rest_of(held)[0] if isinstance(part, Tared) else part for n, part in self.parts.items()}
         return super(Composite, type(self)(parts)).encode(held)

@@ -103,6 +103,13 @@ class Encoder(Value):
         """Return the encoders that it is made of: itself, or the parts of a composite in the order of their trains."""
         return [self]
 
+    def _quantities(self) -> dict[int, tuple[int, ...]]:
+        """Return the quantities whose onsets labels may follow, by train, each with the trains about it.
+
+        Such an encoder is graded with logarithms of 1 + quantity, and its last train has a spike at every sample.
+        """
+        return {}
+
     def trains(self, array: Array) -> int:
         """Return the number of trains that the encoder returns for an array; a signed train counts once.
 
@@ -142,7 +149,7 @@ class Encoder(Value):
         return _core.encoder_about(self._json(), Array(1, 1)._parts())[2]
 
     def with_tare(self, tare: Tare) -> Self:
-        """Return the same encoder with this tare; an encoder without a parameter `tare` is returned unchanged.
+        """Return the same encoder with this tare; one without a parameter `tare`, or such a part, is unchanged.
 
         Parameters
         ----------
@@ -169,7 +176,7 @@ class Encoder(Value):
         return self
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
-        """Return the spikes of a whole recording.
+        """Return the spikes of a whole recording; a tare in seconds is measured at its beginning.
 
         Parameters
         ----------
@@ -187,7 +194,8 @@ class Encoder(Value):
         Raises
         ------
         ProblemError : none of these, events without intensities, or one more than 0.1 s behind another
-            (names it; `Events.sorted` puts them in order)
+            (names it; `Events.sorted` puts them in order); a parameter `tare` that is None, another array's, or more
+            than half of the recording
 
         Examples
         --------

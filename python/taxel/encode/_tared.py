@@ -52,21 +52,6 @@ class Tared(Encoder):
         return {name: value for name, value in super()._plain().items() if name not in rest} | rest
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
-        """Return the spikes of a whole recording; a tare in seconds is measured at its beginning.
-
-        Parameters
-        ----------
-        x : Events, Frames or Recording
-            As in `Encoder.encode`.
-
-        Returns
-        -------
-        SpikeTrains
-
-        Raises
-        ------
-        ProblemError : as `Encoder.encode`; no tare, another array's, or one longer than half of the recording
-        """
         encoder, held = self._with_rest_of(x)
         return super(Tared, encoder).encode(held)
 
@@ -99,22 +84,6 @@ class Tared(Encoder):
         return None if self._is_rest() else self.tare
 
     def with_tare(self, tare: Tare) -> Self:
-        """Return the same encoder with this tare.
-
-        Parameters
-        ----------
-        tare : Tare
-            The taxels' rest.
-
-        Returns
-        -------
-        Encoder
-            A copy; this encoder is not changed.
-
-        Raises
-        ------
-        ProblemError : no tare
-        """
         super().with_tare(tare)
         return copy.copy(self).set_params(tare=tare)
 

@@ -20,10 +20,11 @@ _DEFAULT = defaults("contact_area")
 class ContactArea(Tared):
     """Fire when the number of loaded taxels rises to a level, and when it falls below the level.
 
-    A taxel is loaded while its held value exceeds its rest by the noise floor and half a tick; it counts if one of its
-    8 neighbours is loaded too. A taxel without a value, in the tare or since, is unloaded. The number is computed once
-    a stamp, after the last event with it, and spikes have the time of the stamp. Spikes do not depend on the position
-    of a touch, so weights that are learnt at one position apply to others.
+    A taxel is loaded while its held value exceeds its rest by the noise floor and half a tick (half of a floor below 1,
+    which is that of a unit coarser than the values); it counts if one of its 8 neighbours is loaded too. A taxel
+    without a value, in the tare or since, is unloaded. The number is computed once a stamp, after the last event with
+    it, and spikes have the time of the stamp. Spikes do not depend on the position of a touch, so weights that are
+    learnt at one position apply to others.
 
     Trains are unsigned: rises to each level, then falls below each; ten by default.
 

@@ -47,6 +47,11 @@ class LocalLoad(Tared):
     0. A taxel that has been 0 since the first sample has no value yet and counts as at rest; one without a value in the
     tare is left out. Computed in float32 above float64 baselines.
 
+    With `levels` the trains are others, unsigned: of each quantity *largest* or *largest below*, in the order above,
+    one per level that fires when the quantity rises to it; then as many, in the same order, that fire when it falls
+    below `release` x level. They are computed once a stamp, after the last event with it, and as the rest moves; spikes
+    have the time of the stamp. A stuck taxel or two do not reach a level of 4.
+
     Parameters
     ----------
     noise_floor : float, in the sensor's unit (ticks), 0 or more
@@ -56,11 +61,15 @@ class LocalLoad(Tared):
         between its values.
     rest : {"tracked", "tare"}
         "tare" is constant. "tracked" begins at the tare and follows each taxel's value: with a time constant of 1 s
-        while |u| is less than the larger of noise_floor + 0.5 and 5 sigma, else of 20 s.
+        while abs(u) is less than the larger of noise_floor + 0.5 and 5 sigma, else of 20 s.
     local_ms : sequence of float, ms, above 0
         Time constants of running means, with six quantities each; (50, 300) for objects that stay.
     period_ms : float, ms, whole us
-        Sampling period of events; the step of the wire's stamps is lossless.
+        Sampling period of events; the step of the wire's stamps is lossless. Levels are not sampled.
+    levels : sequence of float, units of noise, ascending, above 0
+        Levels of the largest sums, which are 9 at most, instead of graded quantities; none by default.
+    release : float, from 0.01 to 1
+        The part of a level below which it is left. Below 1, noise near a level does not cross it again and again.
     tare : Tare, or float, s, optional
         The taxels' rest and noise, or the duration of rest at the beginning of each recording. It is valid for one
         board on one day, so a saved readout has none; encoding requires one.
@@ -83,6 +92,12 @@ class LocalLoad(Tared):
     >>> load.values(frames)[:, :4].round(2)
     array([[ 0.  ,  0.  ,  0.  ,  0.  ],
            [ 2.  ,  3.46,  0.  , 18.  ]])
+
+    With levels it fires when the largest sum rises to 2 and to 3; it never falls below them.
+
+    >>> spikes = LocalLoad(levels=(2, 3), tare=tare).encode(frames)
+    >>> [train.tolist() for train in spikes]
+    [[1.0], [1.0], [], []]
     """
 
     name = "local_load"
@@ -92,11 +107,13 @@ class LocalLoad(Tared):
     rest: Literal["tracked", "tare"] = _DEFAULT.rest
     local_ms: Sequence[float] = _DEFAULT.local_ms
     period_ms: float = _DEFAULT.period_ms
+    levels: Sequence[float] = _DEFAULT.levels
+    release: float = _DEFAULT.release
     tare: Tare | float | None = _DEFAULT.tare
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The names of the quantities, in the order of trains and of the columns of `values`.
+        """The names of the quantities, in the order of the columns of `values`, and without `levels` of the trains.
 
         Examples
         --------
@@ -105,6 +122,16 @@ class LocalLoad(Tared):
         (57, 'area, 50 ms', 'total, mean of 0 to 50 ms ago')
         """
         return tuple(_core.local_load_quantities(self._json()))
+
+    def _quantities(self) -> dict[int, tuple[int, ...]]:
+        if len(self.levels):
+            return {}
+        names = self.quantities
+        return {
+            k: (*(n for n, name in enumerate(names) if name == own or name.startswith(f"{own}, mean")), len(names) - 1)
+            for k, own in enumerate(names)
+            if own.startswith("largest") and ", mean" not in own
+        }
 
     def values(self, x: Events | Frames | Recorded) -> NDArray[np.float64]:
         """Return the quantities themselves, of which `encode` returns log(1 + quantity) as graded spikes.

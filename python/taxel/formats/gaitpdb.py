@@ -67,7 +67,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
         if match is None:
             raise FormatError(f"{file.name}: must be named such as GaCo02_01.txt")
         person = match[1]
-        values = text.numbers([line.split("\t") for line in text.lines(file)], file, 1, _COLUMNS)
+        values = text.numbers((line.split("\t") for line in text.lines(file)), file, 1, _COLUMNS)
         t = ascending_us(file.name, values[:, 0], 1)
         if len(t) < 2:
             raise FormatError(f"{file.name}: fewer than 2 lines: must have more")

@@ -34,10 +34,10 @@ def files(path: Path) -> list[Path]:
 
 def _begins_so(path: Path) -> bool:
     try:
-        head = text.lines(path)[:1]
+        head = text.head(path)
     except (FormatError, OSError):
         return False
-    return bool(head) and head[0].startswith("trial,slice,") and "thumb_1" in head[0]
+    return head.startswith("trial,slice,") and "thumb_1" in head
 
 
 def trials(path: str | Path) -> Iterator[Trial]:

@@ -1,11 +1,13 @@
 """Layout files: what a recording lacks, in one TOML file beside it.
 
 A layout says of a sensor its rows, columns, pitch or places, side and heel; of readings whether they fall with
-pressure, their unit and their rate; and how to read a table or an array of somebody else. docs/files.md lists the keys.
+pressure, their unit and their rate; and how to read a table or an array of another program. The keys are listed in
+docs/files.md.
 """
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -18,7 +20,7 @@ from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
 
-__all__ = ["Data", "Layout", "Table", "packaged"]
+__all__ = ["Data", "Layout", "Table", "advice", "packaged"]
 
 #: Times of a table in units of these, us.
 UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
@@ -66,12 +68,12 @@ class Table:
 
 @dataclass(frozen=True)
 class Data:
-    """Say which array of a .npz or .h5 of somebody else holds the pictures; a .npy holds one array without a name.
+    """Say which array of another program's .npz or .h5 holds the pictures; a .npy holds one array without a name.
 
     Parameters
     ----------
     array : str, optional
-        Of shape (pictures, rows, columns) or (pictures, taxels).
+        Of shape (pictures, rows, columns) or (pictures, taxels); in a group of a .h5 by its path, "run1/pressure".
     time : str, optional
         An array of one time a picture; default: none.
     time_unit : {"s", "ms", "us"}
@@ -197,9 +199,8 @@ class Layout:
         >>> Layout.beside(Path("a recording that is not there.csv")) is None
         True
         """
-        stem = path.name.removesuffix(".gz").rpartition(".")[0] or path.name
         folder = [path / "layout.toml"] if path.is_dir() else []
-        for candidate in (path.with_name(f"{stem}.layout.toml"), *folder, path.with_name("layout.toml")):
+        for candidate in (path.with_name(_name(path)), *folder, path.with_name("layout.toml")):
             if candidate.is_file():
                 return candidate
         return None
@@ -236,20 +237,32 @@ class Layout:
         return Array(rows, columns, self.pitch_mm, exists, name, places)
 
 
+def advice(path: Path, says: str) -> str:
+    """Return the end of an error: which layout file beside a recording, or by ``--layout``, says what is lacking.
+
+    Examples
+    --------
+    >>> advice(Path("data/walk.csv.gz"), "describes a table of another program")
+    'a layout file beside it, walk.layout.toml, describes a table of another program (docs/files.md)'
+    """
+    return f"a layout file beside it, {_name(path)}, {says} (docs/files.md)"
+
+
+def _name(path: Path) -> str:
+    """Return the name of the layout file of one recording."""
+    return f"{path.name.removesuffix('.gz').rpartition('.')[0] or path.name}.layout.toml"
+
+
 def _values(document: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a file by the names of the fields of `Layout`."""
-    tables: dict[str, type[Any]] = {"places": Places, "table": Table, "data": Data, "ros": dict}
     _known("", document, [one.name for one in fields(Layout) if one.name != "place"])
     values: dict[str, Any] = {}
     for name, value in document.items():
-        if name in tables:
+        if name in _TABLES:
             inner = mapping(name, value)
-            if name != "ros":
-                _known(f"{name}.", inner, [one.name for one in fields(tables[name])])
-            else:
-                _known("ros.", inner, ["topic", "field", "types", "ros"])
+            _known(f"{name}.", inner, _keys(_TABLES[name]))
             try:
-                values[name] = tables[name](**inner)
+                values[name] = _TABLES[name](**inner)
             except (ProblemError, TypeError) as error:
                 raise ProblemError(f"[{name}]: {first_line(error)}") from None
         else:
@@ -259,10 +272,38 @@ def _values(document: dict[str, Any]) -> dict[str, Any]:
     return values
 
 
+#: The tables of a layout file by their names.
+_TABLES: dict[str, type[Any]] = {"places": Places, "table": Table, "data": Data, "ros": dict}
+
+
+def _keys(table: type[Any]) -> list[str]:
+    """Return the keys of a table; the mapping is that of a ROS bag."""
+    return ["topic", "field", "types", "ros"] if table is dict else [one.name for one in fields(table)]
+
+
 def _known(before: str, values: Mapping[str, Any], names: list[str]) -> None:
     unknown = next((name for name in values if name not in names), None)
     if unknown is not None:
-        raise ProblemError(f"unknown key {before}{unknown}; there are {', '.join(names)}")
+        inner = next((f" in [{one}]" for one, of in _TABLES.items() if not before and unknown in _keys(of)), "")
+        of_size = as_size(values[unknown])
+        hint = f"; a size is said by {of_size}" if of_size else f"; it stands{inner}" if inner else ""
+        raise ProblemError(f"unknown key {before}{unknown}{hint}; there are {', '.join(names)}")
+
+
+def as_size(value: object) -> str:
+    """Return the keys that say a size such as "5x12" or "5x12x2.5", for errors; "" of any other value.
+
+    Examples
+    --------
+    >>> as_size("5x12"), as_size("5 x 12 x 2.5"), as_size("palm")
+    ('rows = 5, columns = 12', 'rows = 5, columns = 12, pitch_mm = 2.5', '')
+    """
+    size = (
+        re.fullmatch(r"\s*(\d+)\s*x\s*(\d+)\s*(?:x\s*(\d+(?:\.\d+)?)\s*)?", value) if isinstance(value, str) else None
+    )
+    if size is None:
+        return ""
+    return f"rows = {size[1]}, columns = {size[2]}" + (f", pitch_mm = {size[3]}" if size[3] else "")
 
 
 @cache

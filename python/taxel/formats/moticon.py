@@ -131,6 +131,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             else (0, 0),
             series={"total": values[:, -1]},
             about=about,
+            unread=tuple(name for k, name in enumerate(names) if k not in chosen and name.startswith(f"{foot} ")),
         )
 
 

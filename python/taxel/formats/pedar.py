@@ -78,7 +78,7 @@ def _read(file: Path) -> Iterator[Trial]:
         raise FormatError(
             f"{file.name}, line {head + 1}: numbers begin at 1 {len(begins)} times; two insoles begin twice"
         )
-    rows = [line.split() for line in content[head + 1 :] if line.strip()]
+    rows = (line.split() for line in content[head + 1 :] if line.strip())
     values = text.numbers(rows, file, head + 2, names)
     t = ascending_us(file.name, values[:, 0], head + 2)
     steps = np.diff(t)

@@ -140,7 +140,10 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     linearly interpolated to S[2k+1] and from there to S[2k+2], rounded down to whole counts. The phase is the one of
     three under which the fewest cells violate |3 (b - c) - (a - d)| <= 3, over the whole trial.
     """
-    y = _loaded(image)
+    whole = _loaded(image)
+    # Cells outside of the box of all loaded columns and frames are 0 and lie on every line.
+    box = tuple(_span(np.flatnonzero(whole.any(axis=axes))) for axes in ((0, 2), (0, 1)))
+    y = whole[:, *box]
     rows = y.shape[0]
     padded = np.concatenate([y, np.zeros((6, *y.shape[1:]), np.int32)])
     breaks = []
@@ -159,9 +162,14 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
         raise FormatError(f"rows are not interpolated three from two ({off} cells off the line)")
     between = np.maximum(np.rint((3 * (b + c) - a - d + 2) / 4), 0).astype(np.int32)
     between[(b == 0) | (c == 0)] = 0
-    sensors = np.empty((2 * count, *y.shape[1:]), np.int32)
-    sensors[0::2], sensors[1::2] = a, between
+    sensors = np.zeros((2 * count, *whole.shape[1:]), np.int32)
+    sensors[0::2, *box], sensors[1::2, *box] = a, between
     return sensors
+
+
+def _span(there: NDArray[np.intp]) -> slice:
+    """Return the span from the first to the last of ascending places."""
+    return slice(int(there[0]), int(there[-1]) + 1)
 
 
 def events(image: NDArray[np.int32]) -> dict[str, int]:

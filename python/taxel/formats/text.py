@@ -5,7 +5,8 @@ from __future__ import annotations
 import gzip
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,10 @@ from taxel._base.header_table import HeaderTable
 from taxel._base.limits import TEXT, VALUE
 from taxel._core import FormatError
 
-__all__ = ["lines", "number", "numbers", "table"]
+__all__ = ["head", "lines", "number", "numbers", "table"]
 
+#: Number of rows of a table that are in memory as cells of text at once.
+_AT_ONCE = 4096
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
 
@@ -30,13 +33,31 @@ def lines(path: Path) -> list[str]:
     ------
     FormatError : not a text, or a damaged gzip file
     """
-    try:
-        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
-            data = file.read(TEXT + 1)
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise FormatError(f"{path.name}: not a whole gzip file ({error}); get it again") from None
+    data = _bytes(path, TEXT + 1)
     if len(data) > TEXT:
         raise FormatError(f"{path.name}: more than {TEXT} bytes of text; at most that are read")
+    return _lines(path, data)
+
+
+def head(path: Path) -> str:
+    """Read the first line of a text file, as `lines` does, but no more of it than 64 KiB.
+
+    Raises
+    ------
+    FormatError : not a text, or a damaged gzip file
+    """
+    return (_lines(path, _bytes(path, 1 << 16).partition(b"\n")[0]) or [""])[0]
+
+
+def _bytes(path: Path, most: int) -> bytes:
+    try:
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+            return file.read(most)
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise FormatError(f"{path.name}: not a whole gzip file ({error}); get it again") from None
+
+
+def _lines(path: Path, data: bytes) -> list[str]:
     if b"\0" in data:
         raise FormatError(f"{path.name}, byte {data.index(0)}: a zero byte; this is not a text file")
     try:
@@ -47,14 +68,17 @@ def lines(path: Path) -> list[str]:
     return content[:-1] if content and not content[-1] else content
 
 
-def number(cell: str, path: Path, line: int, what: str) -> float:
+def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = False) -> float:
     """Read one finite number; `line` counts from 1, as editors do.
+
+    `unmarked`: a layout could say what marks a missing cell, and does not; the error then names that.
 
     Raises
     ------
     FormatError : no finite number (names file, line and column)
     """
     text = cell.strip()
+    remedy = f"; if it marks a missing value, say in a layout file: [table] missing = {shown(text)}" if unmarked else ""
     try:
         value = float(text)
     except ValueError:
@@ -62,33 +86,69 @@ def number(cell: str, path: Path, line: int, what: str) -> float:
             problem = f"has a decimal comma ({shown(text)}); export with decimal points"
         else:
             problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
+            problem += remedy
         raise FormatError(f"{path.name}, line {line}: {what} {problem}") from None
     # Values of pictures have 32 bits.
     if not abs(value) <= VALUE or "_" in text:
-        raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number")
+        raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number{remedy}")
     return value
 
 
-def numbers(rows: Sequence[Sequence[str]], path: Path, first_line: int, names: Sequence[str]) -> NDArray[np.float64]:
+def numbers(
+    rows: Iterable[Sequence[str]],
+    path: Path,
+    first_line: int,
+    names: Sequence[str],
+    missing: frozenset[str] = frozenset(),
+    *,
+    unmarked: bool = False,
+) -> NDArray[np.float64]:
     """Read a block of numbers with columns `names`; `first_line` is the line number of its first row.
+
+    Rows that are made one by one are never all in memory as text. A cell that reads as one of `missing` is NaN.
+    `unmarked` as of `number`.
 
     Raises
     ------
     FormatError : a row of another length, or a cell that is not a number (names file, line and column)
     """
+    rows, blocks, line = iter(rows), [np.empty((0, len(names)))], first_line
+    while block := list(islice(rows, _AT_ONCE)):
+        blocks.append(_block(block, path, line, names, missing, unmarked))
+        line += len(block)
+    return np.concatenate(blocks)
+
+
+def _block(
+    rows: Sequence[Sequence[str]],
+    path: Path,
+    first_line: int,
+    names: Sequence[str],
+    missing: frozenset[str],
+    unmarked: bool,
+) -> NDArray[np.float64]:
     columns = len(names)
     for k, row in enumerate(rows):
         if len(row) != columns:
             raise FormatError(f"{path.name}, line {first_line + k}: {len(row)} cells, must have {columns}")
+    absent = np.array([[cell in missing for cell in row] for row in rows]) if missing else None
+    if missing:
+        rows = [["0" if cell in missing else cell for cell in row] for row in rows]
     try:
         values = np.array(rows, dtype=np.float64).reshape(len(rows), columns)
-        if (np.abs(values) <= VALUE).all():
-            return values
+        sound = bool((np.abs(values) <= VALUE).all())
     except ValueError:
-        pass  # the slow path below names the cell
-    return np.array(
-        [[number(c, path, first_line + k, n) for c, n in zip(row, names, strict=True)] for k, row in enumerate(rows)]
-    ).reshape(len(rows), columns)
+        sound = False
+    if not sound:
+        values = np.array(
+            [
+                [number(c, path, first_line + k, n, unmarked=unmarked) for c, n in zip(row, names, strict=True)]
+                for k, row in enumerate(rows)
+            ]
+        ).reshape(len(rows), columns)
+    if absent is not None:
+        values[absent] = np.nan
+    return values
 
 
 def table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:

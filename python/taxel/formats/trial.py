@@ -49,6 +49,8 @@ class Trial:
         Other information: condition, speed, age ...
     timed : bool
         Whether the recording has times; else its pictures are numbered, one a us.
+    unread : tuple of str
+        Names of further columns of the file, which are not read.
 
     Raises
     ------
@@ -74,6 +76,7 @@ class Trial:
     series: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     about: Mapping[str, str | float] = field(default_factory=dict)
     timed: bool = True
+    unread: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.recorded, Frames | Events):
@@ -81,6 +84,8 @@ class Trial:
         for name in ("name", "person", "source", "foot", "group"):
             arguments.text(name, getattr(self, name))
         arguments.flag("timed", self.timed)
+        for column in arguments.several("unread", self.unread):
+            arguments.text("unread", column)
         for name in ("truth", "series", "about"):
             arguments.mapping(name, getattr(self, name))
         for event, times in self.truth.items():

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import shown, whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
 from taxel.information._labels import belonging, words
@@ -51,7 +52,9 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
         raise ProblemError(f"labels are {values}: must be two at least, or there is nothing to tell")
     if groups is None:
         if len(truth) < parts:
-            raise ProblemError(f"{len(truth)} trials for {parts} folds: must be a trial a fold at least")
+            raise ProblemError(
+                f"{counted(len(truth), 'trial')} for {counted(parts, 'fold')}: must be a trial a fold at least"
+            )
         alone = np.flatnonzero(np.bincount(row) < 2)
         if len(alone):
             raise ProblemError(

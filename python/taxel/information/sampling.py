@@ -40,7 +40,7 @@ class HeldValues:
         exists = np.ones(self.array.shape, bool) if self.array.exists is None else self.array.exists
         self.taxels = np.flatnonzero(exists)
         if isinstance(source, Frames):
-            values = source.values.reshape(len(source), -1)
+            values = source.values.reshape(len(source), exists.size)
             self._values = values if exists.all() else values[:, self.taxels]
         else:
             self._held = _core.HeldValues(source._parts(), self.taxels.astype(np.uint32), None)

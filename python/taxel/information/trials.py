@@ -18,6 +18,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note, ahead_us
+from taxel.recorded import refuse_numbered
 from taxel.recording import Recording
 from taxel.spikes import to_ms, to_us
 
@@ -112,8 +113,8 @@ def read_trials(
     Raises
     ------
     FormatError : a column is missing, or a cell that is no number (names file and line)
-    ProblemError : recordings and table do not match, a recording is there twice, a start outside its recording, trials
-        without an end, trials that overlap, or the host's time of another run
+    ProblemError : recordings and table do not match, a recording is there twice or has no times, a start outside its
+        recording, trials without an end, trials that overlap, or the host's time of another run
     """
     place = Path(path("table", table))
     opened = _once(recordings)
@@ -179,8 +180,8 @@ def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> lis
 
     Raises
     ------
-    ProblemError : a recording without notes, or one that is there twice; an empty note, one outside its recording, or
-        one inside another's window
+    ProblemError : a recording without notes or without times, or one that is there twice; an empty note, one outside
+        its recording, or one inside another's window
     """
     window_us = _window_us(window_ms)
     trials = []
@@ -212,7 +213,7 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
 
     Raises
     ------
-    ProblemError : a recording without anything in it, or one that is there twice
+    ProblemError : a recording without anything in it or without times, or one that is there twice
     """
     trials = []
     for one in _once(recordings):
@@ -239,6 +240,7 @@ def _once(recordings: Sequence[Recording]) -> list[Recording]:
 
 
 def _source(recording: Recording) -> Events | Frames:
+    refuse_numbered(recording)
     return recording.events if recording.has_events else recording.frames()
 
 

@@ -14,7 +14,7 @@ from taxel import _core
 from taxel._base.arguments import callback, floats, instance, several
 from taxel._base.parameters import defaults
 from taxel.learn._examples import examples
-from taxel.learn._learner import SpikeLearner
+from taxel.learn._learner import SpikeLearner, Status
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
@@ -52,7 +52,7 @@ class EpochLearner(SpikeLearner):
     right_: NDArray[np.float64] = field(init=False)
     epochs_: int = field(init=False)
     best_epoch_: int = field(init=False)
-    status_: Literal["right", "epochs", "stopped"] = field(init=False)
+    status_: Status = field(init=False)
     neuron_: Neuron | None = field(init=False)
 
     #: Number of entries of `right_` before the first epoch.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy import float64
 from numpy.typing import NDArray
 
-from taxel._base.arguments import floats, instance, numbers, several
+from taxel._base.arguments import floats, instance, numbers, several, shown
 from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 
@@ -17,8 +17,20 @@ __all__ = ["examples", "windows", "with_kind"]
 
 def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[float64]]]:
     """Return patterns and targets as the compiled part reads them; refuse other types."""
+    if isinstance(patterns, SpikeTrains):
+        raise ProblemError(f"patterns is one SpikeTrains ({patterns!r}): must be a list of them, one a pattern")
     trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))]
-    return trains, [floats(f"targets of pattern {p}", t, "ms") for p, t in enumerate(several("targets", targets))]
+    if not np.iterable(targets):
+        raise ProblemError(f"targets is {shown(targets)}: must be a list of times (ms) for each pattern, [[20.0], []]")
+    times = []
+    of_pattern: Any
+    for p, of_pattern in enumerate(several("targets", targets)):
+        if isinstance(of_pattern, int | float | np.number) or (type(of_pattern) is np.ndarray and of_pattern.ndim == 0):
+            raise ProblemError(
+                f"targets of pattern {p} is {shown(of_pattern)}: must be a list of times (ms), empty for none"
+            )
+        times.append(floats(f"targets of pattern {p}", of_pattern, "ms"))
+    return trains, times
 
 
 def windows(name: str, given: object) -> NDArray[float64] | None:

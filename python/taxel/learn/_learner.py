@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from numpy import float64
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,10 @@ from taxel.learn._examples import examples
 from taxel.metrics import f1
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Learner", "SpikeLearner", "predicted"]
+__all__ = ["Learner", "SpikeLearner", "Status", "predicted"]
+
+#: How a fit ended, of all learners; the page on errors has the table.
+Status = Literal["solved", "feasible", "infeasible", "right", "epochs", "stopped"]
 
 
 _DEFAULT = defaults("matching")
@@ -24,6 +27,16 @@ _DEFAULT = defaults("matching")
 
 class Learner(Parameters):
     """Learn weights; names of results end in ``_``."""
+
+    def __repr__(self) -> str:
+        """Return the parameters, and of a fit with a proven gap how it ended."""
+        made, fit = super().__repr__(), vars(self)
+        if "gap_" not in fit:
+            return made
+        # Of weights that miss rows the gap says nothing.
+        if fit["status_"] == "stopped" and "violation_" in fit:
+            return f"<{made}: stopped, violation_ {fit['violation_']:.1e} mV>"
+        return f"<{made}: {fit['status_']}" + f", gap_ {fit['gap_']:.1e}" * bool(fit["status_"] != "infeasible") + ">"
 
     def _fitted(self) -> NDArray[float64]:
         """Return the weights; raise NotFittedError before `fit`."""

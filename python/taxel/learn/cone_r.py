@@ -16,7 +16,8 @@ from taxel._base.arguments import callback, floats, instance, parameters, severa
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError, ProblemError
 from taxel.learn._examples import examples, windows
-from taxel.learn._learner import SpikeLearner, predicted
+from taxel.learn._learner import SpikeLearner, Status, predicted
+from taxel.learn.cone_x import Multipliers, _multipliers
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
@@ -83,7 +84,11 @@ class ConeR(SpikeLearner):
     parts_ : dict of float
         Its terms "l1", "l2", "B", "C", "D", weighted and normalised: their sum is the objective.
     gap_ : float
-        A proven bound of the distance of the objective from its minimum, relative to the objective.
+        A proven bound of the distance of the objective from its minimum over all weights within the bounds, relative to
+        the objective; 1 if nothing is proven yet, as when a fit is stopped before its first round. It says nothing of
+        the rows: the minimum itself may miss targets and break silence (`parts_`, `check_solution`).
+    multipliers_ : Multipliers
+        The proof of it, which `taxel.learn.check_gap` checks in plain NumPy.
     status_ : {"solved", "stopped"}
         "stopped": the gap is above `tolerance`, as `max_seconds` or Ctrl-C ended the fit, or neither engine closed it.
     engine_ : {"native", "cone solver"}
@@ -147,7 +152,8 @@ class ConeR(SpikeLearner):
     objective_: float = field(init=False)
     parts_: dict[str, float] = field(init=False)
     gap_: float = field(init=False)
-    status_: Literal["solved", "stopped"] = field(init=False)
+    multipliers_: Multipliers = field(init=False)
+    status_: Status = field(init=False)
     engine_: Literal["native", "cone solver"] = field(init=False)
     rounds_: int = field(init=False)
     rows_: int = field(init=False)
@@ -155,7 +161,7 @@ class ConeR(SpikeLearner):
     unreachable_: list[tuple[int, int]] = field(init=False)
     refires_: int = field(init=False)
     neuron_: Neuron = field(init=False)
-    #: What the multipliers belong to (the number of rows, `sides_c`), and these.
+    #: What a start's multipliers belong to (the number of rows, `sides_c`), and these, as shares of their range.
     _multipliers: tuple[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.float64]]] = field(init=False)
 
     def fit(
@@ -360,12 +366,11 @@ class ConeRProblem:
         first = None if start is None else self._start(start, cone)
         if progress is not None:
             callback("progress", progress)
-        (weights, *others), signal = self._problem.fit(*self._handed(instance("cone", cone, ConeR)), first, progress)
-        if self._counted is not None:
-            every = np.zeros(self._trains)
-            every[self._counted] = weights
-            weights = every
-        _keep(cone, (weights, *others), self.silent_rows, self._problem.rows)
+        (weights, *others, (of_rows, of_behind, pull)), signal = self._problem.fit(
+            *self._handed(instance("cone", cone, ConeR)), first, progress
+        )
+        proof = (of_rows, of_behind, self._for_all(pull))
+        _keep(cone, (self._for_all(weights), *others, proof), self.silent_rows, self._problem.rows)
         if signal is not None:
             raise signal
         _warn(cone)
@@ -380,6 +385,14 @@ class ConeRProblem:
         same = what == (self._problem.rows, instance("cone", cone, ConeR).sides_c)
         return self._weighed(start.weights_), multipliers if same else None
 
+    def _for_all(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values of the trains in the fit with a 0 for each of the others."""
+        if self._counted is None:
+            return values
+        every = np.zeros(self._trains)
+        every[self._counted] = values
+        return every
+
     def _weighed(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
         if self._counted is None:
             return weights
@@ -393,7 +406,8 @@ def _weighed(name: str, count: int, what: str) -> None:
     if count > _MOST_TRAINS:
         raise ProblemError(
             f"{name}: {count} {what}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
-            "with the cube of them; take an encoder that pools taxels, fewer levels, or a part of the array"
+            "with the cube of them; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
+            "contact_area), fewer levels, or a part of the array"
         )
 
 
@@ -416,11 +430,12 @@ def _counted(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64
 
 def _keep(cone: ConeR, result: Any, silent_rows: int, all_rows: int) -> None:
     """Set the results of a fit on the learner."""
-    weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable, refires), multipliers = result
+    weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable, refires), multipliers, proof = result
     cone.weights_ = weights
     cone.objective_ = objective
     cone.parts_ = dict(zip(("l1", "l2", "B", "C", "D"), parts, strict=True))
     cone.gap_ = gap
+    cone.multipliers_ = _multipliers(proof)
     cone.status_ = "solved" if solved else "stopped"
     cone.engine_ = "native" if native else "cone solver"
     cone.rounds_, cone.rows_, cone.silent_rows_ = rounds, rows, silent_rows

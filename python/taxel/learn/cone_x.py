@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
@@ -11,15 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, flag, instance, number, shown, whole
+from taxel._base.arguments import callback, flag, floats, instance, number, several, shown, whole
+from taxel._base.messages import counted
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError, ProblemError
 from taxel.learn._examples import examples, with_kind
-from taxel.learn._learner import SpikeLearner, predicted
+from taxel.learn._learner import SpikeLearner, Status, predicted
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Certificate", "ConeX", "ConeXProblem", "Margin", "Row"]
+__all__ = ["Certificate", "ConeX", "ConeXProblem", "Margin", "Multipliers", "Row"]
 
 
 class Row(NamedTuple):
@@ -27,9 +29,9 @@ class Row(NamedTuple):
 
     Parameters
     ----------
-    kind : {"target", "silence", "slope"}
+    kind : {"target", "silence", "slope", "behind"}
         The potential at a target equals the threshold (6.9a); it stays below the threshold at a time (6.9b); it reaches
-        a target from below.
+        a target from below. Behind a target it reaches `kappa` thresholds (6.10; in `multipliers_` only).
     pattern : int, 0 or more
     at : int, 0 or more, or float, ms
         The number of the target in its pattern; the time of a row of silence.
@@ -40,7 +42,7 @@ class Row(NamedTuple):
     Row(kind='silence', pattern=0, at=17.5)
     """
 
-    kind: Literal["target", "silence", "slope"]
+    kind: Literal["target", "silence", "slope", "behind"]
     pattern: int
     at: float
 
@@ -73,11 +75,96 @@ class Certificate:
     at_all: bool
     text: str
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the proof as plain lists, numbers and text, ready for JSON.
+
+        Returns
+        -------
+        dict
+            By the names of the attributes; a row is ``[kind, pattern, at]``.
+
+        Examples
+        --------
+        >>> Certificate([Row("target", 0, 0)], np.array([-1.0]), 0.3, True, "no input").to_dict()["rows"]
+        [['target', 0, 0]]
+        """
+        rows, multipliers = [list(row) for row in self.rows], self.multipliers.tolist()
+        return {"rows": rows, "multipliers": multipliers, "gap": self.gap, "at_all": self.at_all, "text": self.text}
+
+    @classmethod
+    def from_dict(cls, held: Mapping[str, Any]) -> Self:
+        """Return the proof that `to_dict` gave.
+
+        Parameters
+        ----------
+        held : dict
+            As from `to_dict`, also by way of JSON.
+
+        Returns
+        -------
+        Certificate
+
+        Raises
+        ------
+        ProblemError : not such a dict
+
+        Examples
+        --------
+        >>> proof = Certificate([Row("target", 0, 0)], np.array([-1.0]), 0.3, True, "no input")
+        >>> Certificate.from_dict(proof.to_dict()).rows
+        [Row(kind='target', pattern=0, at=0)]
+        """
+        names = ("rows", "multipliers", "gap", "at_all", "text")
+        if not isinstance(held, Mapping) or set(held) != set(names):
+            raise ProblemError(f"certificate: must be a dict of {', '.join(names)}, as to_dict gives it")
+        rows = [_row(_name(row)) for row in several("rows", held["rows"])]
+        multipliers = floats("multipliers", held["multipliers"])
+        if len(rows) != len(multipliers):
+            raise ProblemError(
+                f"certificate: {counted(len(multipliers), 'multiplier')} for {counted(len(rows), 'row')}"
+            )
+        gap = number("gap", held["gap"], "mV")
+        return cls(rows, multipliers, gap, flag("at_all", held["at_all"]), str(held["text"]))
+
     def __str__(self) -> str:
         return self.text
 
     def __repr__(self) -> str:
-        return f"<Certificate of {len(self.rows)} rows: {self.text}>"
+        return f"<Certificate of {counted(len(self.rows), 'row')}: {self.text}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Multipliers:
+    """Prove that no weights within the bounds have an objective below that of a fit by more than its gap.
+
+    `taxel.learn.check_gap` explains and checks the proof.
+
+    Parameters
+    ----------
+    rows : list of Row
+        The rows with a multiplier: of silence (kind "silence"), of targets ("target"), of B ("behind"), and of `ConeX`
+        those of slopes ("slope").
+    values : float64, shape (rows,), 1/mV
+        Of silence 0 or more, of `ConeR` up to the factor of D. Of targets any; of `ConeR` from minus the factor of C
+        up to it, up to 0 if `sides_c` is "below". Of slopes 0 or more, ms/mV. Of B any, at most 0 if `sides_b` is
+        "below".
+    pull : float64, shape (trains,), 1/mV
+        The multiplier of the l2 term: a slope no longer than its factor, of any length if `norm` is "square".
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
+    >>> cone = ConeX(neuron=Neuron(tau=10.0), lb=-1.0, ub=1.0).fit([trains], [[20.0]])
+    >>> cone.multipliers_.rows
+    [Row(kind='target', pattern=0, at=0), Row(kind='slope', pattern=0, at=0)]
+    """
+
+    rows: list[Row]
+    values: NDArray[np.float64]
+    pull: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        return f"<Multipliers of {counted(len(self.rows), 'row')}>"
 
 
 class Margin(NamedTuple):
@@ -140,28 +227,34 @@ class ConeX(SpikeLearner):
 
     Attributes
     ----------
-    status_ : {"solved", "infeasible", "stopped"}
-        "solved": silence keeps at least half its margin, and the neuron, run on the patterns, fires within 1e-6 ms of
-        every target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion where theta_0 is
-        not 0.3 mV). Unless the search ended early (`reason_`), no weights that keep the whole margin have an objective
-        smaller by more than `tolerance` of it, or by more than 1e-10 of the value of B for zero weights. "infeasible":
-        `certificate_` proves it. "stopped": neither is known.
+    status_ : {"solved", "feasible", "infeasible", "stopped"}
+        "solved" and "feasible": silence keeps at least half its margin, and the neuron, run on the patterns, fires
+        within 1e-6 ms of every target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion
+        where theta_0 is not 0.3 mV). "solved": these weights are also the best, as no weights that keep the whole
+        margin have an objective smaller by more than `tolerance` of it, or by more than 1e-10 of the value of B for
+        zero weights. "feasible": the search ended before that was proven (`reason_`). "infeasible": `certificate_`
+        proves it. "stopped": none of these is known.
     weights_ : float64, shape (trains,), mV
-        The best so far if stopped; NaN if infeasible.
+        The best so far if stopped, which may miss any row; NaN if infeasible, or if only the least margin tried is
+        proven to be.
     objective_ : float
         6.11 at these weights; infinite if infeasible.
     parts_ : dict
         Its terms: l1, l2, B.
     gap_ : float
-        A proven bound of the distance of the objective from its minimum over all weights that keep the whole margin,
-        relative to the objective and independent of the engine. (In continuous time these weights keep `margin_`, which
-        is slightly smaller.)
+        A proven bound, independent of the engine: no weights that keep the whole margin have an objective smaller by
+        more than this share of it. (In continuous time these weights keep `margin_`, which is slightly smaller.) It
+        bounds in this direction only and says nothing of the rows: a fit that was stopped early may miss every target
+        with a gap of 0, as its objective is below the minimum of the weights that meet them. `status_` and `violation_`
+        tell. NaN if infeasible; infinite if stopped without weights.
+    multipliers_ : Multipliers or None
+        The proof of it, which `taxel.learn.check_gap` checks in plain NumPy; None if there are no weights.
     margin_ : Margin
         The margin that holds, at least half of that of the problem (`problem_.margin`); on the grid, as `mv`, the least
         threshold - potential over the silent points.
     reason_ : str or None
-        If stopped: the violated row or the wrong spike, with its pattern and time. If solved: None, or why `gap_` is
-        above `tolerance`: the search was ended by `max_seconds`, Ctrl-C or rounding.
+        If stopped: the violated row or the wrong spike, with its pattern and time. If feasible: why `gap_` is above
+        `tolerance`: the search was ended by `max_seconds`, Ctrl-C or rounding. Else None.
     violation_ : float, mV
         The largest violation of a row: of a target, or of silence with half its margin.
     engine_ : {"native", "cone solver"}
@@ -213,11 +306,12 @@ class ConeX(SpikeLearner):
     tolerance: float = _DEFAULT.tolerance
     max_seconds: float | None = _DEFAULT.max_seconds
 
-    status_: Literal["solved", "infeasible", "stopped"] = field(init=False)
+    status_: Status = field(init=False)
     weights_: NDArray[np.float64] = field(init=False)
     objective_: float = field(init=False)
     parts_: dict[str, float] = field(init=False)
     gap_: float = field(init=False)
+    multipliers_: Multipliers | None = field(init=False)
     margin_: Margin = field(init=False)
     reason_: str | None = field(init=False)
     violation_: float = field(init=False)
@@ -268,13 +362,14 @@ class ConeX(SpikeLearner):
         multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
         first = [tuple(row) for row, _ in held]
         result = problem._problem.fit(first, multipliers, progress)
-        (status, weights, objective, parts, gap, violation), rest, signal = result
+        (status, weights, objective, parts, gap, violation), rest, proof, signal = result
         (margin, requested), engine, rounds, (rows, multipliers), certificate, reason = rest
         self.status_ = status
         self.weights_ = weights
         self.objective_ = objective
         self.parts_ = dict(zip(("l1", "l2", "B"), parts, strict=True))
         self.gap_ = gap
+        self.multipliers_ = None if proof is None else _multipliers(proof)
         self.violation_ = violation
         self.margin_ = Margin(*margin)
         self.reason_ = reason
@@ -359,21 +454,10 @@ class ConeXProblem:
             self.margin = Margin(*margin)
         return self
 
-    def _without_signs(self) -> tuple[Self, int]:
-        """Return the same problem with values without sign, and how many spikes the fullest train has.
-
-        In a coefficient of this problem, which is a sum over spikes, nothing cancels: rounding makes one of the given
-        problem wrong by no more than that size, times the number of spikes and the precision. It is the given problem,
-        and 0 spikes, where no value is below 0.
-        """
-        text, parts = self._stated
-        if not any(values is not None and (values < 0).any() for _, _, values, kind, *_ in parts if kind == "graded"):
-            return self, 0
-        sizes = copy.copy(self)
-        sizes._stated = text, [(t, o, None if v is None else np.abs(v), *rest) for t, o, v, *rest in parts]
-        sizes._lay_out()
-        fullest = max(int(np.diff(offsets).max(initial=0)) for _, offsets, *_ in parts)
-        return sizes._with_margin(self.margin), fullest
+    def _restated(self) -> tuple[ConeX, list[SpikeTrains]]:
+        """Return the learner's parameters and the patterns that state the problem."""
+        json_text, parts = self._stated
+        return ConeX._from_values(json.loads(json_text)), [SpikeTrains._from_parts(one) for one in parts]
 
     def __getstate__(self) -> dict[str, Any]:
         return {"_stated": self._stated, "targets": self.targets, "margin": self.margin}
@@ -404,14 +488,7 @@ class ConeXProblem:
         ------
         ProblemError : no such row
         """
-        try:
-            kind, pattern, at = row
-        except (TypeError, ValueError):
-            raise ProblemError(f"row is {shown(row)}: must be kind, pattern and target or time") from None
-        if not isinstance(kind, str):
-            raise ProblemError(f"row is {shown(row)}: its kind must be a text")
-        name = (kind, whole("pattern", pattern, 0), number("target or time", at, "ms"))
-        return self._problem.row(name, flag("margin", margin))
+        return self._problem.row(_name(row), flag("margin", margin))
 
     def target(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
         """Return the row of a target (6.9a): the coefficients of the potential, which must equal the threshold.
@@ -500,6 +577,25 @@ class ConeXProblem:
         ProblemError : no such target
         """
         return self._problem.behind(whole("pattern", pattern, 0), whole("target", target, 0))
+
+
+def _name(row: object) -> tuple[str, int, float]:
+    """Return the name of a row; refuse what is none."""
+    try:
+        given: Any = row
+        kind, pattern, at = given
+    except (TypeError, ValueError):
+        raise ProblemError(f"row is {shown(row)}: must be kind, pattern and target or time") from None
+    if not isinstance(kind, str):
+        raise ProblemError(f"row is {shown(row)}: its kind must be a text")
+    return kind, whole("pattern", pattern, 0), number("target or time", at, "ms")
+
+
+def _multipliers(proof: Any) -> Multipliers:
+    """Return the proof of a gap as the compiled part gives it."""
+    (named, values), (behind, slopes), pull = proof
+    rows_of_b = [Row("behind", pattern, target) for pattern, target in behind]
+    return Multipliers([*map(_row, named), *rows_of_b], np.append(values, slopes), pull)
 
 
 def _row(name: tuple[str, int, float]) -> Row:

@@ -56,7 +56,8 @@ class OnlineConeR(ConeR):
     ----------
     patterns_ : int
         Current number of patterns in the window.
-    weights_, objective_, parts_, gap_, status_, engine_, rounds_, rows_, silent_rows_, unreachable_, neuron_
+    weights_, objective_, parts_, gap_, multipliers_, status_, engine_, rounds_, rows_, silent_rows_, unreachable_,
+    neuron_
         Results of the last fit, as in `ConeR`; patterns are counted from the oldest in the window.
     refires_ : int
         As in `ConeR`, for the newest pattern only.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,7 @@ from taxel._base.arguments import callback, flag, floats, instance, several
 from taxel._base.parameters import defaults
 from taxel._core import ProblemError
 from taxel.learn._epochs import keep
-from taxel.learn._learner import Learner
+from taxel.learn._learner import Learner, Status
 from taxel.spikes import SpikeTrains
 
 __all__ = ["Tempotron"]
@@ -95,7 +95,7 @@ class Tempotron(Learner):
     right_: NDArray[np.float64] = field(init=False)
     epochs_: int = field(init=False)
     best_epoch_: int = field(init=False)
-    status_: Literal["right", "epochs", "stopped"] = field(init=False)
+    status_: Status = field(init=False)
     _LOOKS_BEFORE_THE_FIRST = 0
 
     def fit(

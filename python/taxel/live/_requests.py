@@ -26,12 +26,12 @@ from taxel.detect import load, run
 from taxel.detections import Detection
 from taxel.device import Cable
 from taxel.labels import Labels, write_labels
-from taxel.live._shown_files import ReadPictures, ShownFiles
+from taxel.live._shown_files import Opening, ReadPictures, ShownFiles
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.health import TaxelStatistics, by_taxel, judged
+from taxel.recording.health import TaxelStatistics, Touches, judged
 from taxel.recording.opening import sensors
 from taxel.tare import Tare
 from taxel.wire import Command
@@ -52,6 +52,9 @@ _REST_US = 50_000
 
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
+
+#: A label, its time (us), source and trial ("": all), and the time of the note that it replaces; "" removes that note.
+_LabelRow = tuple[str, int, str, str, int | None]
 
 
 def presets_path() -> Path:
@@ -109,6 +112,8 @@ class RequestHandler:
         Reads the board out with another readout.
     cable : Cable or None
         The board's serial line. The handler closes it.
+    opening : Opening
+        How recordings are opened.
     """
 
     def __init__(
@@ -117,12 +122,13 @@ class RequestHandler:
         delta_intensity: Callable[[bool], None],
         read_out: Callable[[Path], None],
         cable: Cable | None,
+        opening: Opening,
     ) -> None:
         self._listen, self._delta_intensity, self._read_out, self._cable = listen, delta_intensity, read_out, cable
         self._training: subprocess.Popen[str] | None = None
         self._training_lock = threading.Lock()
         self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
-        self._files = ShownFiles()
+        self._files, self._opening = ShownFiles(opening), opening
 
     def close(self) -> None:
         """Close the serial line, end a training that runs, and remove temporary files."""
@@ -185,7 +191,7 @@ class RequestHandler:
         array: _core._Array,
         events: NDArray[np.uint32],
         moved: NDArray[np.uint32],
-        touches: NDArray[np.uint32],
+        touches: tuple[NDArray[np.uint32], NDArray[np.uint32]],
         values: tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]] | None,
     ) -> tuple[_Taxels, _Taxels, _Taxels, int]:
         """Return the taxels that are dead, stuck and noisy, and how many were not touched enough to say.
@@ -195,8 +201,8 @@ class RequestHandler:
         array : the sensor
         events, moved : shape (taxels,)
             Events of each taxel, and those in the direction of the one before.
-        touches : shape (5 taxels,)
-            Five counts of touches by taxel, as the core gives them.
+        touches : two arrays
+            Indices of taxels, and five counts of touches of each, as the core gives them.
         values : three arrays of shape (taxels,), or None without intensities
             Number of different values; least and greatest held value, -1 where unknown.
         """
@@ -204,9 +210,14 @@ class RequestHandler:
         activity, on, *known = (
             np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))
         )
-        result = judged(sensor, TaxelStatistics(activity, on, by_taxel(touches, sensor), *known))
+        result = judged(sensor, TaxelStatistics(activity, on, Touches.of(*touches), *known))
         taxels = result.named()
         return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untold))
+
+    def recordings(self, folder: Path) -> list[str]:
+        """Return the names of what is a recording in a folder."""
+        with _reasons():
+            return [file.name for file in folder.iterdir() if self._opening.is_recording(file)]
 
     def read(self, path: Path, trial: str | None, whole: bool) -> tuple[Path | None, ReadPictures | None]:
         """Read a recording that is no file of a board's events.
@@ -244,6 +255,7 @@ class RequestHandler:
     def train(self, recording: Path, out: Path) -> str:
         """Train a readout on the labels of a recording, as ``taxel train`` does; return what it prints."""
         command = [sys.executable, "-m", "taxel", "train", str(recording), "--labels", "notes", "-o", str(out)]
+        command += self._opening.options_of(recording)
         with self._training_lock:
             if self._training is not None:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
@@ -269,11 +281,11 @@ class RequestHandler:
         if training is not None:
             training.terminate()
 
-    def detect(self, recording: Path, readout: Path) -> list[tuple[str, int, int]]:
-        """Return the detections of a readout in a recording: label, time and when it was known, us."""
+    def detect(self, recording: Path, trial: str | None, readout: Path) -> list[tuple[str, int, int]]:
+        """Return the detections of a readout in a recording or its trial: label, time and when it was known, us."""
         with _reasons():
             loaded = load(readout)
-            opened, _ = self._files.opened(recording, None)
+            opened, _ = self._files.opened(recording, trial)
             found: list[Detection] = []
             for one in sensors(opened):
                 registers = one.registers
@@ -286,17 +298,33 @@ class RequestHandler:
         with _reasons():
             self._read_out(readout)
 
-    def read_labels(self, table: Path, recording: str) -> list[tuple[str, int, str]]:
-        """Return the labels of a recording, each with its time (us) and its source, from a table."""
+    def read_labels(self, table: Path, recording: str) -> list[_LabelRow]:
+        """Return the labels of a recording, and those removed that replaced a note of it, from a table."""
         with _reasons():
             labels = Labels(table)
-        name = labels.named(recording)
-        return [(row.text, row.t or 0, row.source) for row in labels.rows if row.recording == name]
+        name, unit_us = labels.named(recording), self._opening.unit_us(table)
+        return [
+            (
+                row.text,
+                round((row.t or 0) * unit_us),
+                row.source,
+                "" if row.recording == name else row.recording,
+                None if row.replaces is None else round(row.replaces * unit_us),
+            )
+            for row in (*labels.rows, *labels.removed)
+        ]
 
-    def write_labels(self, table: Path, rows: Sequence[tuple[str, int, str]]) -> None:
+    def write_labels(self, table: Path, rows: Sequence[_LabelRow]) -> None:
         """Write a table of labels."""
         with _reasons(), self._file_lock:
-            write_labels(table, rows)
+            unit_us = self._opening.unit_us(table)
+            write_labels(
+                table,
+                [
+                    (label, round(t / unit_us), source, trial, None if replaces is None else round(replaces / unit_us))
+                    for label, t, source, trial, replaces in rows
+                ],
+            )
 
     def read_presets(self) -> tuple[Path, dict[str, dict[str, object]]]:
         """Return the file of the user's presets, and the presets: value by register name."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import tempfile
 import threading
 import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +19,14 @@ from numpy.typing import NDArray
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
 from taxel.frames import Frames
+from taxel.labels import Labels, beside
 from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.health import health
-from taxel.recording.opening import open_joined
+from taxel.recording.opening import is_recording, open_joined
+from taxel.recording.rest import of_pictures, ticks_by_unit
 
-__all__ = ["ReadPictures", "ShownFiles", "side_by_side"]
+__all__ = ["Opening", "ReadPictures", "ShownFiles", "side_by_side"]
 
 #: Of a text table of more bytes than this the beginning is shown first, of so many bytes.
 _LARGE, _BEGINNING = 8 << 20, 1 << 19
@@ -36,10 +41,53 @@ ReadPictures = tuple[Any, ...]
 _Taxels = list[tuple[int, int]]
 
 
+@dataclass(frozen=True)
+class Opening:
+    """Hold how a recording is opened that `open_joined` alone does not open as it should be.
+
+    Parameters
+    ----------
+    opens : function of a path
+        Opens a file, with the feet of each trial joined.
+    file : path, optional
+        The file that is opened so; default: each file.
+    options : sequence of str
+        The options of ``taxel train`` that open it so.
+    rate_hz : float, optional
+        By which numbered pictures have times; their labels are in numbers of pictures.
+    layout : path, optional
+        The layout file by which it opens tables and arrays of other programs; default: the one beside each.
+    """
+
+    opens: Callable[[Path], Sequence[Recording]] = open_joined
+    file: Path | None = None
+    options: Sequence[str] = ()
+    rate_hz: float | None = None
+    layout: str | os.PathLike[str] | None = None
+
+    def open(self, file: Path) -> Sequence[Recording]:
+        """Open a file."""
+        return self.opens(file) if self.file in (None, file) else open_joined(file)
+
+    def is_recording(self, file: Path) -> bool:
+        """Return whether a file is a recording by its name, its first bytes and its layout."""
+        return is_recording(file, self.layout if self.file in (None, file) else None)
+
+    def options_of(self, file: Path) -> Sequence[str]:
+        """Return the options of ``taxel train`` for a file."""
+        return self.options if self.file in (None, file) else ()
+
+    def unit_us(self, table: Path) -> float:
+        """Return how many us a unit of time in a table of labels is."""
+        applies = self.rate_hz is not None and (self.file is None or beside(self.file) == table)
+        return 1e6 / self.rate_hz if applies and self.rate_hz else 1.0
+
+
 class ShownFiles:
     """Read recordings for the panel; the events of tables are written to temporary .mcap files, until `close`."""
 
-    def __init__(self) -> None:
+    def __init__(self, opening: Opening | None = None) -> None:
+        self._opening = Opening() if opening is None else opening
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._lock = threading.Lock()
         #: The trials of the file with several that was read last, by its path and the time of its last change.
@@ -63,7 +111,7 @@ class ShownFiles:
         key = path, path.stat().st_mtime_ns
         with self._lock:
             known = self._trials
-        every = known[1] if known is not None and known[0] == key else open_joined(path)
+        every = known[1] if known is not None and known[0] == key else list(self._opening.open(path))
         if not every:
             raise FormatError(f"{path.name}: holds no recording")
         if len(every) == 1:
@@ -126,9 +174,9 @@ class ShownFiles:
         place.write_bytes(head[: head.rfind(b"\n") + 1])
         begun = time.perf_counter()
         try:
-            every = open_joined(place)
-        except (FormatError, OSError):
-            # A format whose files have no beginning of their own.
+            every = self._opening.opens(place)
+        except (FormatError, ProblemError, OSError):
+            # A format whose files have no beginning of their own, or options that are of the whole file.
             return None
         finally:
             os.unlink(place)
@@ -155,11 +203,15 @@ def _pictures(recording: Recording) -> tuple[Any, ...]:
     array, lefts = side_by_side([one.array for one in frames.values()])
     us = 1 if recording.timed else _PICTURE_US
     parts = [
-        (name, left, one.array.rows, one.array.columns, _times(one.t, us), _values(one))
+        (name, left, one.array.rows, one.array.columns, _times(one.t, us), _values(one), _rest(one))
         for (name, one), left in zip(frames.items(), lefts, strict=True)
     ]
-    notes = {(note.t, note.text) for one in sources.values() for note in one.notes}
-    notes -= {(row.t, row.text) for row in _labels_beside(recording)}
+    noted = {name: {(note.t, note.text) for note in one.notes} for name, one in sources.items()}
+    of_all = set.intersection(*noted.values())
+    notes = {(t, text, "") for t, text in of_all}
+    notes |= {(t, text, name) for name, own in noted.items() for t, text in own - of_all}
+    labels = {(row.t, row.text) for row in _labels_beside(recording)}
+    notes = {note for note in notes if note[:2] not in labels}
     found = [(d.label, d.t, d.known) for one in sources.values() for d in one.detections]
     remarks = json.dumps([sorted(notes, key=lambda note: (note[0] or 0, note[1])), found])
     return array._parts(), parts, units.pop(), None if us == 1 else us, remarks, recording.verdict
@@ -167,8 +219,6 @@ def _pictures(recording: Recording) -> tuple[Any, ...]:
 
 def _labels_beside(recording: Recording) -> tuple[Any, ...]:
     """Return the labels of the table beside a file, which the panel shows as such and not as notes."""
-    from taxel.labels import Labels, beside  # noqa: PLC0415  only here
-
     table = beside(recording.path)
     return Labels(table).rows if table.is_file() else ()
 
@@ -176,6 +226,12 @@ def _labels_beside(recording: Recording) -> tuple[Any, ...]:
 def _in_its_unit(recording: Recording) -> Frames:
     """Return pictures in N or kPa where a calibration gives it, else in the file's unit."""
     return recording.frames() if recording.calibration is None else recording.calibrated()
+
+
+def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, bool]:
+    """Return where the rest of pictures is from, that of each taxel, ticks by their unit, and whether they fall."""
+    rest = of_pictures(frames)
+    return {"unit": "given"}.get(rest.source, rest.source), rest.values, ticks_by_unit(frames), rest.falls
 
 
 def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:
@@ -205,20 +261,28 @@ def side_by_side(arrays: list[Array]) -> tuple[Array, list[int]]:
 
 
 def _places_beside(arrays: list[Array], lefts: list[int], exists: NDArray[np.bool_]) -> Places | None:
-    """Return the places of arrays side by side, a fifth of a width apart; None unless all have them in one unit."""
+    """Return the places of arrays side by side; None unless all have them in one unit.
+
+    Arrays that stand apart from left to right keep their places, as those of two feet in one system of coordinates;
+    others are set half a width apart.
+    """
     every = [one.places for one in arrays]
     places = [one for one in every if one is not None]
     if len(places) < len(arrays) or len({one.unit for one in places}) > 1:
         return None
     x, y, area = np.zeros(exists.shape), np.zeros(exists.shape), np.ones(exists.shape)
+    ends = [
+        (one.x[array._there()].min(), one.x[array._there()].max()) for array, one in zip(arrays, places, strict=True)
+    ]
+    apart = all(one[1] < other[0] for one, other in itertools.pairwise(ends))
     right = 0.0
     for array, left, one in zip(arrays, lefts, places, strict=True):
         at = np.s_[: array.rows, left : left + array.columns]
         there = exists[at]
         own = one.x.reshape(array.shape)
         least, most = float(own[there].min()), float(own[there].max())
-        x[at], y[at] = own - least + right, one.y.reshape(array.shape)
-        right += 1.2 * (most - least)
+        x[at], y[at] = own if apart else own - least + right, one.y.reshape(array.shape)
+        right += 1.5 * (most - least)
         if one.area is not None:
             area[at] = one.area.reshape(array.shape)
     known = all(one.area is not None for one in places)

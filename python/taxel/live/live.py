@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import flag, number, numbers, parameters, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.messages import counted
 from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -132,7 +133,7 @@ class Live:
 
     @with_fields_of(LiveOptions)
     def __init__(self, options: LiveOptions) -> None:
-        #: Whether somebody stated the registers; the panel shows no frame rate that is only assumed.
+        #: Whether the registers were stated; the panel shows no frame rate that is only assumed.
         self._registers_stated = options.registers is not None or options.remote is not None
         options = options.completed()
         remote, readout, tare, say = options.remote, options.readout, options.tare, options.say
@@ -233,7 +234,8 @@ class Live:
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
         `wire_late` (events of version 2 that arrived after time had passed theirs), `arrived_ns` (when the latest
         datagram arrived, ns since 1970, or None), `heartbeat_us` (the longest interval between heartbeats of a board of
-        version 2, or None), `bridged` (None, or of a board
+        version 2, or None), `arrival` (state: "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s,
+        heartbeat_us; not of one that has ended), `bridged` (None, or of a board
         of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
         ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
         `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those output in a
@@ -242,7 +244,8 @@ class Live:
         each other source), `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
         `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
-        drift_ppm, or None), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
+        drift_ppm, or None), `pace` (drift_ppm, delay: as a latency, beyond the shortest; doubt: why they cannot be, or
+        None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 
         Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
         `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +
@@ -352,7 +355,9 @@ class Live:
         """
         columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
-            raise ProblemError(f"x has {len(columns)} columns, y {len(rows)} rows: must be as many")
+            raise ProblemError(
+                f"x has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
+            )
         for name, places in (("x", columns), ("y", rows)):
             if len(places) and (places.min() < 0 or places.max() > _MOST_PLACE):
                 wrong = places.min() if places.min() < 0 else places.max()

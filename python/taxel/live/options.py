@@ -44,8 +44,8 @@ class LiveOptions:
     )
     array: Array | None = option(
         None,
-        "Rows, columns and pitch of the sensor, as 24x20x5 (default pitch: 2.67 mm). Default: 64x64x2.67; with --from, "
-        "the bridge reports it.",
+        "Rows, columns and pitch of the sensor, as 24x20x5 (default pitch: 2.67 mm; with --rate-hz unknown). Default: "
+        "64x64x2.67; with --from, the bridge reports it.",
     )
     registers: str | Registers | None = option(
         None,

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 
 from taxel import _core
-from taxel._base.arguments import flag, text, whole
+from taxel._base.arguments import callback, flag, several, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.detect import load
 from taxel.device import Cable
+from taxel.formats.ros import is_bag
 from taxel.frames import Frames
 from taxel.live._requests import RequestHandler
+from taxel.live._shown_files import Opening
 from taxel.live.live import Live
-from taxel.recording.opening import check_recording, recordings_in
+from taxel.recording import Recording
+from taxel.recording.opening import check_recording, open_joined, recordings_in
+from taxel.recording.pictures import period_us
 from taxel.tare import Tare
 
 __all__ = ["Panel"]
@@ -42,6 +48,16 @@ class Panel:
     host : str
         The address of this machine to listen on. On any but loopback every user with the token of the panel's address
         can see the board and set registers, over a connection that is not encrypted.
+    opens : function of a path, optional
+        Opens the recording that is shown first, or of a folder each of its files, and returns its trials; default:
+        `taxel.open`.
+    layout : path, optional
+        The layout file for tables and arrays of other programs, as of `taxel.open`, which `opens` must then heed too;
+        default: the one beside each.
+    options : sequence of str
+        The options of ``taxel train`` with which it opens a file as `opens` does, so that the page can train on it.
+    rate_hz : float, optional
+        By which `opens` gives times to pictures without any; their labels are saved in numbers of pictures.
 
     Raises
     ------
@@ -63,20 +79,33 @@ class Panel:
         folder: str | os.PathLike[str] | None = None,
         port: int = 0,
         host: str = "127.0.0.1",
+        opens: Callable[[Path], Sequence[Recording]] | None = None,
+        layout: str | os.PathLike[str] | None = None,
+        options: Sequence[str] = (),
+        rate_hz: float | None = None,
     ) -> None:
         # Locked while one `Live` replaces another.
         self._restarting = threading.Lock()
         self._live = shows if isinstance(shows, Live) else None
-        opened = None
+        opened, shown = None, None
         if self._live is None:
             place = Path(checked_path("shows", shows))
             if control is not None:
                 raise ProblemError("control: a recording has no board; give a taxel.live.Live")
             if folder is not None:
                 raise ProblemError("folder: is the recording's own")
-            folder, opened = _shown(place)
+            if layout is not None:
+                layout = checked_path("layout", layout)
+            folder, opened = _shown(place, layout)
+            if layout is not None and opens is None:
+                opens, options = functools.partial(open_joined, layout=layout), ["--layout", layout, *options]
+            shown = None if place.is_dir() and not is_bag(place) else folder / opened
+        given = [text("options", option) for option in several("options", options)]
+        if rate_hz is not None:
+            period_us("rate_hz", rate_hz)
+        opening = Opening() if opens is None else Opening(callback("opens", opens), shown, given, rate_hz, layout)
         cable = None if control is None else Cable(text("control", control))
-        self._requests = RequestHandler(self.listen, self.delta_intensity, self.read_out, cable)
+        self._requests = RequestHandler(self.listen, self.delta_intensity, self.read_out, cable, opening)
         readout = None if self._live is None else self._live._labels
         stated = self._live is not None and self._live._registers_stated
         try:
@@ -85,6 +114,7 @@ class Panel:
                 whole("port", port, 0, 65_535),
                 Path.cwd() if folder is None else Path(checked_path("folder", folder)),
                 opened,
+                opens is not None,
                 control,
                 stated,
                 readout,
@@ -244,19 +274,19 @@ class Panel:
         return f"Panel({'ended' if self._stopped else self._url.partition('#')[0]})"
 
 
-def _shown(place: Path) -> tuple[Path, str]:
+def _shown(place: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, str]:
     """Return the folder of a recording and its name there; of a folder its first recording.
 
     The server indexes it when a client opens it; what is no recording is refused now.
     """
-    if place.is_dir():
-        files = recordings_in(place)
+    if place.is_dir() and not is_bag(place):
+        files = recordings_in(place, layout)
         if not files:
             raise ProblemError(f"{place}: holds no recording; name a file, or one of its folders")
         place = files[0]
-    if not place.is_file():
+    if not place.exists():
         raise FileNotFoundError(2, "no such recording", str(place))
-    check_recording(place)
+    check_recording(place, layout)
     return place.resolve().parent, place.resolve().name
 
 

@@ -5,19 +5,17 @@ from __future__ import annotations
 import os
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, number, numbers, parameters, text, whole
+from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.live.sending import PORT
 from taxel.wire import Registers
 
 __all__ = ["Source"]
-
-#: The largest value of a frame.
-_MOST = 2**16 - 1
 
 
 class Source:
@@ -70,6 +68,7 @@ class Source:
     ) -> None:
         self.array = instance("array", array, Array)
         held, self.shift = Registers._of_source(self.array, number("rate", rate), whole("bits", bits, 1, 16))
+        self.bits = int(bits)
         self.registers = held.replace(noise_floor=whole("noise_floor", noise_floor, 0, 255))
         options = parameters(
             {"board": whole("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
@@ -81,19 +80,36 @@ class Source:
 
         Parameters
         ----------
-        frame : int, shape (rows, columns) or flat, 0 to 65535
+        frame : int, shape (rows, columns) or flat, 0 to 2**bits - 1
+            Readings that are no whole numbers are scaled before: ``np.rint(readings / full * (2**bits - 1))``, `full`
+            the greatest reading.
 
         Raises
         ------
-        ProblemError : not one number for each taxel, or one below 0
+        ProblemError : another shape, or a value that is no whole number of that many bits (names the taxel)
         OSError : the system refuses to send
         """
-        values = numbers("frame", frame, np.int64).reshape(-1)
-        if values.size and (values.min() < 0 or values.max() > _MOST):
-            wrong = values.min() if values.min() < 0 else values.max()
-            raise ProblemError(f"frame: holds {wrong}, must lie in 0 to {_MOST}")
-        ticks = np.minimum(values >> self.shift, self.registers.ramp)
-        return self._core.push(ticks.astype(np.uint16))
+        ticks = np.minimum(self._whole(frame) >> self.shift, self.registers.ramp)
+        return self._core.push(ticks.astype(np.uint16).reshape(-1))
+
+    def _whole(self, frame: ArrayLike) -> NDArray[np.int64]:
+        """Return a frame's values as rows x columns; refuse those that the bits cannot hold."""
+        values, shape, most = numbers("frame", frame, np.float64), self.array.shape, 2**self.bits - 1
+        if values.shape not in (shape, (shape[0] * shape[1],)):
+            right = f"{shape[0]} x {shape[1]} (rows x columns), or {shape[0] * shape[1]} row by row"
+            raise ProblemError(f"frame: of shape {' x '.join(map(str, values.shape)) or 'one number'}, must be {right}")
+        values = values.reshape(shape)
+        is_whole = values == np.rint(values)
+        wrong = np.argwhere(~(is_whole & (values >= 0) & (values <= most)))
+        if len(wrong):
+            row, column = (int(k) for k in wrong[0])
+            value = float(values[row, column])
+            scaled = f"; scale readings to it first: np.rint(readings / full * {most}), full the greatest of them"
+            raise ProblemError(
+                f"frame: row {row}, column {column} is {plain(value)}; must be a whole number from 0 to {most} "
+                f"({counted(self.bits, 'bit')})" + scaled * (not is_whole[row, column])
+            )
+        return values.astype(np.int64)
 
     def __repr__(self) -> str:
         rows, columns = self.array.shape

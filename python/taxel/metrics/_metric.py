@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._base.arguments import bare, floats, instance, number, parameters, several, shown, text
+from taxel._base.messages import counted
 from taxel._base.parameters import ranges
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -77,7 +78,9 @@ def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[
     trains = len(patterns[0])
     for p, pattern in enumerate(patterns):
         if len(pattern) != trains:
-            raise ProblemError(f"{name}[{p}] has {len(pattern)} trains, {name}[0] has {trains}: must be equally many")
+            raise ProblemError(
+                f"{name}[{p}] has {counted(len(pattern), 'train')}, {name}[0] has {trains}: must be equally many"
+            )
     offsets = _offsets(np.concatenate([p.counts for p in patterns]))
     return name, len(patterns), trains, _joined([p.times for p in patterns]), offsets, window, True
 

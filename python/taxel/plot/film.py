@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from taxel._base.arguments import number
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
+from taxel.array import Array
 from taxel.events import Events
+from taxel.recording.pressure import above_rest_at
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 
@@ -41,7 +43,7 @@ def film(
     overwrite: bool = False,
     watch: Callable[[float], object] = lambda _: None,
 ) -> Path:
-    """Write a film of the taxels' values above their rest, with a plot of the force on the foam.
+    """Write a film of the taxels' values above the rest that they show, with a plot of the force on the foam.
 
     Parameters
     ----------
@@ -73,20 +75,17 @@ def film(
         raise ProblemError("events: nothing to draw; a film is of events with intensities")
     begin = events.markers[0][0] if events.markers else int(events.t[0])
     period_us = 1e6 / _RATE_HZ / slower
+    events = events.sorted()
     times = np.arange(begin, int(events.t[-1]) + period_us, period_us)
     if len(times) > _MOST:
         raise ProblemError(
             f"{len(times)} pictures: at most {_MOST}; choose slower below {slower * _MOST / len(times):.3g}"
         )
-    events = events.sorted()
-    rows, columns = events.array.shape
-    held = np.zeros(rows * columns)
-    rest: NDArray[np.float64] | None = None
-    index = events.array.index(events.x, events.y)
-    ends = np.searchsorted(events.t, times, side="right")
+    over = above_rest_at(events, times.astype(np.int64))
 
-    figure, image, below = _stage(events, times)
+    figure, image, below = _stage(events.array, times, float(over.max(initial=1.0)))
     if force_n is None:
+        ends = np.searchsorted(events.t, times, side="right")
         below.plot(to_ms(times - begin), np.diff(ends, prepend=0))
         below.set(ylabel="events")
     else:
@@ -98,22 +97,13 @@ def film(
     figure.set_layout_engine("none")
 
     def write(file: io.BufferedIOBase) -> None:
-        nonlocal rest
         # Writers require a file name with an ending, so they write to a temporary file, whose bytes are copied to
         # `file`.
         with tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{place.suffix.lower()}"
-            done = 0
             with writer.saving(figure, str(film), dpi=80):
-                for n, (t, end) in enumerate(zip(times, ends, strict=True)):
-                    assert events.intensity is not None  # checked above
-                    held[index[done:end]] = np.asarray(events.intensity)[done:end]
-                    done = end
-                    if rest is None:
-                        rest = held.copy()
-                    # A taxel without events before the start is at rest until its first one.
-                    rest = np.where(rest == 0, held, rest)
-                    image.set_data(np.clip(held - rest, 0, None).reshape(rows, columns))
+                for n, (t, picture) in enumerate(zip(times, over, strict=True)):
+                    image.set_data(picture)
                     cursor.set_xdata([to_ms(t - begin)] * 2)
                     writer.grab_frame()
                     watch((n + 1) / len(times))
@@ -136,29 +126,19 @@ def writer_of(place: Path) -> animation.AbstractMovieWriter:
     raise ProblemError(f"{place}: must end in .gif; .mp4, .webm, .mkv and .mov need the program ffmpeg")
 
 
-def _stage(events: Events, times: NDArray[np.float64]) -> tuple[Figure, AxesImage, Axes]:
+def _stage(array: Array, times: NDArray[np.float64], most: float) -> tuple[Figure, AxesImage, Axes]:
     """Return a figure, the image of the taxels in it, and the axes of the plot over time."""
     figure = Figure(figsize=(5.0, 5.6), layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, height_ratios=[5, 1])
-    rows, columns = events.array.shape
-    known = events.array.pitch_mm is not None
-    down, across = events.array._pitch("film") if known else (1.0, 1.0)
+    rows, columns = array.shape
+    known = array.pitch_mm is not None
+    down, across = array._pitch("film") if known else (1.0, 1.0)
     image = above.imshow(
-        np.zeros((rows, columns)), cmap="magma", vmin=0, vmax=_most(events), interpolation="nearest",
+        np.zeros((rows, columns)), cmap="magma", vmin=0, vmax=most, interpolation="nearest",
         extent=(-across / 2, (columns - 0.5) * across, (rows - 0.5) * down, -down / 2),
     )  # fmt: skip
     figure.colorbar(image, ax=above, label="ticks above rest")
     above.set(xlabel="x (mm)" if known else "column", ylabel="y (mm)" if known else "row")
     below.set(xlabel="time since the start marker (ms)", xlim=(0, to_ms(times[-1] - times[0])))
     return figure, image, below
-
-
-def _most(events: Events) -> float:
-    """Return the largest rise of a taxel, ticks, above the least intensity of its events."""
-    assert events.intensity is not None  # checked before
-    index = events.array.index(events.x, events.y)
-    values = np.asarray(events.intensity, np.float64)
-    least = np.full(events.array.rows * events.array.columns, np.inf)
-    np.minimum.at(least, index, values)
-    return max(1.0, float((values - least[index]).max()))

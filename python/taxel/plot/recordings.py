@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 
 from taxel._base.arguments import instance
+from taxel._base.times import beginning_us, begun
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
@@ -63,7 +64,8 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
     over, where = instance("figure", figure, FigureBase).subplots(1, 2, width_ratios=(2, 1))
     if recording.has_events:
         events = recording.events
-        t = events.t / 1e6
+        begin_us = beginning_us(events.t)
+        t = (events.t - begin_us) / 1e6
         span = (float(t.min()), float(t.max())) if len(events) else (0.0, 1.0)
         bins = np.linspace(span[0], max(span[1], span[0] + 1e-4), 201)
         width = bins[1] - bins[0]
@@ -77,13 +79,14 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         taxel_health = health(events)
     else:
         frames = recording.frames()
-        over.plot(frames.t / 1e6, frames.total(), color="black", linewidth=0.8)
+        begin_us = beginning_us(frames.t)
+        over.plot((frames.t - begin_us) / 1e6, frames.total(), color="black", linewidth=0.8)
         over.set_ylabel(f"sum of taxels ({frames.unit})")
         taxel_health = health(frames)
     for note in recording.notes:
         if note.t is not None:
-            over.axvline(note.t / 1e6, color="grey", linestyle=":", linewidth=0.8)
-    over.set(xlabel="board time (s)", title=recording.path.name)
+            over.axvline((note.t - begin_us) / 1e6, color="grey", linestyle=":", linewidth=0.8)
+    over.set(xlabel=_time(begin_us), title=recording.path.name)
     health_map(taxel_health, where)
     return figure
 
@@ -127,7 +130,8 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     if of.area is not None:
         curves.insert(0, (f"contact area ({of.area_unit})", of.area))
     rows = instance("figure", figure, FigureBase).subplots(len(curves) + (of.centre is not None), 1, sharex=True)
-    t = frames.t / 1e6
+    begin_us = beginning_us(frames.t)
+    t = (frames.t - begin_us) / 1e6
     for ax, (name, values) in zip(rows, curves, strict=False):
         ax.plot(t, values, color="black", linewidth=0.8)
         ax.set_ylabel(name)
@@ -137,8 +141,13 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
             rows[-1].plot(t, axis, color=colour, linewidth=0.8, label=name)
         rows[-1].set_ylabel(f"centre ({of.centre_unit})")
         rows[-1].legend(loc="upper right")
-    rows[-1].set_xlabel("board time (s)")
+    rows[-1].set_xlabel(_time(begin_us))
     return figure
+
+
+def _time(begin_us: int) -> str:
+    """Return the name of the axis of time, s from `begin_us` on."""
+    return f"time from {begun(begin_us)} (s)" if begin_us else "board time (s)"
 
 
 def health_map(health: Health, ax: Axes | None = None) -> Axes:
@@ -170,7 +179,7 @@ def health_map(health: Health, ax: Axes | None = None) -> Axes:
     instance("health", health, Health)
     ax = axes(ax, (5, 4.4))
     image = ax.imshow(np.log10(1.0 + health.activity), origin="upper", cmap="Greys", interpolation="nearest")
-    ax.figure.colorbar(image, ax=ax, label="log10 (1 + events)")
+    ax.figure.colorbar(image, ax=ax, label="log10 (1 + changes)")
     for name, places in health.named().items():
         if places:
             x, y = np.array(places).T

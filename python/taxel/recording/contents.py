@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sized
+from collections.abc import Callable, Mapping, Sequence, Sized
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar, cast
@@ -22,7 +22,7 @@ from taxel.labels import Note
 from taxel.recording.notes import BoardChange, Datagrams, Samples, Zeroing
 from taxel.wire import Registers
 
-__all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "once", "several", "together"]
+__all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "named", "once", "several", "together"]
 
 T = TypeVar("T")
 
@@ -123,7 +123,9 @@ class Contents:
     counts : mapping
         What was received and lost, by cause.
     verdict : str
-        The same in one line; None if there is none.
+        What was lost, in one line; None if that is not known.
+    remarks : tuple of str
+        What else there is to know: by whose times it is, what was left out, what it was converted from.
     datagrams : Datagrams
         The datagrams as received; those of the whole file, even if the recording is a part by time.
     payload : uint8, shape (bytes,)
@@ -174,6 +176,7 @@ class Contents:
     clock_of: str | None = None
     counts: Mapping[str, Any] = field(default_factory=dict)
     verdict: str | None = None
+    remarks: tuple[str, ...] = ()
     datagrams: Datagrams | None = None
     payload: NDArray[np.uint8] | None = None
     version_2: bool = False
@@ -261,11 +264,19 @@ def several(sources: Mapping[str, Contents]) -> Contents:
         verdict=once(
             lambda: "; ".join(f"{name}: {one.verdict}" for name, one in sources.items() if one.verdict) or None
         ),
+        remarks=once(lambda: named([(name, one.remarks) for name, one in sources.items()])),
         truncated=once(lambda: any(one.truncated for one in sources.values())),
         lost=once(lambda: tuple(dict.fromkeys(line for one in sources.values() for line in one.lost))),
         clock_of=first.clock_of,
         sources=sources,
     )
+
+
+def named(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:
+    """Return the remarks of several recordings as those of one: each with its recording's name if they differ."""
+    if len({lines for _, lines in remarks}) == 1:
+        return remarks[0][1]
+    return tuple(dict.fromkeys(f"{name}: {line}" for name, lines in remarks for line in lines))
 
 
 def together(sources: Mapping[str, Contents]) -> bool:

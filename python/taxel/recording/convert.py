@@ -130,12 +130,12 @@ def _contents(source: object) -> Contents:
 def _counts(of: Contents, written: Contents) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
     if of.samples is not None:
-        return {"received": len(of.samples), "converted": str(written.verdict).partition(": ")[2]}
+        return {"received": len(of.samples), "converted": written.verdict}
     if not written.has_events:
         pictures = len(written.table)
         if of.kind == "events":
             return {"received": pictures, "missing": 0}
-        return {"received": pictures, "converted": str(written.verdict).partition(": ")[2]}
+        return {"received": pictures, "converted": written.verdict}
     if of.kind == "events":
         # The datagrams are made of the events, so none is missing.
         return {"received": len(written.datagrams or ()), "missing": 0}
@@ -143,7 +143,7 @@ def _counts(of: Contents, written: Contents) -> dict[str, Any]:
     known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
     decoder = counts.get("decoder")
     damage = json.loads(_core.recording_damage(json.dumps(decoder))) if decoder else {}
-    return {**known, "decoder": damage, "converted": str(written.verdict).partition(": ")[2]}
+    return {**known, "decoder": damage, "converted": written.verdict}
 
 
 def _read_otherwise(part: Path, of: Contents) -> list[str]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import re
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -18,11 +19,12 @@ from numpy.typing import NDArray
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.limits import COLUMNS, TAXELS, VALUE, unpacked
-from taxel._base.messages import first_line
+from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import table as limited
+from taxel.formats.layout import advice
 from taxel.frames import Frames
 from taxel.recording.contents import Contents
 from taxel.recording.npz import around
@@ -32,6 +34,20 @@ __all__ = ["array_in_csv", "read_csv", "write_csv"]
 _EVENTS = ("t_us", "x", "y", "p")
 _MORE = ("intensity", "repaired")
 _TAXEL = re.compile(r"x(\d{1,5})y(\d{1,5})")
+#: Columns of events: the least and the largest number in the file, and the type in memory. -1 is an absent intensity.
+_LIMITS: dict[str, tuple[int, int, type[Any]]] = {
+    "p": (0, 1, np.uint8),
+    "x": (0, 65_535, np.uint16),
+    "y": (0, 65_535, np.uint16),
+    "intensity": (-1, 65_535, np.uint16),
+    "repaired": (0, 1, np.bool_),
+}
+#: Number of pictures that are written at once.
+_PICTURES = 4096
+#: Bytes of a table that are read at once.
+_AT_ONCE = 1 << 22
+#: The number of a table's line, and whole lines from there on.
+_Block = tuple[int, bytes]
 
 
 def array_in_csv(table: Events | Frames) -> Array:
@@ -52,10 +68,15 @@ def write_csv(file: BinaryIO, contents: Contents) -> None:
         places = _places(table.array)
         names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
         file.write(names.encode() + b"\n")
-        for t, picture in zip(table.t, table.values, strict=True):
-            # repr of a float32 is the shortest text that reads back as the same value.
-            values = (_shortest(picture[y, x]) for x, y in places)
-            file.write(",".join([str(t), *values]).encode() + b"\n")
+        x, y = np.array(places).T
+        for k in range(0, len(table), _PICTURES):
+            values = table.values[k : k + _PICTURES, y, x]
+            # Each value is written once; as bits, because 0 equals -0.
+            bits, which = np.unique(values.view(np.uint32), return_inverse=True)
+            texts = np.array([_shortest(value) for value in bits.view(np.float32)], object)
+            rows = texts[which.reshape(values.shape)].tolist()
+            times = table.t[k : k + _PICTURES].tolist()
+            file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
         return
     columns: list[NDArray[Any]] = [table.t, table.x, table.y, table.p.astype(np.uint8)]
     more = [name for name in _MORE if getattr(table, name) is not None]
@@ -84,8 +105,16 @@ def read_csv(path: Path, array: Array | None) -> Contents:
 
 
 def _table(path: Path, array: Array | None) -> Events | Frames:
-    raw = path.read_bytes().replace(b"\r\n", b"\n").removeprefix(b"\xef\xbb\xbf")
-    head, _, body = raw.partition(b"\n")
+    with path.open("rb") as file:
+        head = file.readline().removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n")
+        names = _names(path, head)
+        if tuple(names[:4]) == _EVENTS:
+            return _csv_events(path, names, _blocks(file), array)
+        return _csv_frames(path, names, _blocks(file), array)
+
+
+def _names(path: Path, head: bytes) -> list[str]:
+    """Return the names of the columns in the first line."""
     columns = head.count(b",") + 1
     if columns > COLUMNS:
         raise FormatError(f"{path}, line 1: {columns} columns; at most {COLUMNS} are read")
@@ -94,48 +123,60 @@ def _table(path: Path, array: Array | None) -> Events | Frames:
     except UnicodeDecodeError:
         names = []
     if not names or names[0] != "t_us" or len(names) < 2:
+        if {"label", "t_us"} <= set(names):
+            raise FormatError(f"{path}, line 1: a table of labels (docs/command-line.md), no recording")
         begin = repr(head[:40].decode("utf-8", "replace"))
         raise FormatError(
-            f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel"
+            f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel; "
+            + advice(path, "describes a table of another program")
         )
     if tuple(names[:4]) == _EVENTS:
         if names[4:] != [name for name in _MORE if name in names[4:]]:
             raise FormatError(
                 f"{path}, line 1: {shown(','.join(names[4:]))} after p: only intensity and repaired may follow"
             )
-        return _csv_events(path, names, body, array)
+        return names
     repeated = next((name for name, n in Counter(names).items() if n > 1), None)
     if repeated is not None:
         raise FormatError(f"{path}, line 1: column {shown(repeated)} stands there twice")
-    return _csv_frames(path, names, body, array)
+    return names
 
 
-def _csv_events(path: Path, names: list[str], body: bytes, array: Array | None) -> Events:
-    if "intensity" in names:
+def _blocks(file: BinaryIO) -> Iterator[_Block]:
+    """Yield whole lines below the header, and the number of the first of them: a large table is not in memory twice."""
+    first = 2
+    while block := file.read(_AT_ONCE):
+        block += file.readline()
+        yield first, block.replace(b"\r\n", b"\n")
+        first += block.count(b"\n")
+
+
+def _csv_events(path: Path, names: list[str], blocks: Iterator[_Block], array: Array | None) -> Events:
+    parts: dict[str, list[NDArray[Any]]] = {name: [] for name in (*names, "present")}
+    for first, block in blocks:
         # An empty intensity is an absent one; -1 stands for it while numbers are read.
-        body = re.sub(rb",[ \t]*(?=,|\n|$)", b",-1", body)
-    table = _numbers(path, names, body, np.int64)
-    t, x, y, p = table[:, :4].T
-    _within(path, "p", p, 0, 1)
-    for name, column in (("x", x), ("y", y)):
-        _within(path, name, column, 0, 65_535)
-    extra: dict[str, Any] = {}
+        body = re.sub(rb",[ \t]*(?=,|\n|$)", b",-1", block) if "intensity" in names else block
+        columns = dict(zip(names, _numbers(path, names, first, body, np.int64).T, strict=True))
+        for name, (low, high, _) in _LIMITS.items():
+            if name in columns:
+                _within(path, first, body, name, columns[name], low, high)
+        if "intensity" in columns:
+            columns["present"] = columns["intensity"] >= 0
+            columns["intensity"] = np.maximum(columns["intensity"], 0)
+        for name, column in columns.items():
+            parts[name].append(column.astype(_LIMITS[name][2] if name in _LIMITS else column.dtype))
+    joined = {name: np.concatenate(of) if of else np.empty(0, np.int64) for name, of in parts.items()}
+    t, x, y, p = (joined[name] for name in _EVENTS)
+    extra: dict[str, Any] = {name: joined[name] for name in _MORE if name in names}
     if "intensity" in names:
-        ticks = table[:, names.index("intensity")]
-        _within(path, "intensity", ticks, -1, 65_535)
-        extra = {"intensity": np.maximum(ticks, 0), "present": ticks >= 0}
-    if "repaired" in names:
-        repaired = table[:, names.index("repaired")]
-        _within(path, "repaired", repaired, 0, 1)
-        extra["repaired"] = repaired.astype(bool)
+        extra["present"] = joined["present"].astype(bool)
     try:
         return Events(t, x, y, p.astype(bool), array=array or around(x, y), **extra)
     except ProblemError as error:
         raise FormatError(f"{path}: {error}") from None
 
 
-def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) -> Frames:
-    table = _numbers(path, names, body, np.float64)
+def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: Array | None) -> Frames:
     matches = [_TAXEL.fullmatch(name) for name in names[1:]]
     if all(matches):
         places = [(int(m[1]), int(m[2])) for m in matches if m is not None]
@@ -146,35 +187,48 @@ def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) 
         shape = (1, len(names) - 1) if array is None else array.shape
         if shape[0] * shape[1] != len(names) - 1:
             raise FormatError(
-                f"{path}, line 1: {len(names) - 1} columns for an array of {shape[0]} x {shape[1]} taxels"
+                f"{path}, line 1: {counted(len(names) - 1, 'column')} for an array of {shape[0]} x {shape[1]} taxels"
             )
         places = [(k % shape[1], k // shape[1]) for k in range(len(names) - 1)]
     x, y = np.array(places).T
+    rows, columns = (int(y.max()) + 1, int(x.max()) + 1) if array is None else array.shape
+    sparse = f"{path}, line 1: {counted(len(places), 'column')} for {rows} x {columns} taxels: most are missing"
     if array is None:
-        rows, columns = int(y.max()) + 1, int(x.max()) + 1
-        if rows * columns > TAXELS or len(table) * rows * columns > max(1 << 24, 16 * table.size):
-            raise FormatError(f"{path}, line 1: {len(places)} columns for {rows} x {columns} taxels: most are missing")
+        if rows * columns > TAXELS:
+            raise FormatError(sparse)
         exists = np.zeros((rows, columns), bool)
         exists[y, x] = True
-        array = Array(rows, columns, exists=None if exists.all() else exists)
-    elif x.max() >= array.columns or y.max() >= array.rows:
-        k = int(np.flatnonzero((x >= array.columns) | (y >= array.rows))[0])
-        raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {array.rows} x {array.columns} taxels")
-    large = np.argwhere(np.abs(table[:, 1:]) > VALUE)
-    if len(large):
-        k, c = large[0]
-        raise FormatError(f"{path}, line {k + 2}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit 32 bits")
-    unpacked(str(path), 4 * len(table) * array.rows * array.columns)
-    values = np.zeros((len(table), *array.shape), np.float32)
-    values[:, y, x] = table[:, 1:]
+        sensor = Array(rows, columns, exists=None if exists.all() else exists)
+    elif x.max() >= columns or y.max() >= rows:
+        k = int(np.flatnonzero((x >= columns) | (y >= rows))[0])
+        raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {rows} x {columns} taxels")
+    else:
+        sensor = array
+    t, values, n = [np.empty(0)], [np.empty((0, rows, columns), np.float32)], 0
+    for first, body in blocks:
+        table = _numbers(path, names, first, body, np.float64)
+        large = np.argwhere(np.abs(table[:, 1:]) > VALUE)
+        if len(large):
+            k, c = large[0]
+            raise FormatError(
+                f"{path}, line {first + _line_number(body, k)}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit "
+                "32 bits"
+            )
+        n += len(table)
+        if array is None and n * rows * columns > max(1 << 24, 16 * n * len(names)):
+            raise FormatError(sparse)
+        unpacked(str(path), 4 * n * rows * columns)
+        t.append(table[:, 0].copy())
+        values.append(np.zeros((len(table), rows, columns), np.float32))
+        values[-1][:, y, x] = table[:, 1:]
     try:
-        return Frames(frozen(values), table[:, 0], array=array)
+        return Frames(frozen(np.concatenate(values)), np.concatenate(t), array=sensor)
     except ProblemError as error:
         raise FormatError(f"{path}: {error}") from None
 
 
-def _numbers(path: Path, names: list[str], body: bytes, dtype: type[Any]) -> NDArray[Any]:
-    """Read the rows below the header; an error names line and column."""
+def _numbers(path: Path, names: list[str], first: int, body: bytes, dtype: type[Any]) -> NDArray[Any]:
+    """Read rows, whose first line has a number; an error names line and column."""
     if not body.strip():
         return np.empty((0, len(names)), dtype)
     try:
@@ -183,31 +237,35 @@ def _numbers(path: Path, names: list[str], body: bytes, dtype: type[Any]) -> NDA
         place = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
         # NumPy counts rows from 0 in one of its messages, and from 1 in the other.
         row = 0 if place is None else int(place[1]) - ("changed" in str(error))
-        where = "" if place is None else f", line {_line_number(body, row)}"
+        where = "" if place is None else f", line {first + _line_number(body, row)}"
         if place is not None and place[2] is not None and int(place[2]) <= len(names):
             where += f", column {names[int(place[2]) - 1]}"
         reason = re.sub(r" at row .*|; use `usecols`.*", "", first_line(error))
         raise FormatError(f"{path}{where}: {reason}; must be {len(names)} numbers a line") from None
     if table.shape[1] != len(names):
-        raise FormatError(f"{path}, line 2: {table.shape[1]} numbers; must be {len(names)} numbers a line")
+        raise FormatError(
+            f"{path}, line {first + _line_number(body, 0)}: {table.shape[1]} numbers; must be {len(names)} numbers a "
+            "line"
+        )
     return table
 
 
 def _line_number(body: bytes, row: int) -> int:
-    """Return the line number of a row of numbers; empty lines are not rows."""
+    """Return the number of the line, from 0 on, of a row of numbers; empty lines are not rows."""
     rows = -1
     for k, line in enumerate(body.split(b"\n")):
         rows += bool(line.strip())
         if rows == row:
-            return k + 2
-    return row + 2
+            return k
+    return row
 
 
-def _within(path: Path, name: str, column: NDArray[Any], low: int, high: int) -> None:
+def _within(path: Path, first: int, body: bytes, name: str, column: NDArray[Any], low: int, high: int) -> None:
     wrong = np.flatnonzero((column < low) | (column > high))
     if len(wrong):
         k = int(wrong[0])
-        raise FormatError(f"{path}, line {k + 2}, column {name}: is {column[k]}; must be {max(0, low)} to {high}")
+        line = first + _line_number(body, k)
+        raise FormatError(f"{path}, line {line}, column {name}: is {column[k]}; must be {max(0, low)} to {high}")
 
 
 def _places(array: Array) -> list[tuple[int, int]]:
@@ -217,5 +275,6 @@ def _places(array: Array) -> list[tuple[int, int]]:
 
 
 def _shortest(value: np.float32) -> str:
+    # str of a float32 is the shortest text that reads back as the same value.
     text = str(value)
     return text.removesuffix(".0")

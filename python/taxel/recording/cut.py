@@ -89,7 +89,12 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
     array = of.array
     (left, right), (top, bottom) = array.region(columns, rows)
     if right <= left or bottom <= top:
-        raise ProblemError(f"columns {left} to {right}, rows {top} to {bottom}: no taxel of {array!r} lies there")
+        asked = " and ".join(
+            f"{name} {chosen.start or 0} to {'the last' if chosen.stop is None else chosen.stop}"
+            for name, chosen in (("columns", columns), ("rows", rows))
+            if chosen != slice(None)
+        )
+        raise ProblemError(f"{asked}: no taxel lies there; there are {array.columns} columns and {array.rows} rows")
     if (bottom - top, right - left) == array.shape:
         return of
     if of.is_several:

@@ -47,6 +47,7 @@ clock                =      =      ~      ~         =          =         =      
 clock_of             =      =      ~      ~         =          =         =       =      -     -    -    -   -
 counts               =      =      ~      =         =          =         =       ~      ~     -    =    -   =
 verdict              =      =      ~      =         =          =         =       ~      ~     -    =    -   =
+remarks              =      =      ~      =         =          =         =       ~      ~     -    =    -   =
 datagrams            =      -      -      =         =          =         =       ~      ~     -    -    -   -
 payload              =      -      -      =         =          =         =       ~      ~     ~    -    -   -
 version_2            =      -      -      =         =          =         =       ~      ~     -    -    -   -
@@ -118,6 +119,7 @@ LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "counts": lambda _, __: "what was received and lost, by cause",
     # This field is the counts in one line.
     "verdict": None,
+    "remarks": lambda of, _: [f"the remark: {line}" for line in of.remarks],
     "datagrams": _datagrams,
     "payload": lambda _, __: "raw bytes (words that are no events)",
     # These fields describe how the datagrams are encoded; a .lsa has only the bytes of the datagrams.

@@ -9,6 +9,7 @@ beginning. ``about`` is JSON: the sensor, the source, registers, notes, detectio
 
 from __future__ import annotations
 
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,8 @@ from taxel.recording.npz import TEXTS, columns_of, contents_of
 
 __all__ = ["is_ours", "read_h5", "write_h5"]
 
+#: Name of the attribute that has the version of the layout.
+_MARK = "taxel"
 #: Version of the layout.
 _VERSION = 1
 #: Size of the chunks of a data set, which are compressed one by one.
@@ -30,8 +33,12 @@ _PIECE_BYTES = 1 << 20
 def is_ours(path: Path) -> bool:
     """Return whether a .h5 has the layout that `taxel convert` writes; false for a file that is not HDF5."""
     try:
+        # The name of an attribute is in the file as it is: without it the library, which begins slowly, is not asked.
+        with path.open("rb") as file:
+            if not path.stat().st_size or mmap(file.fileno(), 0, access=ACCESS_READ).find(_MARK.encode()) < 0:
+                return False
         with H5File(path) as h5:
-            return "taxel" in h5.attributes
+            return _MARK in h5.attributes
     except (FormatError, OSError):
         return False
 
@@ -41,7 +48,7 @@ def write_h5(part: Path, contents: Contents) -> None:
     import h5py  # noqa: PLC0415  loads slowly
 
     with h5py.File(part, "w") as h5:
-        h5.attrs["taxel"] = _VERSION
+        h5.attrs[_MARK] = _VERSION
         for name, column in columns_of(contents).items():
             if name in TEXTS:
                 h5.create_dataset(name, data=str(column))
@@ -60,12 +67,12 @@ def read_h5(path: Path, array: Array | None) -> Contents:
     FormatError : not an HDF5 file, or one of another layout
     """
     with H5File(path) as h5:
-        if "taxel" not in h5.attributes:
+        if _MARK not in h5.attributes:
             raise FormatError(
                 f"{path}: HDF5, but without the attribute taxel of what taxel convert writes; other people's files are "
                 "read by taxel.open and taxel.formats.trials"
             )
-        if h5.attributes["taxel"] != _VERSION:
+        if h5.attributes[_MARK] != _VERSION:
             raise FormatError(f"{path}: layout {h5.attributes['taxel']}; this version reads {_VERSION}")
         columns = {name: np.array(h5.text(name)) if name in TEXTS else h5.numbers(name) for name in h5.entries}
     return contents_of(path, "h5", columns, array)

@@ -10,19 +10,21 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import shown
+from taxel._base.columns import frozen
 from taxel._base.drawing import draw
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded
 from taxel.recorded import recorded as held_by
-from taxel.recording.rest import FORCE_UNITS, ticks_by_unit
+from taxel.recording.rest import FORCE_UNITS, flickering, ticks_by_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Health", "TaxelStatistics", "Touches", "by_taxel", "health", "judged"]
+__all__ = ["Health", "TaxelStatistics", "Touches", "health", "judged"]
 
 #: Reading: a taxel is dead, or stuck, if its place was touched at least this number of times (`_core`, *touch counts*)
 #: and it never changed meanwhile, if it has this number of neighbours: beyond the edge of an insole nothing presses ...
@@ -85,7 +87,7 @@ class Health:
         counts = ", ".join(f"{len(places)} {name}" for name, places in self.named().items())
         untold = int(np.count_nonzero(self.untold))
         return (
-            f"Health({self.array.taxels} taxels: {counts}"
+            f"Health({counted(self.array.taxels, 'taxel')}: {counts}"
             + f", {untold} not touched enough to say" * bool(untold)
             + ")"
         )
@@ -122,7 +124,9 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     many as the silent ones. Stuck: like a dead one, but known to hold a value other than 0; or 3 events or more, all
     with one intensity, while its neighbours show more than one. Noisy: in 10 bins of 50 ms or more, half of all in
     which it changes, it has 3 changes or more, and more than 8 times those of all but one of the 24 taxels around it;
-    and at most 45 % of its changes go on in the direction of the one before.
+    and at most 45 % of its changes go on in the direction of the one before. Of pictures, too, one that jumps for less
+    than two pictures at a time, 10 times or more, more than half as far from its median as ever, while all but one of
+    its neighbours move less than an eighth as much.
 
     Examples
     --------
@@ -132,31 +136,35 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     >>> health(Frames(values, np.arange(15) * 100_000, unit="ticks"))
     Health(9 taxels: 1 dead, 0 stuck, 0 noisy)
     """
-    held = held_by(recorded)
+    # A missing value is no reading that could show what a taxel does.
+    held = held_by(recorded, hold=False)
     if isinstance(held, Events):
         return judged(held.array, _statistics_of_events(held))
     if not isinstance(held, Frames):
         raise ProblemError(f"recorded is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
-    flat = held.values.reshape(len(held), held.array.rows * held.array.columns)
-    # A NaN has no direction of change.
-    ways = (flat[1:] > flat[:-1]).astype(np.int8) - (flat[1:] < flat[:-1])
-    turn, taxel = np.nonzero(ways)
-    activity, moved = _ways(taxel, ways[turn, taxel], held.array)
+    activity, moved = (of.astype(np.int64).reshape(held.array.shape) for of in _core.changes_of_frames(held._parts()))
     # The values of pictures count from the least one.
-    scale, least = ticks_by_unit(held), np.nanmin(flat, initial=np.inf)
-    ticks = Frames((held.values - least) * scale if np.isfinite(least) else held.values, held.t, array=held.array)
+    scale, least = ticks_by_unit(held), np.fmin.reduce(held.values, axis=None, initial=np.inf)
+    ticks = held
+    if np.isfinite(least):
+        values = held.values - least
+        ticks = Frames(frozen(np.multiply(values, scale, out=values)), held.t, array=held.array)
     counts = _core.touches_of_frames(ticks._parts(), 0.0 if held.unit in FORCE_UNITS else np.nan)
-    result = judged(held.array, TaxelStatistics(activity, moved, by_taxel(counts, held.array)), loud=False)
+    result = judged(held.array, TaxelStatistics(activity, moved, Touches.of(*counts)), loud=False)
     if not len(held):
         return result
     # In pictures a taxel that never changes is dead or stuck, depending on its value.
     loaded = held.values[0] > least
-    return replace(result, dead=result.dead & ~loaded, stuck=result.stuck | result.dead & loaded)
+    noisy = result.noisy | flickering(held)
+    dead, stuck = (of & ~noisy for of in (result.dead & ~loaded, result.stuck | result.dead & loaded))
+    return replace(result, dead=dead, stuck=stuck, noisy=noisy, untold=result.untold & ~noisy)
 
 
 class Touches(NamedTuple):
-    """Counts of each taxel's touches; whole numbers, shape (rows, columns)."""
+    """Counts of touches of taxels that had a value, and of their neighbours, shape (taxels,); others have none."""
 
+    taxels: NDArray[np.uint32]
+    """Their indices."""
     touches: NDArray[np.uint32]
     """Number of touches of its place, as its neighbours show them."""
     missed: NDArray[np.uint32]
@@ -168,9 +176,14 @@ class Touches(NamedTuple):
     by_itself: NDArray[np.uint32]
     """Those in which hardly any taxel around it did."""
 
+    @classmethod
+    def of(cls, taxels: NDArray[np.uint32], counts: NDArray[np.uint32]) -> Touches:
+        """Return what the core gives: the taxels, and rows of five counts one after the other."""
+        return cls(taxels, *counts.reshape(-1, 5).T)
+
 
 class TaxelStatistics(NamedTuple):
-    """Statistics of each taxel's events and held values; whole numbers, shape (rows, columns)."""
+    """Statistics of each taxel's events and held values; whole numbers, shape (rows, columns) but for touches."""
 
     activity: NDArray[np.int64]
     """Number of events."""
@@ -190,8 +203,14 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
     activity, of = statistics.activity, statistics.touches
     silent = exists & (activity == 0)
-    enough = (of.touches >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
-    dead = exists & enough & (of.missed == of.touches)
+
+    def where(told: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        grid = np.zeros(array.shape, bool)
+        grid.reshape(-1)[of.taxels[told]] = True
+        return grid
+
+    enough = where(of.touches >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
+    dead = exists & enough & where(of.missed == of.touches)
     if loud:
         # A median reaches a bound only if a neighbour reaches it, so all other taxels are skipped.
         among = _reaches(activity, exists, (_neighbours(exists & (activity >= LOUD_FROM)) > 0) & exists, LOUD_FROM)
@@ -209,19 +228,14 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
     if statistics.values is not None:
         still = exists & (activity >= STUCK_FROM) & (statistics.values == 1)
         stuck |= _reaches(statistics.values, exists & (activity > 0), still, 1, above=True)
-    noisy = exists & (of.by_itself >= NOISY_FROM) & (of.by_itself >= NOISY_SHARE * of.changed)
+    noisy = exists & where((of.by_itself >= NOISY_FROM) & (of.by_itself >= NOISY_SHARE * of.changed))
     noisy &= ~stuck & (statistics.moved <= NOISY_ON * activity)
     # A channel has no neighbours that would show what it should do.
     noisy &= min(array.shape) > 1
     dead &= ~stuck
-    works = enough | (of.pressed > 0) | (activity >= WORKS_FROM)
+    works = enough | where(of.pressed > 0) | (activity >= WORKS_FROM)
     untold = exists & ~dead & ~stuck & ~noisy & ~works
     return Health(array, activity, dead, stuck, noisy, untold)
-
-
-def by_taxel(counts: NDArray[np.uint32], array: Array) -> Touches:
-    """Return the counts of touches that the core gives, as grids."""
-    return Touches(*counts.reshape(array.rows, array.columns, 5).transpose(2, 0, 1))
 
 
 def _statistics_of_events(events: Events) -> TaxelStatistics:
@@ -229,7 +243,7 @@ def _statistics_of_events(events: Events) -> TaxelStatistics:
     own = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
     index = events.array.index(events.x, events.y).astype(np.int64)
     activity, moved = _ways(index[own], np.where(events.p[own], 1, -1), events.array)
-    touches = by_taxel(_core.touches_of_events(events.sorted()._parts()), events.array)
+    touches = Touches.of(*_core.touches_of_events(events.sorted()._parts()))
     if events.intensity is None or events.present is None:
         return TaxelStatistics(activity, moved, touches)
     shape, size = events.array.shape, events.array.rows * events.array.columns

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from taxel._core import FormatError
+from taxel.formats.layout import advice
 from taxel.formats.ros import is_bag
 from taxel.recording.contents import Contents
 
-__all__ = ["ENDINGS", "kind_of", "kind_of_file", "verdict_of"]
+__all__ = ["ENDINGS", "is_label_table", "is_own_table", "kind_of", "kind_of_file", "verdict_of"]
 
 #: taxel's own kinds of files by their endings.
 ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
@@ -33,19 +34,41 @@ _STRANGERS = {
 }
 
 
+def is_own_table(path: Path) -> bool:
+    """Return whether the first line of a .csv begins as taxel's own recordings do, which are separated by commas."""
+    names = _columns(path)
+    return names[:1] == [b"t_us"] and len(names) > 1 and b"label" not in names
+
+
+def is_label_table(path: Path) -> bool:
+    """Return whether the first line of a .csv names the columns of a table of labels (`taxel.Labels`)."""
+    return {b"label", b"t_us"} <= set(_columns(path))
+
+
+def _columns(path: Path) -> list[bytes]:
+    """Return the names in the first line of a table, as far as they are within 64 kB."""
+    with path.open("rb") as table:
+        head = table.readline(1 << 16).removeprefix(b"\xef\xbb\xbf").lstrip()
+    return [name.strip() for name in head.split(b",")]
+
+
 def kind_of_file(kind: str) -> str:
     """Return the name of a kind of recording: its ending if it is taxel's own, else its format.
 
     Examples
     --------
-    >>> kind_of_file("npz"), kind_of_file("pedar")
-    ('.npz', 'pedar recording')
+    >>> kind_of_file("npz"), kind_of_file("pedar"), kind_of_file("arrays")
+    ('.npz', 'pedar recording', 'file of arrays')
     """
-    return f".{kind}" if kind in ENDINGS.values() else f"{kind} recording"
+    return f".{kind}" if kind in ENDINGS.values() else _OTHERS.get(kind, f"{kind} recording")
+
+
+#: Kinds of files that are no recordings of one format.
+_OTHERS = {"arrays": "file of arrays", "table": "table", "ros": "ROS bag"}
 
 
 def verdict_of(contents: Contents) -> str:
-    """Return in one line what was lost of a recording, or that its file does not record losses."""
+    """Return in one line what was lost of a recording, or that its file does not say it."""
     verdict = contents.verdict
     return f"the {kind_of_file(contents.kind)} does not say what was lost" if verdict is None else verdict
 
@@ -77,14 +100,12 @@ def kind_of(path: Path) -> str:
         stranger = f"a .{by_magic} file; rename it"
     if stranger is not None:
         right = expected[ending] if ending else "a recording"
-        what, _, advice = stranger.partition("; ")
-        raise FormatError(
-            f"{path}, byte 0: starts with {begins} ({what}), not with {right}" + f"; {advice}" * bool(advice)
-        )
+        what, _, then = stranger.partition("; ")
+        raise FormatError(f"{path}, byte 0: starts with {begins} ({what}), not with {right}" + f"; {then}" * bool(then))
     if ending is None:
         raise FormatError(
-            f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}; a layout file beside "
-            f"it, {path.stem}.layout.toml, describes a table or an array of somebody else"
+            f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}; "
+            + advice(path, "describes a table or an array of another program")
         )
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]

@@ -19,7 +19,7 @@ from taxel.detections import Detections
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.contents import UNKNOWN, Contents, anything
+from taxel.recording.contents import UNKNOWN, Contents, anything, named
 from taxel.recording.fates import after
 from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import Zeroing
@@ -78,7 +78,11 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
 def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
     if len({part.has_events for part in parts}) > 1:
-        raise ProblemError("recordings: events among pictures; convert one kind to the other first")
+        ours, other = parts[0], next(part for part in parts if part.has_events != parts[0].has_events)
+        of_events, of_pictures = (ours, other) if ours.has_events else (other, ours)
+        raise ProblemError(
+            f"recordings: {of_events.name} holds events, {of_pictures.name} pictures; convert one of them first"
+        )
     tables = [part.table for part in parts]
     shifts = _shifts(tables, gap)
     array, lefts = _side_by_side(tables) if beside else (_common(parts, tables), [0] * len(parts))
@@ -134,6 +138,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         notes=_notes(parts, tables, shifts),
         detections=_detections(parts, shifts),
         verdict=None if all(part.verdict is None for part in parts) else verdict,
+        remarks=named([(part.name, part.remarks) for part in parts]),
         truncated=any(part.truncated for part in parts),
         **fields,
     )

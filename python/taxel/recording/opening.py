@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,21 +18,30 @@ from taxel.events import Events
 from taxel.formats import Trial
 from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
-from taxel.labels import Labels, Note
+from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording.contents import Contents, several
 from taxel.recording.csv import read_csv
 from taxel.recording.h5 import is_ours, read_h5
-from taxel.recording.kinds import ENDINGS, kind_of
-from taxel.recording.layout import laid_out
+from taxel.recording.kinds import ENDINGS, is_label_table, is_own_table, kind_of
+from taxel.recording.layout import laid_out, on_array
 from taxel.recording.npz import read_npz
-from taxel.recording.read_foreign import is_foreign, read_foreign
+from taxel.recording.read_foreign import is_foreign, read_foreign, refuse_without_layout
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.read_ros import Topics, read_ros
-from taxel.recording.recording import Recording
+from taxel.recording.recording import Recording, with_notes
 from taxel.recording.sidecars import with_sidecars
 
-__all__ = ["check_recording", "joined", "open_any", "open_joined", "open_recording", "recordings_in", "sensors"]
+__all__ = [
+    "check_recording",
+    "is_recording",
+    "joined",
+    "open_any",
+    "open_joined",
+    "open_recording",
+    "recordings_in",
+    "sensors",
+]
 
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
@@ -93,7 +103,8 @@ def open_any(
     -----
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
     is described in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) become
-    notes of the recordings that it names; in a folder with files that taxel writes, all other files are ignored.
+    notes of the recordings that it names, also of a file of pictures that is opened alone. In a folder with files that
+    taxel writes, all other files are ignored.
 
     Examples
     --------
@@ -108,49 +119,43 @@ def open_any(
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
     place = Path(arguments.path("path", path))
-    how: dict[str, Any] = {"array": array, "layout": layout, "pairing": pairing, "differences": differences}
-    how |= {"topic": topic, "field": field, "types": types, "ros": ros}
+    how = How(array, layout, pairing, differences, topic, field, types, ros)
     if place.is_dir() and not is_bag(place):
         return _folder(place, how)
     # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
     if place.exists() and (names := _formats(place)) and not _is_own(place):
-        return [_of(trial, place, names[0], layout) for trial in formats.trials(place, names[0])]
-    return open_recording(place, **how)
+        trials = formats.trials(place, names[0])
+        return [_named_beside(place, Path(one.name), _of(one, place, names[0], layout)) for one in trials]
+    return _named_beside(place, Path(place.name), _open_one(place, how))
 
 
-def open_recording(
-    path: str | os.PathLike[str],
-    *,
-    array: Array | Sequence[Array] | None = None,
-    layout: str | os.PathLike[str] | None = None,
-    pairing: str = "direct",
-    differences: bool = False,
-    topic: str | Sequence[str] | None = None,
-    field: str | Sequence[str] | None = None,
-    types: str | os.PathLike[str] | None = None,
-    ros: str | None = None,
-) -> Recording:
-    """Open one .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged.
+@dataclass(frozen=True)
+class How:
+    """Hold what says how files are opened; the fields are the arguments of `open_any`."""
+
+    array: Array | Sequence[Array] | None = None
+    layout: str | os.PathLike[str] | None = None
+    pairing: str = "direct"
+    differences: bool = False
+    topic: str | Sequence[str] | None = None
+    field: str | Sequence[str] | None = None
+    types: str | os.PathLike[str] | None = None
+    ros: str | None = None
+
+    @property
+    def topics(self) -> Topics:
+        """What of a ROS bag is opened."""
+        return Topics(self.topic, self.field, self.types, self.ros)
+
+
+def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
+    """Open one .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, or a ROS bag; finished or not, whole or damaged.
 
     Parameters
     ----------
     path : path
-    array : Array, or list of Array, optional
-        The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
-        a larger one if events lie outside it. Of a ROS bag rows and columns, for messages that do not state them.
-    layout : path, optional
-        The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
-        ``layout.toml`` beside it, if there is one.
-    pairing : {"direct", "taxel"}
-        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
-    differences : bool
-        Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
-    topic, field : str, or list of str, optional
-        What of a ROS bag is opened as pictures: a topic, and the path of a field of its messages, as "left.taxels"
-        (default: the only one with numbers). Of lists each entry becomes a source, with its own `array` if that is a
-        list too.
-    types, ros : path and str, optional
-        For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
+    **how
+        The other arguments of `open_any`.
 
     Returns
     -------
@@ -165,26 +170,50 @@ def open_recording(
     -----
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel.
     """
-    place = Path(arguments.path("path", path))
-    text("pairing", pairing, ("direct", "taxel"))
-    flag("differences", differences)
-    said = _layout(place, layout)
+    return _open_one(Path(arguments.path("path", path)), How(**how))
+
+
+def _open_one(place: Path, how: How) -> Recording:
+    """Open one file as taxel writes it, a table of another program with a layout, or a ROS bag."""
+    text("pairing", how.pairing, ("direct", "taxel"))
+    flag("differences", how.differences)
+    said = _layout(place, how.layout)
     of_layout = {} if said is None else said.ros
-    given = Topics(topic, field, types, ros)
-    topics = given.but(of_layout)
     try:
+        if said is None:
+            refuse_without_layout(place)
         if said is not None and is_foreign(place):
+            if how.topics.are_given:
+                raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
             contents = read_foreign(place, said)
+            if how.array is not None:
+                contents = _on_given(contents, instance("array", how.array, Array))
         elif (kind := kind_of(place)) == "ros":
-            contents = read_ros(place, topics, said.grid() if array is None and said is not None else array)
-        elif given.are_given:
+            grid = said.grid() if how.array is None and said is not None else how.array
+            contents = read_ros(place, how.topics.but(of_layout), grid)
+        elif how.topics.are_given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
         else:
-            own = None if array is None else instance("array", array, Array)
-            contents = _read(place, kind, own, pairing, differences)
+            own = None if how.array is None else instance("array", how.array, Array)
+            contents = _read(place, kind, own, how.pairing, how.differences)
         return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
+
+
+def _on_given(of: Contents, array: Array) -> Contents:
+    """Return pictures of another program on the given sensor: as many rows and columns, or a row of as many channels.
+
+    Raises
+    ------
+    ProblemError : another number of taxels, rows or columns
+    """
+    own, taxels = of.array, array.rows * array.columns
+    if own.shape not in (array.shape, (1, taxels)):
+        size = f"{array.rows} x {array.columns}"
+        raise ProblemError(f"array: {size} taxels; {of.path} holds pictures of {own.rows} x {own.columns}")
+    says_more = array.shape != own.shape or (array._is_measured and not own._is_measured)
+    return on_array(of, array) if says_more else of
 
 
 def _read(place: Path, kind: str, array: Array | None, pairing: str, differences: bool) -> Contents:
@@ -196,17 +225,17 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
     return {"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array)
 
 
-def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
+def _folder(folder: Path, how: How) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
     files = sorted((file for file in folder.iterdir() if file.name != LABELS), key=_order)
     own = [file for file in files if _is_own(file)]
-    if how["topic"] or not own:
+    if how.topic or not own:
         own = [file for file in files if file in own or is_bag(file)]
     if own:
-        opened = [open_recording(file, **how) for file in own]
+        opened = [_open_one(file, how) for file in own]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
-    elif not (names := _formats(folder)) and (foreign := [f for f in files if _is_laid_out(f, how["layout"])]):
-        pairs = [(file.relative_to(folder), open_recording(file, **how)) for file in foreign]
+    elif not (names := _formats(folder)) and (foreign := _laid_out_in(files, how.layout)):
+        pairs = [(file.relative_to(folder), _open_one(file, how)) for file in foreign]
     else:
         if len(names) != 1:
             problem = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
@@ -215,7 +244,7 @@ def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
             there = f"there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}"
             raise FormatError(f"{folder}: holds {problem}; {hint or there}")
         trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
-        pairs = [(Path(trial.name), _of(trial, folder, names[0], how["layout"])) for trial in trials]
+        pairs = [(Path(trial.name), _of(trial, folder, names[0], how.layout)) for trial in trials]
     return _labelled(folder / LABELS, pairs)
 
 
@@ -229,28 +258,61 @@ def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recordin
     if unknown:
         there = ", ".join(str(name) for name, _ in pairs[:8])
         raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {there}")
-    if None in known and any(not row.recording for row in labels.rows) and len(pairs) > 1:
-        raise FormatError(f"{table}: without a column recording, but the folder holds {len(pairs)}")
-    return [recording.with_notes(_notes(labels, name, recording)) for name, recording in pairs]
+    # The feet of one trial are one recording.
+    count = len({trial_of(str(name), recording.label) for name, recording in pairs})
+    if count > 1 and any(not row.recording for row in labels.rows):
+        raise FormatError(f"{table}: names no recording, and there are {count}; must have the column recording")
+    return [_with_labels(labels, name, recording) for name, recording in pairs]
 
 
-def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
-    clock = recording.clock if recording.clock is not None and len(recording.clock.board_us) else None
-    times = labels._of(name, lambda: clock, recording.label)
+def _named_beside(place: Path, name: Path, recording: Recording) -> Recording:
+    """Add the reference events of the folder to the notes of pictures that it names; the page opens them one by one."""
+    table, own = place.parent / LABELS, recording._contents
+    if any(one.has_events for one in (own.sources or {own.label: own}).values()):
+        return recording
+    if not (table.is_file() and is_label_table(table)):
+        return recording
+    labels = Labels(table)
+    return recording if labels.named(name) in (None, "") else _with_labels(labels, name, recording)
+
+
+def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
+    """Add the reference events of a recording, and of each of its sources, to the notes."""
+    own = recording._contents
+    if not own.is_several:
+        return recording.with_notes(_notes(labels, name, own))
+    sources: dict[str, Contents] = {}
+    for label, one in own.sources.items():
+        more = () if one.columns else _notes(labels, name, one)
+        sources[label] = with_notes(one.but(sources={}), tuple(more))
+    for label, one in sources.items():
+        sources[label] = one.but(sources=sources)
+    return Recording(several(sources))
+
+
+def _notes(labels: Labels, name: Path, of: Contents) -> list[Note]:
+    """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
+    clock = of.clock if of.clock is not None and len(of.clock.board_us) else None
+    times = labels._of(name, lambda: clock, of.label)
+    which, replaced, there = (of.path, of.label, trial_of(of.name, of.label)), set[int | None](), set[object]()
+    if beside(of.path).is_file():
+        set_here = Labels(beside(of.path))
+        replaced, there = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
     return sorted(
         (
             Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
             for label, every in times.items()
             for t in every
+            if t not in replaced and (label, int(t)) not in there
         ),
         key=lambda note: note.t or 0,
     )
 
 
-def _is_laid_out(file: Path, given: str | os.PathLike[str] | None) -> bool:
-    """Return whether a file of a folder is of somebody else, and a layout says how to read it."""
-    is_labels = file.name.endswith(".notes.csv")
-    return is_foreign(file) and not is_labels and (given is not None or Layout.beside(file) is not None)
+def _laid_out_in(files: Sequence[Path], given: str | os.PathLike[str] | None) -> list[Path]:
+    """Return the files of a folder that are of another program, and of which a layout says how to read them."""
+    foreign = (file for file in files if not file.name.endswith(".notes.csv") and is_foreign(file))
+    return [file for file in foreign if given is not None or Layout.beside(file) is not None]
 
 
 def _layout(place: Path, given: str | os.PathLike[str] | None) -> Layout | None:
@@ -269,28 +331,61 @@ def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | N
     path = place if place.is_file() else place / trial.name
     held: dict[str, Any] = {"events": events, "frames": frames, "source": trial.source, "notes": tuple(notes)}
     label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
-    held |= {"untimed": not trial.timed, "label": label}
+    held |= {"untimed": not trial.timed, "label": label, "lost": _beside_pictures(trial)}
     contents = Contents(path, trial.name, kind, table.array, side=trial.foot, **held)
     said = _layout(place, layout)
     return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
 
 
-def recordings_in(folder: Path) -> list[Path]:
-    """Return the files of a folder that are recordings, in the order of their names: 2 before 10."""
-    own = [file for file in folder.iterdir() if file.is_file() and file.name != LABELS and _is_own(file)]
+def _beside_pictures(trial: Trial) -> tuple[str, ...]:
+    """Return the line of `lost` for what a file holds of a trial beside its taxels, times and reference events."""
+    names = [*trial.series, *trial.unread]
+    return (f"columns that are no taxels: {', '.join(names)}",) if names else ()
+
+
+def recordings_in(folder: Path, layout: str | os.PathLike[str] | None = None) -> list[Path]:
+    """Return what of a folder is a recording, ROS bags last, in the order of their names: 2 before 10.
+
+    Tables and arrays of other programs are those that `layout`, or a layout file beside them, describes; they count in
+    a folder that holds nothing else.
+    """
+    there = [file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir())]
+    bags = sorted((file for file in there if os.access(file, os.R_OK) and is_bag(file)), key=_order)
+    own = [file for file in there if file not in bags and _is_own(file)]
     others = [file for kind in formats.FORMATS.values() for file in kind.files(folder)]
-    return sorted(own or others, key=_order)
+    found = own or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(there, layout))
+    return [*sorted(found, key=_order), *bags]
 
 
-def check_recording(file: Path) -> None:
-    """Refuse a file that is no recording by its name and its first bytes.
+def check_recording(file: Path, layout: str | os.PathLike[str] | None = None) -> None:
+    """Refuse a file that is no recording by its name, its first bytes, and its layout file.
 
     Raises
     ------
-    FormatError : no recording (names the kind of file if it is known)
+    FormatError : no recording (names the kind of file if it is known); an invalid layout file
     """
-    if not _formats(file) and kind_of(file) == "mcap":
+    if _kind(file, layout) == "mcap":
         _core.RecordingReader(file)
+
+
+def is_recording(file: Path, layout: str | os.PathLike[str] | None = None) -> bool:
+    """Return whether `check_recording` takes a file for one; what is damaged inside shows only when it is opened."""
+    if not (file.is_file() or file.is_dir()):
+        return False
+    try:
+        if file.suffix.lower() == ".csv" and is_label_table(file):
+            return False
+        _kind(file, layout)
+    except (FormatError, OSError):
+        return False
+    return True
+
+
+def _kind(file: Path, layout: str | os.PathLike[str] | None) -> str:
+    """Return the kind of a recording by its name, its first bytes, and its layout file."""
+    if names := _formats(file):
+        return names[0]
+    return "foreign" if is_foreign(file) and _layout(file, layout) is not None else kind_of(file)
 
 
 def joined(opened: Sequence[Recording]) -> list[Recording]:
@@ -351,8 +446,7 @@ def _is_own(file: Path) -> bool:
     if not file.is_file():
         return False
     if ending == ".csv":
-        with file.open("rb") as table:
-            return table.read(16).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"t_us")
+        return is_own_table(file)
     if ending == ".npz":
         return not _formats(file)
     return is_ours(file) if ending == ".h5" else ending in ENDINGS

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._core import ProblemError
+from taxel.array import Array
 from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
+from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import UNKNOWN
+from taxel.recording.contents import UNKNOWN, Contents
 from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
-from taxel.recording.rest import FORCE_UNITS, Picture, Rest, found, loaded_above, ticks_by_unit, tracked
+from taxel.recording.rest import Picture, Rest, found, loaded_above, of_pictures, ticks_by_unit, tracked
 from taxel.tare import Tare
 
-__all__ = ["Series", "above_rest", "readings", "series"]
+__all__ = ["Series", "above_rest", "above_rest_at", "readings", "series"]
 
 #: The most pictures of a long recording, as a plot resolves no more points.
 MOST_PICTURES = 2000
@@ -48,6 +51,7 @@ class Series:
     area_unit : {"mm2", "taxels"}
         "taxels", a number of taxels, if their area is not known.
     peak, total : float64, shape (n,), in `unit`
+        The largest value, and the sum of the loaded taxels, 0 without one; of all where `above` is 0.
     centre : float64, shape (n, 2), in `centre_unit`; None of channels
         As of `Frames.centre`.
     centre_unit : {"mm", "taxels", "places"}
@@ -74,12 +78,24 @@ class Series:
     def of(cls, frames: Frames, above: float, rest: Rest) -> Series:
         """Return the series of pictures above rest."""
         array = frames.array
+        each = max(1, _BLOCK // max(1, array.rows * array.columns))
+        # A block at a time, because the centre's weights have 64 bits.
+        blocks = [frames[k : k + each] for k in range(0, len(frames), each)] or [frames]
+
+        def over(of: Callable[[Frames], NDArray[np.float64]]) -> NDArray[np.float64]:
+            return np.concatenate([of(block) for block in blocks])
+
+        def loaded_sum(block: Frames) -> NDArray[np.float64]:
+            # Where no noise is cut off, values below 0 cancel that above.
+            values = np.where(block._loaded(above), block.values, 0.0) if above > 0 else block.values
+            return np.asarray(values.sum(axis=(1, 2), dtype=np.float64))
+
         in_mm2 = array.area_mm2 is not None
-        area = frames.area(above) if in_mm2 else frames.loaded(above).astype(np.float64)
-        centre = None if array.is_channels else frames.centre(above)
+        area = over(lambda block: block.area(above) if in_mm2 else block.loaded(above).astype(np.float64))
+        centre = None if array.is_channels else over(lambda block: block.centre(above))
         return cls(
-            frames.t, frames.unit, above, None if array.is_channels else area, frames.peak(), frames.total(), centre,
-            "mm2" if in_mm2 else "taxels", array.centre_unit or "", rest, force_n(frames),
+            frames.t, frames.unit, above, None if array.is_channels else area, over(Frames.peak), over(loaded_sum),
+            centre, "mm2" if in_mm2 else "taxels", array.centre_unit or "", rest, force_n(frames),
         )  # fmt: skip
 
 
@@ -115,11 +131,11 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
         loaded = over > np.float64(floor)
         part = slice(first, first + len(over))
         area[part] = np.where(loaded, each, 0.0).sum(axis=1)
-        peak[part], total[part] = over.max(axis=1), over.sum(axis=1, dtype=np.float64)
+        weights = np.where(loaded, over, 0.0).astype(np.float64)
+        peak[part], total[part] = over.max(axis=1), weights.sum(axis=1)
         if places is None:
             continue
-        weights = np.where(loaded, over, 0.0).astype(np.float64)
-        all_of_them = weights.sum(axis=1)[:, None]
+        all_of_them = total[part, None]
         moments = np.stack([weights @ axis for axis in places], axis=1)
         np.divide(moments, all_of_them, out=centre[part], where=all_of_them > 0)
     of = (area, centre) if places is not None else (None, None)
@@ -188,7 +204,8 @@ class _Drawn:
     def found(self) -> Rest:
         """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""
         rest = found(lambda: (picture for _, picture in self.blocks()), self.box[0] * self.box[1], self.box[1])
-        return replace(rest, values=rest.values[self.places])
+        # A board's comparators are turned by its register, not by a layout file.
+        return replace(rest, values=rest.values[self.places], falls=False)
 
     def above(self, rest: Rest) -> Iterator[tuple[int, NDArray[np.float32]]]:
         """Yield the number of the first picture of each block, and the values of the taxels above rest."""
@@ -210,9 +227,16 @@ class _Drawn:
             yield first, over[shown][:, self.places]
             first += int(np.count_nonzero(shown))
 
+    def pictures(self, rest: Rest, array: Array) -> NDArray[np.float32]:
+        """Return the pictures above rest, shape (n, rows, columns); 0 of taxels without events."""
+        shown = np.zeros((len(self.t), array.rows * array.columns), np.float32)
+        for first, over in self.above(rest):
+            shown[first : first + len(over), self.taxels] = over
+        return shown.reshape(-1, *array.shape)
+
 
 def _above(rest: Rest, pictures: Iterable[Picture], columns: int, scale: float = 1.0) -> Iterable[Picture]:
-    """Yield pictures above a rest: tracked where nobody gave it; 0 where a value or its rest is not known."""
+    """Yield pictures above a rest: tracked where none is given; 0 where a value or its rest is not known."""
     if rest.source in ("quiet", "none"):
         yield from tracked(rest, pictures, columns, scale)
         return
@@ -262,16 +286,36 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
         return Frames(of._values(frames.values, values), frames.t, unit=of.unit, array=frames.array), 0.0, rest
     if recording.has_events:
         drawn = _Drawn.of(recording)
-        shown = np.zeros((len(frames), frames.array.rows * frames.array.columns), np.float32)
-        for first, over in drawn.above(replace(rest, values=rest.values.reshape(-1)[drawn.taxels])):
-            shown[first : first + len(over), drawn.taxels] = over
+        shown = drawn.pictures(replace(rest, values=rest.values.reshape(-1)[drawn.taxels]), frames.array)
     elif rest.source in ("unit", "none"):
         return frames, 0.0, rest
     else:
-        pictures = [(frames.t, frames.values.reshape(len(frames), -1))]
+        pictures = [(frames.t, frames.values.reshape(len(frames), frames.array.rows * frames.array.columns))]
         [(_, shown)] = _above(rest, pictures, frames.array.columns, ticks_by_unit(frames))
     shape = len(frames), *frames.array.shape
     return Frames(shown.reshape(shape), frames.t, unit=frames.unit, array=frames.array), floor, rest
+
+
+def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return the held values of events above the rest that they show (`above_rest`), at times.
+
+    Parameters
+    ----------
+    events : Events
+        With intensities.
+    t : int64, shape (n,), us
+        Ascending.
+
+    Returns
+    -------
+    float32, shape (n, rows, columns), ticks
+    """
+    recording = Recording(Contents(Path(), "", "events", events.array, events=events))
+    drawn = _Drawn.of(recording)
+    # The rest is found from the first event on.
+    before = np.arange(int(events.t.min()), int(t[0]), _TRACKED_US) if len(t) else t
+    drawn = replace(drawn, t=np.concatenate([before, t]).astype(np.int64))
+    return drawn.pictures(_rest_of(recording, drawn, None), events.array)[len(before) :]
 
 
 def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
@@ -304,17 +348,12 @@ def _rest_of(recording: Recording, drawn: _Drawn, tare: Tare | None) -> Rest:
 
 
 def _rest_of_pictures(recording: Recording, frames: Frames, tare: Tare | None) -> Rest:
-    given, taxels = _given(recording, tare), frames.array.rows * frames.array.columns
-    if given is not None:
-        return given
-    if frames.unit in FORCE_UNITS:
-        return Rest("unit", np.zeros(taxels))
-    pictures = [(frames.t, frames.values.reshape(len(frames), -1))]
-    return found(lambda: pictures, taxels, frames.array.columns, ticks_by_unit(frames))
+    given = _given(recording, tare)
+    return of_pictures(frames) if given is None else given
 
 
 def _given(recording: Recording, tare: Tare | None) -> Rest | None:
-    """Return the rest that somebody measured; NaN where a taxel has none."""
+    """Return the measured rest; NaN where a taxel has none."""
     if tare is not None:
         if tare.array.shape != recording.array.shape:
             given, own = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))

@@ -1,32 +1,34 @@
-"""Reads tables of text and arrays of somebody else, as a layout file says."""
+"""Reads tables of text and arrays of other programs, as a layout file says."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import read_arrays, stored_names
+from taxel._base.archive import read_arrays, shapes, stored_names
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.h5_file import H5File
 from taxel._base.limits import COLUMNS, VALUE, unpacked
-from taxel._base.messages import first_line
+from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.checks import ascending_us
 from taxel.formats.checks import table as limited
-from taxel.formats.layout import UNITS_US, Data, Layout, Table
+from taxel.formats.layout import UNITS_US, Data, Layout, Table, advice, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Contents
 from taxel.recording.h5 import is_ours
+from taxel.recording.kinds import is_label_table, is_own_table, kind_of
 
-__all__ = ["is_foreign", "read_foreign"]
+__all__ = ["is_foreign", "read_foreign", "refuse_without_layout"]
 
 #: The endings of tables of text, also compressed by gzip, and of files of arrays.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
@@ -43,8 +45,7 @@ def is_foreign(path: Path) -> bool:
     if ending == ".h5":
         return not is_ours(path)
     if ending == ".csv":
-        with path.open("rb") as table:
-            return not table.read(16).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"t_us")
+        return not (is_own_table(path) or is_label_table(path))
     return True
 
 
@@ -69,16 +70,16 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
         column), an array that is not there
     """
     is_table = path.suffix.lower() not in _DATA
+    first, unread = 0, ""
     if is_table:
         values, seconds, first = _table(path, layout.table or Table())
     else:
-        values, seconds = _data(path, layout.data or Data())
-        first = 0
+        values, seconds, unread = _data(path, layout.data or Data())
     t = np.arange(len(values)) if seconds is None else ascending_us(path.name, seconds, first)
     try:
         taxels = math.prod(values.shape[1:])
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
-            what = f"{taxels} columns" if is_table else f"pictures of {' x '.join(map(str, values.shape[1:]))}"
+            what = counted(taxels, "column") if is_table else f"pictures of {' x '.join(map(str, values.shape[1:]))}"
             raise FormatError(f"{path}: {what}; {layout.place} says {layout.rows} x {layout.columns} taxels")
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
         array = layout.array(taxels, grid or Array(1, taxels, name=path.stem))
@@ -88,27 +89,66 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
         raise FormatError(f"{layout.place}: {first_line(error)}") from None
     limited(path, frames)
     kind = "table" if is_table else "arrays"
-    return Contents(path, path.name, kind, array, frames=frames)
+    lost = (f"other arrays of the file: {unread}",) if unread else ()
+    return Contents(path, path.name, kind, array, frames=frames, untimed=seconds is None, lost=lost)
+
+
+def refuse_without_layout(path: Path) -> None:
+    """Refuse a file of arrays that taxel did not write and no layout describes, and say what the layout would say.
+
+    Raises
+    ------
+    FormatError : it is such a file, or a damaged one
+    """
+    if path.suffix.lower() not in _DATA or not is_foreign(path):
+        return
+    if path.suffix.lower() == ".npz" and not stored_names(path):
+        return
+    if path.suffix.lower() not in (".npy", ".npz"):
+        kind_of(path)  # refuses what is not of the kind that its name says
+    there = _shapes(path)
+    fit = [name for name, shape in there.items() if len(shape) in (2, 3)]
+    if not fit:
+        raise FormatError(
+            f"{path}: holds {_listed(there)}; must be t, x, y, p (events), values, t (pictures), or, with a layout "
+            "file, an array of pictures x rows x columns or pictures x taxels (docs/files.md)"
+        )
+    which = f'[data] array = "{fit[0]}"' if fit[0] else ""
+    flat = "rows, columns" if len(there[fit[0]]) == 2 else ""
+    keys = ", ".join(key for key in ("rate_hz", flat, which) if key)
+    says = f"says which are the pictures: {keys}" if which else f"says what it is: {keys}"
+    raise FormatError(f"{path}: holds {_listed(there)}, not written by taxel; {advice(path, says)}")
+
+
+def _listed(there: Mapping[str, tuple[int, ...]]) -> str:
+    """Return the names and shapes of the first arrays, those that could hold pictures before the others."""
+    first = sorted(there.items(), key=lambda one: len(one[1]) not in (2, 3))[:8]
+    shown = [f"{name or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
+    return (", ".join(shown) or "no numbers") + " ..." * (len(there) > 8)
 
 
 def _table(path: Path, how: Table) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, int]:
     """Return the readings, the times in s, and the number of the first line of numbers."""
-    lines = text.lines(path)[how.skip_lines :]
     first = how.skip_lines + 1
-    rows = [_cells(line, how) for line in lines if line.strip()]
-    if not rows:
+    lines = [line for line in text.lines(path)[how.skip_lines :] if line.strip()]
+    if not lines:
         raise FormatError(f"{path.name}, line {first}: no line after {how.skip_lines} skipped ones")
-    if len(rows[0]) > COLUMNS:
-        raise FormatError(f"{path.name}, line {first}: {len(rows[0])} columns; at most {COLUMNS} are read")
-    named = not all(_is_number(cell, how) for cell in rows[0])
-    names = rows.pop(0) if named else [f"column {k}" for k in range(1, len(rows[0]) + 1)]
+    names = _cells(lines[0], how)
+    if len(names) > COLUMNS:
+        raise FormatError(f"{path.name}, line {first}: {len(names)} columns; at most {COLUMNS} are read")
+    other = next((mark for mark in ",;\t " if all(mark in line.strip() for line in lines[:2])), None)
+    if len(names) == 1 and other is not None:
+        raise FormatError(
+            f"{path.name}, line {first}: one column by the separator {shown(how.separator)}, and {shown(other)} within "
+            "it; say in the layout which it is: [table] separator"
+        )
+    named = not all(_is_number(cell, how) for cell in names)
+    names = names if named else [f"column {k}" for k in range(1, len(names) + 1)]
     first += named
     column = _time_column(path, how, names, named)
-    if how.missing is not None:
-        rows = [["nan" if cell == how.missing else cell for cell in row] for row in rows]
-        values = _with_missing(rows, path, first, names)
-    else:
-        values = text.numbers(rows, path, first, names)
+    missing = frozenset() if how.missing is None else frozenset({how.missing, "nan"})
+    rows = (_cells(line, how) for line in islice(lines, int(named), None))
+    values = text.numbers(rows, path, first, names, missing, unmarked=how.missing is None)
     if column is None:
         return values, None, first
     seconds = values[:, column] * UNITS_US[how.time_unit] / 1e6
@@ -137,7 +177,7 @@ def _time_column(path: Path, how: Table, names: Sequence[str], named: bool) -> i
         return None
     if isinstance(column, int):
         if column > len(names):
-            raise FormatError(f"{path.name}: {len(names)} columns; time_column is {column}")
+            raise FormatError(f"{path.name}: {counted(len(names), 'column')}; time_column is {column}")
         return column - 1
     if column not in names:
         there = ", ".join(names[:8]) + " ..." * (len(names) > 8) if named else "no names, so give its number from 1"
@@ -145,32 +185,35 @@ def _time_column(path: Path, how: Table, names: Sequence[str], named: bool) -> i
     return names.index(column)
 
 
-def _with_missing(rows: list[list[str]], path: Path, first: int, names: Sequence[str]) -> NDArray[np.float64]:
-    """Return a block of numbers in which a cell may be missing, NaN."""
-    there = [["0" if cell == "nan" else cell for cell in row] for row in rows]
-    values = text.numbers(there, path, first, names)
-    values[np.array([[cell == "nan" for cell in row] for row in rows]).reshape(values.shape)] = np.nan
-    return values
-
-
-def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | None]:
-    """Return the pictures, and the times in s."""
+def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | None, str]:
+    """Return the pictures, the times in s, and the names of the arrays that are not read."""
     if path.suffix.lower() == ".npy":
+        key = next((key for key in ("array", "time") if getattr(how, key) is not None), None)
+        if key is not None:
+            size = as_size(getattr(how, key))
+            right = f"a size is said by {size}" if size else "leave it out"
+            raise FormatError(f"{path}: one array without a name; the layout says [data] {key}: {right}")
         try:
             arrays = {"": np.load(path, allow_pickle=False)}
         except (ValueError, EOFError) as error:
             raise FormatError(f"{path}: {first_line(error)}; must be a NumPy array of numbers") from None
-        wanted: list[str] = [""]
+        there: list[str] = [""]
+        wanted = there
     else:
-        there = _names(path)
+        every = _shapes(path)
+        there = list(every)
         if how.array is None and len(there) != 1:
-            raise FormatError(f"{path}: holds {', '.join(there) or 'nothing'}; say which in the layout: [data] array")
-        wanted = [there[0] if how.array is None else how.array, *([] if how.time is None else [how.time])]
+            raise FormatError(f"{path}: holds {_listed(every)}; say which in the layout: [data] array")
+        # A path within a .h5 may begin at its root.
+        named = [name if name in every else name.strip("/") for name in (how.array, how.time) if name is not None]
+        wanted = [there[0], *named] if how.array is None else named
         missing = next((name for name in wanted if name not in there), None)
         if missing is not None:
-            raise FormatError(f"{path}: holds no array {missing}; there are {', '.join(there)}")
+            size = as_size(missing)
+            hint = f"; a size is said by {size}" if size else ""
+            raise FormatError(f"{path}: holds no array {missing}; there are {_listed(every)}{hint}")
         arrays = _arrays(path, wanted)
-    values = arrays[wanted[0]]
+    values, unread = arrays[wanted[0]], ", ".join(name for name in there if name not in wanted)
     if values.dtype.kind not in "uif" or values.ndim not in (2, 3) or 0 in values.shape:
         shape = " x ".join(map(str, values.shape))
         raise FormatError(
@@ -180,18 +223,19 @@ def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | No
     if values.dtype.kind == "f" and (np.abs(np.nan_to_num(values, posinf=np.inf)) > VALUE).any():
         raise FormatError(f"{path}, {wanted[0] or 'the array'}: a value does not fit 32 bits")
     if len(wanted) == 1:
-        return values, None
+        return values, None, unread
     times = arrays[wanted[1]].astype(np.float64)
     if times.shape != values.shape[:1]:
-        raise FormatError(f"{path}, {wanted[1]}: {times.size} times for {len(values)} pictures")
-    return values, times * UNITS_US[how.time_unit] / 1e6
+        raise FormatError(f"{path}, {wanted[1]}: {counted(times.size, 'time')} for {counted(len(values), 'picture')}")
+    return values, times * UNITS_US[how.time_unit] / 1e6, unread
 
 
-def _names(path: Path) -> list[str]:
-    if path.suffix.lower() == ".npz":
-        return list(stored_names(path))
+def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the arrays of numbers by name; the one of a .npy has the name ""."""
+    if path.suffix.lower() in (".npy", ".npz"):
+        return shapes(path)
     with H5File(path) as h5:
-        return [name for name, entry in h5.entries.items() if entry.is_numbers]
+        return {name: entry.shape for name, entry in h5.entries.items() if entry.is_numbers}
 
 
 def _arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:

@@ -32,9 +32,9 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Conte
     payload, parts, decoder, complete = _core.read_lsa(path, array._parts(), pairing, differences)
     damage = json.loads(_core.recording_damage(decoder))
     _, _, damaged = _core.recording_verdict(json.dumps({"decoder": damage})).partition("; ")
-    verdict = ["raw bytes do not say what was lost, nor how many turns of 6.5536 s a longer silence had"]
+    verdict = [f"not finished, as {path.with_suffix('.lss').name} is not there"] * (not complete)
+    verdict += ["the .lsa does not say what was lost"]
     verdict += [damaged] * bool(damaged)
-    verdict += [f"{path.with_suffix('.lss').name} is not there: the recording was not finished"] * (not complete)
     return Contents(
         path,
         path.name,
@@ -43,6 +43,7 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Conte
         events=Events._from_parts(parts, array),
         counts={"bytes": len(payload), "decoder": json.loads(decoder)},
         verdict="; ".join(verdict),
+        remarks=("times after a silence of more than 6.45 s are short by whole turns of 6.5536 s",),
         payload=payload,
         differences=differences,
         truncated=not complete,

@@ -68,6 +68,7 @@ class _Source:
             "truncated": bool(self.opened["unfinished"]) or "finished" not in self.ending,
             "rebuilt": once(self.rebuilt),
             "sources": sources,
+            "remarks": tuple(self.header.get("remarks", ())),
             "lost": tuple(self.header.get("lost", ())),
             "side": self.header.get("side", ""),
             "heel": self.header.get("heel", ""),
@@ -109,7 +110,7 @@ class _Source:
 
         def frames() -> Frames:
             t, values, _ = read()
-            shaped = frozen(values.reshape(len(t), *self.array.shape))
+            shaped = frozen(values).reshape(len(t), *self.array.shape)
             try:
                 return Frames(shaped, frozen(t), unit=about["unit"], array=self.array)
             except ProblemError as error:
@@ -189,9 +190,9 @@ class _Source:
         return {**rebuilt, "bad_chunks": int(self.remarks()["bad_chunks"])}
 
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
-        """Return the numbers of received and lost datagrams and events of a board, by cause."""
+        """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
         counts = self.ending.get("finished", {}).get("counts") or self.remarks()["counts"] or {}
-        _, decoder, _, _, number, *_ = decoded
+        _, decoder, _, _, number, _, decoder_2, *_ = decoded
         missing = int(number[-1]) - int(number[0]) + 1 - len(number) if len(number) else 0
         return {
             "datagrams": self.remarks()["datagrams"],
@@ -199,6 +200,7 @@ class _Source:
             "missing_numbers": max(0, missing),
             **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
             "decoder": json.loads(decoder),
+            **({"decoder_version_2": of_2} if (of_2 := json.loads(decoder_2))["datagrams"] else {}),
             **self.rebuilt(),
         }
 
@@ -222,9 +224,11 @@ class _Source:
             bad.append(f"{skipped} of the file skipped in {counted(rebuilt['gaps'], 'place')}")
         if rebuilt["torn_bytes"]:
             bad.append(f"{counted(rebuilt['torn_bytes'], 'torn byte')} at the end")
+        lost = [f"LOST in the file: {', '.join(bad)}"] if bad else []
         if "finished" in self.ending:
-            recorded = str(self.ending["finished"]["verdict"])
-            return f"LOST in the file: {', '.join(bad)}; while recording: {recorded}" if bad else recorded
+            # Versions before wrote from what a recording was converted into its verdict.
+            recorded = str(self.ending["finished"]["verdict"]).rpartition("a recording that says: ")[2]
+            return "; ".join([*lost, "while recording: " * bool(bad) + recorded])
         why = "not finished: what came last is missing"
         if "stopped" in self.ending:
             why = f"stopped by an error ({self.ending['stopped']}): what came last is missing"
@@ -233,7 +237,7 @@ class _Source:
         if so_far is not None:
             # If more was received than the file holds, the difference is in its unfinished end.
             known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))
-        return "; ".join([why, *bad, f"until then: {known}"])
+        return "; ".join([why, *lost, f"until then: {known}"])
 
 
 def _clock(decoded: tuple[Any, ...]) -> Clock:

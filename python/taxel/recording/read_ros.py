@@ -14,6 +14,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.ros import Chosen, Read, read
 from taxel.frames import Frames
+from taxel.labels import source_of
 from taxel.recording.contents import Contents, alone
 from taxel.recording.read_mcap import ascending
 
@@ -109,31 +110,38 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
                 "messages_of_another_length": one.left_out,
                 "times_by_the_bag": one.by_the_bag,
             },
-            verdict=_verdict(one),
+            remarks=_remarks(one),
+            lost=(f"other topics of the bag: {', '.join(one.unread)}",) if one.unread else (),
             sources=sources,
         )
     return alone(sources)
 
 
 def _names(path: Path, reads: Sequence[Read]) -> list[str]:
-    """Return the names of sources: their topics, with the field where a topic is opened twice."""
+    """Return the names of sources: their topics (/palm/left: palm_left), with the field where one is opened twice."""
     topics = [one.topic.strip("/") for one in reads]
-    names = [f"{t}.{one.field}" if topics.count(t) > 1 else t for t, one in zip(topics, reads, strict=True)]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise ProblemError(f"{path}: {twice} is chosen twice")
+    whole = [f"{t}.{one.field}" if topics.count(t) > 1 else t for t, one in zip(topics, reads, strict=True)]
+    names = [source_of(name) for name in whole]
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            also = whole[names.index(name)]
+            raise ProblemError(
+                f"{path}: {also} is chosen twice"
+                if also == whole[k]
+                else f"{path}: {also} and {whole[k]} would both be the source {name}; open one at a time"
+            )
     return names
 
 
-def _verdict(one: Read) -> str:
-    """Return in one line what was left out, and whose times stand in for a header's."""
-    parts = []
+def _remarks(one: Read) -> tuple[str, ...]:
+    """Return what was left out, and whose times stand in for a header's."""
+    lines = []
     if one.left_out:
-        parts.append(f"{counted(one.left_out, 'message')} of another length left out")
+        lines.append(f"{counted(one.left_out, 'message')} of another length left out")
     if one.by_the_bag:
-        parts.append(
+        lines.append(
             f"{one.by_the_bag} of {counted(len(one.t), 'message')} at the bag's time, as stamps are 0 or step back"
         )
     if not one.has_stamps:
-        parts.append("at the bag's times, as its messages have no header")
-    return "; ".join(parts) or "nothing left out"
+        lines.append("at the bag's times, as its messages have no header")
+    return tuple(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, text, window
 from taxel._base.drawing import draw
-from taxel._base.messages import counted
+from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -85,6 +86,7 @@ class Recording:
         self._contents = contents
         self.path, self.name, self.kind = contents.path, contents.name, contents.kind
         self.array, self.source = contents.array, contents.source
+        self._cut_from: tuple[weakref.ref[Recording], float, float] | None = None
 
     path: Path
     name: str
@@ -206,12 +208,12 @@ class Recording:
 
     @property
     def side(self) -> str:
-        """The foot or hand that the sensor is of, "left" or "right"; "" if nobody said it."""
+        """The foot or hand that the sensor is of, "left" or "right"; "" if not stated."""
         return self._contents.side
 
     @property
     def heel(self) -> str:
-        """Where on the sensor the heel lies, "top" or "bottom"; "" if nobody said it."""
+        """Where on the sensor the heel lies, "top" or "bottom"; "" if not stated."""
         return self._contents.heel
 
     @property
@@ -245,6 +247,8 @@ class Recording:
     @property
     def notes(self) -> tuple[Note, ...]:
         """The notes of the file in its order, followed by the labels of its folder and of `NAME.notes.csv`.
+
+        A note of the file that a label of `NAME.notes.csv` replaces (`replaces_us`) is left out.
 
         Raises
         ------
@@ -335,8 +339,29 @@ class Recording:
 
     @property
     def verdict(self) -> str:
-        """One line: nothing lost after arrival, or what was lost at which stage."""
+        """One line: nothing lost, what was lost at which stage, or that the file does not say it.
+
+        The page *What the output means* lists its wordings; all else there is to know is in `remarks`.
+        """
         return verdict_of(self._contents)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What else there is to know, one line each: whose times it has, what was left out, what it was converted from.
+
+        `.mcap`, `.npz` and `.h5` store it.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile, taxel
+        >>> folder = pathlib.Path(tempfile.mkdtemp())
+        >>> _ = taxel.convert(taxel.Frames([[[1.0, 2.0]]], [0]), folder / "one.npz")
+        >>> _ = taxel.convert(folder / "one.npz", folder / "one.mcap")
+        >>> one = taxel.open(folder / "one.mcap")
+        >>> one.verdict, one.remarks
+        ('the .npz does not say what was lost', ('converted from one.npz',))
+        """
+        return self._contents.remarks
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -390,7 +415,24 @@ class Recording:
         >>> taxel.open(place).between(100, 200)
         Recording(two.npz: 1 event, 192 to 192 us, 8 x 8 taxels)
         """
-        return Recording(between(self._contents, *window("us", start, stop)))
+        part = Recording(between(self._contents, *window("us", start, stop)))
+        # A weak reference, so that a part does not hold what it was taken from.
+        part._cut_from = weakref.ref(self), start, stop
+        return part
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_cut_from": None}
+
+    def _why_empty(self) -> str:
+        """Return where the events or pictures of a recording are of which a part without any was taken."""
+        if self._cut_from is None:
+            return f": {self.title} is empty"
+        of, start, stop = self._cut_from
+        asked, whole = f" from {plain(start)} to {plain(stop)} us", of()
+        if whole is None:
+            return f"{asked} of {self.title}"
+        t = whole._contents.table.t
+        return f"{asked}: {whole.title} " + (f"lies from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
         """Return the same recording of numbered pictures with times: so many pictures a second, the first at 0.

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.times import beginning_us
 from taxel.frames import Frames
 
-__all__ = ["FORCE_UNITS", "Picture", "Rest", "found", "loaded_above", "ticks_by_unit", "tracked"]
+__all__ = [
+    "FORCE_UNITS",
+    "Picture",
+    "Rest",
+    "flickering",
+    "found",
+    "loaded_above",
+    "of_pictures",
+    "of_quiet",
+    "ticks_by_unit",
+    "tracked",
+]
 
 #: Units of force and pressure: an unloaded taxel reads 0 in them.
 FORCE_UNITS = ("N", "mN", "kPa", "Pa", "N/cm2")
@@ -23,6 +35,17 @@ RANGE_TICKS = 150.0
 #: Reading: what a taxel reads in a quiet stretch is not its rest, but a load that stood still, if in more than this
 #: share of all pictures it reads less by so many ticks.
 LOADED_SHARE, LOADED_TICKS = 0.1, 8.0
+#: Values fall from a rest if they go so many times as far below it as above it, in the taxel that does so third most:
+#: bad taxels move alone or in pairs. In ...
+_FALLS, _THIRD = 3.0, 3
+#: ... a smaller array the first counts.
+_SMALL = 9
+#: Reading: a taxel of pictures flickers if it is more than half as far from its median as it ever is so many times or
+#: more, for less than two pictures at a time, while all but one of its neighbours move less than this share of it.
+#: At most one in so many taxels is taken for one.
+_FLICKERS, _ALONE, _FEW = 10, 1 / 8, 16
+#: So many pictures or fewer give a taxel's median.
+_MEDIAN_OF = 2000
 
 #: Pictures in order: their times, us, and their values by taxel, NaN where a taxel has none.
 Picture = tuple[NDArray[np.int64], NDArray[np.float32]]
@@ -40,14 +63,21 @@ class Rest:
         NaN for a taxel whose rest is not known. That of a quiet stretch is where the rest is tracked from.
     quiet_us : (int, int), us, optional
         The quiet stretch.
+    begin_us : int, us
+        The time that text counts the quiet stretch from (`taxel._base.times`).
     zeroed : int
         Number of taxels that were zeroed while recording: from then on their rest is what was given.
+    falls : bool
+        Whether values of pictures go further below the rest of a quiet stretch than above it, and come back: less may
+        mean more pressure.
     """
 
     source: str
     values: NDArray[np.float64]
     quiet_us: tuple[int, int] | None = None
+    begin_us: int = 0
     zeroed: int = 0
+    falls: bool = False
 
     def __str__(self) -> str:
         """Return the line of ``taxel info``."""
@@ -59,13 +89,15 @@ class Rest:
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:
-            first, end = (us / 1e6 for us in self.quiet_us)
+            first, end = ((us - self.begin_us) / 1e6 for us in self.quiet_us)
             text = f"a quiet stretch, {first:.3f} to {end:.3f} s, tracked from there"
+        if self.falls:
+            text += "; values fall from it: if less means more pressure, say falls = true in a layout file"
         return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
 
     def described(self) -> dict[str, object]:
-        """Return source, quiet stretch and number of zeroed taxels as JSON values."""
-        return {"source": self.source, "quiet_us": self.quiet_us, "zeroed": self.zeroed}
+        """Return source, quiet stretch, number of zeroed taxels and whether values fall, as JSON values."""
+        return {"source": self.source, "quiet_us": self.quiet_us, "zeroed": self.zeroed, "falls": self.falls}
 
 
 def loaded_above(scale: float) -> float:
@@ -74,15 +106,61 @@ def loaded_above(scale: float) -> float:
 
 
 def ticks_by_unit(frames: Frames) -> float:
-    """Return the ticks by the unit of pictures: the range of their values counts as that of a board's ramp."""
+    """Return the ticks by the unit of pictures: the range of their values counts as that of a board's ramp.
+
+    The values of taxels that flicker (`flickering`) are left out.
+    """
     if frames.unit == "ticks":
         return 1.0
-    values = frames.values[np.isfinite(frames.values)] if len(frames) else frames.values
-    span = float(np.ptp(values)) if values.size else 0.0
-    return RANGE_TICKS / span if span else 1.0
+    least, most = _extremes(frames.values)
+    flickers = flickering(frames)
+    least[flickers] = most[flickers] = np.nan
+    span = float(np.fmax.reduce(most, axis=None, initial=np.nan)) - float(
+        np.fmin.reduce(least, axis=None, initial=np.nan)
+    )
+    return RANGE_TICKS / span if span > 0 else 1.0
 
 
-def found(pictures: Callable[[], Iterable[Picture]], taxels: int, columns: int, scale: float = 1.0) -> Rest:
+def flickering(frames: Frames) -> NDArray[np.bool_]:
+    """Return which taxels of pictures jump again and again for one picture, alone, shape (rows, columns)."""
+    values, found = frames.values, np.zeros(frames.array.shape, bool)
+    if min(found.shape) == 1 or found.size < _SMALL:
+        return found
+    least, most = _extremes(values)
+    spans = np.nan_to_num(most.astype(np.float64) - least)
+    for _ in range(found.size // _FEW):
+        y, x = np.unravel_index(np.argmax(spans), found.shape)
+        own = values[:, y, x]
+        if not spans[y, x] or not np.isfinite(own).all():
+            return found
+        apart = np.abs(own - np.median(own))
+        far = apart > apart.max() / 2
+        times = np.count_nonzero(far[1:] & ~far[:-1])
+        if times < _FLICKERS or np.count_nonzero(far) >= 2 * times:
+            return found
+        rows, columns = (slice(max(0, at - 1), at + 2) for at in (y, x))
+        around = values[:, rows, columns].reshape(len(values), -1)
+        around = around[:, np.isfinite(around).all(axis=0)]
+        moves = np.sort(np.median(np.abs(around[far] - np.median(around, axis=0)), axis=0))
+        # The last is the taxel's own.
+        if len(moves) < _THIRD or moves[-_THIRD] >= _ALONE * moves[-1]:
+            return found
+        found[y, x], spans[y, x] = True, 0
+    return found
+
+
+def _extremes(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return each taxel's least and greatest finite value, NaN for one without any."""
+    least, most = (of.reduce(values, axis=0, initial=np.nan) for of in (np.fmin, np.fmax))
+    if np.isinf(least).any() or np.isinf(most).any():
+        values = np.where(np.isfinite(values), values, np.nan)
+        least, most = (of.reduce(values, axis=0, initial=np.nan) for of in (np.fmin, np.fmax))
+    return least, most
+
+
+def found(
+    pictures: Callable[[], Iterable[Picture]], taxels: int, columns: int, scale: float = 1.0, *, falls: bool = False
+) -> Rest:
     """Return the rest that a quiet stretch of pictures shows (`_core.TrackedRest`), or none.
 
     Parameters
@@ -92,24 +170,69 @@ def found(pictures: Callable[[], Iterable[Picture]], taxels: int, columns: int, 
     taxels, columns : int
     scale : float
         Ticks by the sensor's unit.
+    falls : bool
+        Whether values fall from the rest with pressure.
     """
-    rest = _core.TrackedRest(columns, NOISE_FLOOR, np.full(taxels, np.nan))
+    rest = _core.TrackedRest(columns, NOISE_FLOOR, np.full(taxels, np.nan), falls)
+    begin_us = None
     for t, values in pictures():
+        begin_us = beginning_us(t) if begin_us is None else begin_us
         rest.above(t, np.ascontiguousarray(values * np.float32(scale)).reshape(-1))
     unknown = np.full(taxels, np.nan)
     if rest.quiet is None:
         return Rest("none", unknown)
-    begins, below, known = rest.begins / scale, np.zeros(taxels, np.int64), np.zeros(taxels, np.int64)
+    begins, released, known = rest.begins / scale, np.zeros(taxels, np.int64), np.zeros(taxels, np.int64)
     for _, values in pictures():
-        below += np.count_nonzero(values < begins - LOADED_TICKS / scale, axis=0)
+        load = begins - values if falls else values - begins
+        released += np.count_nonzero(load < -LOADED_TICKS / scale, axis=0)
         known += np.count_nonzero(~np.isnan(values), axis=0)
-    begins[below > LOADED_SHARE * known] = np.nan
-    return Rest("none", unknown) if np.isnan(begins).all() else Rest("quiet", begins, rest.quiet)
+    begins[released > LOADED_SHARE * known] = np.nan
+    if np.isnan(begins).all():
+        return Rest("none", unknown)
+    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls)
+
+
+def of_pictures(frames: Frames) -> Rest:
+    """Return the rest of pictures without a tare: 0 of force or pressure, else what a quiet stretch shows, or none."""
+    if frames.unit in FORCE_UNITS:
+        return Rest("unit", np.zeros(frames.array.rows * frames.array.columns))
+    return of_quiet(frames)
+
+
+def of_quiet(frames: Frames) -> Rest:
+    """Return the rest of pictures that a quiet stretch of them shows, or none."""
+    taxels = frames.array.rows * frames.array.columns
+    pictures, scale = [(frames.t, frames.values.reshape(len(frames), taxels))], ticks_by_unit(frames)
+    rest = found(lambda: pictures, taxels, frames.array.columns, scale)
+    if rest.quiet_us is None or not _fall(frames, rest.quiet_us, scale):
+        return rest
+    fallen = found(lambda: pictures, taxels, frames.array.columns, scale, falls=True)
+    # Without a rest of their own the values are tracked from their first ones on.
+    return replace(rest, values=fallen.values, falls=True)
+
+
+def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:
+    """Return whether values go further below their rest than above it, and come back.
+
+    The rest is here that of the quiet stretch itself: a tracked one follows values that fall and stay for a while. A
+    taxel that is loaded half of the time or more has its lower one; one that never comes back was loaded before.
+    """
+    values = frames.held().values.reshape(len(frames), -1)
+    first, end = np.searchsorted(frames.t, quiet_us)
+    rest = np.median(values[:: 1 + len(values) // _MEDIAN_OF], axis=0)
+    rest = np.minimum(rest, values[first:end].mean(axis=0, dtype=np.float64))
+    lowest = values.min(axis=0)
+    down, up = rest - lowest, values.max(axis=0) - rest
+    back = np.array([values[k:, taxel].max() for taxel, k in enumerate(values.argmin(axis=0))])
+    down[back < rest - down / _FALLS] = 0
+    which = _THIRD if down.size >= _SMALL else 1
+    deepest, most = (np.partition(of, -which)[-which] for of in (down, up))
+    return bool(deepest > max(_FALLS * most, 2 * LOADED_TICKS / scale))
 
 
 def tracked(rest: Rest, pictures: Iterable[Picture], columns: int, scale: float = 1.0) -> Iterable[Picture]:
     """Yield pictures above a rest that is tracked, from a quiet stretch or from the first values; 0 below it."""
-    at = _core.TrackedRest(columns, NOISE_FLOOR, rest.values * scale)
+    at = _core.TrackedRest(columns, NOISE_FLOOR, rest.values * scale, rest.falls)
     for t, values in pictures:
         above = at.above(t, np.ascontiguousarray(values * np.float32(scale)).reshape(-1))
         yield t, above.reshape(values.shape) / np.float32(scale)

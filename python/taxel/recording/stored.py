@@ -112,13 +112,16 @@ def _lsa(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
 
 def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
     """Return the contents of a .mcap: all; events without datagrams of exactly these events get new datagrams."""
-    place, verdict = common["path"], verdict_of(of)
+    place, is_file = common["path"], of.kind != "events"
+    # Of what recordings were merged stands in `source`.
+    origin = [f"converted from {of.name}"] if is_file and of.kind != "merged" else []
     changed: dict[str, Any] = {
         "source": of.source or of.name or ("events" if of.has_events else "pictures"),
         "rebuilt": {},
         "truncated": False,
         "counts": once(lambda: of.counts),
-        "verdict": f"converted from a recording that says: {verdict}" if of.kind != "events" else None,
+        "verdict": verdict_of(of) if is_file else None,
+        "remarks": once(lambda: tuple(dict.fromkeys((*of.remarks, *origin)))),
     }
     if of.samples is not None:
         stay = (*_OF_DATAGRAMS, "events", "frames", "clock", "datagrams", "payload", "label")

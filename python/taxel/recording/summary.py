@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel.clock import doubt
+from taxel.events import Events
+from taxel.frames import Frames
 from taxel.recording.health import health
 from taxel.recording.pressure import Series
 from taxel.recording.recording import Recording
@@ -17,6 +19,12 @@ __all__ = ["summary"]
 
 #: The interval over which the highest rate is measured, us.
 _PEAK_US = 10_000
+#: Reading: pictures are apart by a gap if by so many median intervals.
+_GAP = 2.5
+#: Reading: a taxel was at full scale if it read the greatest value in so many pictures, of at least so many levels.
+_AT_TOP, _LEVELS = 3, 50
+#: At most so many places of taxels are listed that were not touched enough: a large sensor may have millions.
+_PLACES = 100
 
 
 def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
@@ -29,7 +37,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         Its pressure over time (`taxel.recording.pressure.series`), if it has intensities.
     """
     array = recording.array
-    table = recording.events if recording.has_events else recording.frames()
+    table: Events | Frames = recording.events if recording.has_events else recording.frames()
     span = (int(table.t.min()), int(table.t.max())) if len(table) and recording.timed else None
     seconds = (span[1] - span[0]) / 1e6 if span else 0.0
     facts: dict[str, Any] = {
@@ -45,16 +53,19 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "to_us": span[1] if span else None,
         "seconds": seconds,
     }
-    if recording.has_events:
-        events = recording.events
+    if isinstance(table, Events):
+        events = table
         facts["events"] = len(events)
         facts["intensities"] = 0 if events.present is None else int(events.present.sum())
         facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
         facts["events_per_s_board"] = len(events) / seconds if seconds else None
         facts["peak_events_per_s_board"] = _peak(events.t)
     else:
-        facts["pictures"], facts["unit"] = len(table), recording.frames().unit
+        facts["pictures"], facts["unit"] = len(table), table.unit
         facts["pictures_per_s"] = (len(table) - 1) / seconds if seconds else None
+        facts["missing"] = {"values": table.missing, "of": table.values.size}
+        facts["full_scale"] = _full_scale(table)
+        facts["gaps"] = _gaps(table.t) if recording.timed else None
     clock = recording.clock
     if clock is not None and len(clock.board_us) > 1:
         host = (int(clock.arrived_ns.max()) - int(clock.arrived_ns.min())) / 1e9
@@ -65,12 +76,13 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
             "datagrams_per_s_host": len(clock.arrived_ns) / host if host else None,
             "drift_ppm": clock.drift_ppm,
             "delay_us": {"median": float(late[0]), "p99": float(late[1])},
-            "clock_doubt": doubt(clock.drift_ppm, float(late[1])),
+            "clock_doubt": doubt(clock.drift_ppm, float(late[1]), float(late[0])),
         }
     calibration = recording.calibration
     facts["calibration"] = None if calibration is None else calibration.described()
     facts["rest"] = None if pressed is None else {**pressed.rest.described(), "text": str(pressed.rest)}
-    facts["pressure"] = None if pressed is None else _pressure(pressed)
+    # Above the rest of readings that fall is nothing but noise.
+    facts["pressure"] = None if pressed is None or pressed.rest.falls else _pressure(pressed)
     of_taxels = health(table)
     return facts | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
@@ -78,11 +90,15 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "registers": None if recording.registers is None else json.loads(recording.registers._json()),
         "taxels": of_taxels.named(),
         "taxels_untold": int(np.count_nonzero(of_taxels.untold)),
+        "taxels_untold_at": [
+            (int(k % array.columns), int(k // array.columns)) for k in np.flatnonzero(of_taxels.untold)[:_PLACES]
+        ],
         "counts": recording.counts,
         "truncated": recording.truncated,
         "rebuilt": recording.rebuilt,
         "lost": list(recording.lost),
         "verdict": recording.verdict,
+        "remarks": list(recording.remarks),
     }
 
 
@@ -104,6 +120,35 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     if limits is not None:
         limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
     return facts | {f"centre_{pressed.centre_unit}": limits}
+
+
+def _full_scale(frames: Frames) -> dict[str, Any] | None:
+    """Return how many readings are at full scale, and of which value; None where the readings show none.
+
+    It is the greatest value if two taxels or more read exactly that one in several pictures, and other values too.
+    Readings of few levels reach their greatest one by chance.
+    """
+    values = frames.values
+    if not values.size:
+        return None
+    least, top = (float(of.reduce(values, axis=None)) for of in (np.fmin, np.fmax))
+    if not np.isfinite(top - least) or (top - least < _LEVELS and not np.any(values % 1)):
+        return None
+    at_top = np.count_nonzero(values == top, axis=0)
+    # A taxel that is always there is stuck.
+    at_top[(at_top < _AT_TOP) | (at_top == np.count_nonzero(~np.isnan(values), axis=0))] = 0
+    taxels = int(np.count_nonzero(at_top))
+    return {"value": top, "readings": int(at_top.sum()), "taxels": taxels} if taxels > 1 else None
+
+
+def _gaps(t: NDArray[np.int64]) -> dict[str, int] | None:
+    """Return the number of gaps between pictures, and the length (us) and begin of the longest; None without any."""
+    apart = np.diff(t)
+    gaps = np.flatnonzero(apart > _GAP * np.median(apart)) if len(apart) else apart
+    if not len(gaps):
+        return None
+    longest = int(apart.argmax())
+    return {"count": len(gaps), "longest_us": int(apart[longest]), "t_us": int(t[longest])}
 
 
 def _peak(t: NDArray[np.int64]) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,20 @@ from taxel import _core
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Contents, once
 from taxel.recording.notes import Datagrams
+from taxel.recording.pressure import above_rest
+from taxel.recording.recording import Recording
+from taxel.recording.rest import Rest, ticks_by_unit
 
 __all__ = ["cut_raw", "encoded", "write_mcap"]
 
 #: Number of values of a block of pictures: a chunk of the file.
 _BLOCK = 1 << 18
+#: Interval between the pictures for viewers, us.
+_EVERY_US = 100_000
+#: What a picture for viewers states as the rest that was subtracted, by the source of the rest.
+_RESTS = {"unit": "0", "quiet": "quiet stretch"}
 
 
 def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping[str, dict[str, Any]]) -> None:
@@ -44,7 +51,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
         return
     samples = contents.samples
     if samples is not None:
-        header = {**samples.about, "sources": [], "lost": contents.lost}
+        header = {**samples.about, "sources": [], "lost": contents.lost, "remarks": contents.remarks}
         writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
         writer.finish(json.dumps(counts[contents.label]))
@@ -86,6 +93,7 @@ def _header(contents: Contents) -> dict[str, Any]:
         "registers": None if registers is None else json.loads(registers._json()),
         **({} if driven == contents.array else {"driven": driven._geometry()}),
         "lost": contents.lost,
+        "remarks": contents.remarks,
         "source": contents.source,
         "side": contents.side,
         "heel": contents.heel,
@@ -115,6 +123,8 @@ def _write_pictures(
     def at_ns(t: int) -> int:
         return max(0, (t - origin_us) * 1000)
 
+    shown = {name: _low_rate(sources[name], frames) for name, frames in tables.items() if frames is not None}
+    drawn = dict.fromkeys(shown, 0)
     for name, one in sources.items():
         if one.held is not None:
             tracks[name].held(0, None, np.ascontiguousarray(one.held).reshape(-1))
@@ -124,11 +134,32 @@ def _write_pictures(
         t = np.ascontiguousarray(block.t)
         values = np.ascontiguousarray(block.values).reshape(-1)
         tracks[name].pictures(first, (t - origin_us) * 1000, t, values, whole)
+        few, about = shown[name]
+        stop = int(np.searchsorted(few.t, t[-1], side="right"))
+        for k in range(drawn[name], stop):
+            above = np.ascontiguousarray(few.values[k]).reshape(-1)
+            tracks[name].picture_above(at_ns(int(few.t[k])), int(few.t[k]), above, *about)
+        drawn[name] = stop
     for name, one in sources.items():
         _add_small(tracks[name], one, at_ns)
     for name in [*sources][1:]:
         tracks[name].end(json.dumps(counts[name]))
     writer.finish(json.dumps(counts[next(iter(sources))]))
+
+
+def _low_rate(contents: Contents, frames: Frames) -> tuple[Frames, tuple[float, str, str]]:
+    """Return pictures above rest, ten a second, and what white is at least, the rest that was subtracted, the unit.
+
+    There are none where pictures have no times.
+    """
+    _, first = np.unique(frames.t // _EVERY_US, return_index=True)
+    first = first[: 0 if contents.untimed else None]
+    few = Frames(frames.values[first], frames.t[first], unit=frames.unit, array=frames.array)
+    if not len(few):
+        return few, (1.0, "none", few.unit)
+    recording = Recording(contents.but(frames=once(lambda: few), sources={}))
+    above, _, rest = cast("tuple[Frames, float, Rest]", above_rest(recording))
+    return above, (1.0 / ticks_by_unit(few), _RESTS.get(rest.source, rest.source), above.unit)
 
 
 def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bool]]:

@@ -17,6 +17,7 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from taxel._base.files import write_whole
+from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import Alignment, Judged, Outcome, PlainRule, Readout, Score
@@ -28,6 +29,7 @@ from taxel.report.page import render
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["write_listening"]
@@ -96,7 +98,6 @@ def write_listening(
     if not listened:
         raise ProblemError("listened is empty: there is nothing to report")
     place = Path(folder)
-    place.mkdir(parents=True, exist_ok=True)
     moments = {label: _moments(listened, label) for label in readout.labels}
     aligned = {} if alignments is None else alignments
     with mpl.rc_context(STYLE):
@@ -122,12 +123,19 @@ def write_listening(
             for one, own in zip(listened, held_out, strict=bool(held_out))
             for label in readout.labels
         ],
-        worst=[(listened[m.recording].name, m) for label in readout.labels for m in moments[label] if m.badness > 0],
+        worst=[
+            (listened[m.recording].name, m, (m.t - listened[m.recording].begin_us) / 1e6)
+            for label in readout.labels
+            for m in moments[label]
+            if m.badness > 0
+        ],
+        begun=[(one.name, begun(one.begin_us)) for one in listened if one.begin_us],
         viewed=[quote(one.name) for one in listened if one.name.endswith(_VIEWED)][:_MOST_VIEWED],
         beside=_beside(readout.labels, scored),
         outside=[one for one in listened if isinstance(readout, Readout)],
         scored=any(one.score is not None for one in listened),
     )
+    place.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended
     return write_whole(place / "report.html", lambda file: file.write(text.encode()))
 
 
@@ -140,7 +148,7 @@ def _beside(labels: Sequence[str], scored: Judged | None) -> list[tuple[str, str
         rule, together = scored.plain.rules[label], scored.plain.together
         rows.append((label, "neuron", scored.together[label]))
         score = None if rule is None or together is None else together[label]
-        rows.append((label, "none" if rule is None else repr(rule), score))
+        rows.append((label, "none" if rule is None else rule._compared(), score))
     return rows
 
 
@@ -227,7 +235,7 @@ def _potential(
         felt = np.empty(0) if aligned is None else to_ms(aligned.felt(moment.recording))
         for k, t in enumerate(felt[np.abs(felt - at) < reach]):
             axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle=":", label="felt" * (k == 0))
-        axis.set_title(f"{moment.what}, {at / 1000.0:.3f} s", fontsize=9)
+        axis.set_title(f"{moment.what}, {(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s", fontsize=9)
         axis.set_xlabel("ms from then")
         axis.legend()
     axes[0][0].set_ylabel("potential, mV")
@@ -268,7 +276,7 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
         figure, axis = plt.subplots(figsize=(6.5, 2.2), layout="constrained")
         axis.bar(np.arange(len(weights)), weights, color=_POTENTIAL)
         axis.axhline(0, color="#999999", linewidth=0.8)
-        axis.set_xlabel("input, in the encoder's order")
+        _name_inputs(axis, readout.encoder_of(label), array, len(readout.delays_ms))
         axis.set_ylabel("weight, mV")
         return figure
     planes = sorted(planes, key=lambda one: -float(np.abs(one[1]).max()))[:_MAPS]
@@ -287,6 +295,18 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
         axis.set_ylabel("row")
     figure.colorbar(ScalarMappable(scale, "RdBu_r"), ax=axes, label="weight, mV")
     return figure
+
+
+def _name_inputs(axis: Axes, encoder: Encoder, array: Array, delays: int) -> None:
+    """Name the inputs of bars by the encoder, or by the parts of a composite one, which are told apart by lines."""
+    names = sorted(encoder.parts) if isinstance(encoder, Composite) else [encoder.name.replace("_", " ")]
+    counts = [part.trains(array) * (2 if part.signed else 1) for part in encoder._each()] * delays
+    ends = np.cumsum(counts) - 0.5
+    ticks = [name + f", {_nth('delay', delays, d)}" * (delays > 1) for d in range(delays) for name in names]
+    axis.set_xticks(ends - np.array(counts) / 2.0, ticks)
+    for end in ends[:-1]:
+        axis.axvline(end, color="#999999", linewidth=0.8, linestyle=":")
+    axis.set_xlabel("input: the encoder's trains in their order")
 
 
 def _planes(

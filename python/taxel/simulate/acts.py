@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import flag, number, numbers, parameters, shown, whole
+from taxel._base.messages import plain
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -352,7 +353,7 @@ class Pictures:
 
     def __repr__(self) -> str:
         n, rows, columns = self.values.shape
-        return f"Pictures({n} of {rows} x {columns}, each {self.period_us:g} us)"
+        return f"Pictures({n} of {rows} x {columns}, each {plain(self.period_us)} us)"
 
 
 Act = Silence | Scene | Pictures

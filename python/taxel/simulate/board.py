@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, numbers, text, whole
+from taxel._base.messages import plain
 from taxel._base.options import option
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
@@ -109,7 +110,7 @@ class Board:
     Parameters
     ----------
     registers : Registers, optional
-        What it holds after reset; where it is left out, of a board of 64 x 64 taxels the preset "5.2 kHz".
+        What it holds at first; where it is left out, of a board of 64 x 64 taxels the preset "5.2 kHz".
     array : Array, optional
         Up to 65 536 positions; the thesis' where it is left out.
     previous : {"last_sent", "last_sample"}
@@ -206,7 +207,12 @@ class Board:
         return self._core.frame(given, at_most, flags)
 
     def reset(self) -> None:
-        """Reset it: registers, values and time as at the start, in a new session; what waits is still sent."""
+        """Reset it, in a new session.
+
+        Registers are those of a board at reset, with the version of the wire that this one had at first; values, time
+        and the counts of its status lines are 0. Datagrams that wait are still sent; the one that is being filled is
+        discarded, with the events held in it.
+        """
         self._core.reset()
 
     def command(self, data: Any) -> str:
@@ -266,4 +272,4 @@ class Board:
         return dict(json.loads(self._core.counts()))
 
     def __repr__(self) -> str:
-        return f"Board({self.greeting.strip()}, {self.time_us:g} us after reset)"
+        return f"Board({self.greeting.strip()}, {plain(self.time_us)} us after reset)"

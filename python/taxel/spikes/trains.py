@@ -159,7 +159,7 @@ class SpikeTrains(Columns):
         if not isinstance(other, SpikeTrains):
             return NotImplemented
         if len(self) != len(other):
-            raise ProblemError(f"{len(self)} trains and {len(other)}: only equally many are merged")
+            raise ProblemError(f"{counted(len(self), 'train')} and {len(other)}: only equally many are merged")
         if self.signed != other.signed:
             one, two = sorted((self.kind, other.kind))
             raise ProblemError(f"{one} and {two} trains: only alike ones are merged; see split_by_sign")

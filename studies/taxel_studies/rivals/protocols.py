@@ -58,7 +58,7 @@ def share_right(params: dict[str, Any], count: int, seed: int) -> float:
         cone = learner(name, protocol, inputs, count, seed).fit(patterns, targets)
         if cone.status_ == "stopped":
             raise ProblemError(f"ConeX came to no verdict on {count} patterns, seed {seed}, of {params}")
-        return 1.0 if cone.status_ == "solved" else 0.0
+        return 1.0 if cone.status_ in ("solved", "feasible") else 0.0
     fitted = learner(name, protocol, inputs, count, seed, **training).fit(patterns, targets)
     return float(fitted.right_[-1])
 

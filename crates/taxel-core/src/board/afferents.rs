@@ -6,34 +6,48 @@ use crate::wire::registers::{POWER_LAW, POWER_LAW_FRACTION};
 /// Fractional bits of `threshold_rest` and of the intensity word.
 const WORD_FRACTION: u32 = 10;
 
-/// Integrals and thresholds of all taxels.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Afferents {
-    /// By taxel: the compressed pressure (5.1) when the integral (5.3) was last reset; empty before the first frame.
-    base: Vec<u32>,
-    /// By taxel: the threshold (5.5).
-    threshold: Vec<u32>,
-    /// By taxel: the integral at its last spike.
-    fired: Vec<i64>,
+/// What a taxel's afferent remembers.
+#[derive(Debug, Clone, Copy)]
+struct Afferent {
+    /// The compressed pressure (5.1) when the integral (5.3) was last reset.
+    base: u32,
+    /// The threshold (5.5).
+    threshold: u32,
+    /// The integral at its last spike.
+    fired: i64,
 }
 
+/// The afferents by taxel; none before a taxel's first reading.
+#[derive(Debug, Clone)]
+pub(super) struct Afferents(Vec<Option<Afferent>>);
+
 impl Afferents {
-    /// Returns to the state before the first frame; the next frame's pressures become the reference.
+    /// Afferents without a reading.
+    pub(super) fn new(taxels: usize) -> Self {
+        Self(vec![None; taxels])
+    }
+
+    /// Returns to the state before the first frame: the first reading of each taxel becomes its reference.
     pub(super) fn forget(&mut self) {
-        self.base.clear();
+        self.0.fill(None);
     }
 
     /// Processes a taxel's next trip time (already limited to the ramp); returns whether the taxel fires.
+    ///
+    /// Its first one counts as what had always been.
     pub(super) fn sample(&mut self, taxel: usize, ticks: u16, registers: &Registers) -> bool {
         let rest = rest(registers);
         let share = |part: u16, whole: u32| (u64::from(part) * u64::from(rest) / u64::from(whole)) as u32;
         let pressure = pressure(ticks);
-        let (base, threshold) = (&mut self.base[taxel], &mut self.threshold[taxel]);
+        let Some(Afferent { base, threshold, fired }) = &mut self.0[taxel] else {
+            self.0[taxel] = Some(Afferent { base: pressure, threshold: rest, fired: 0 });
+            return false;
+        };
         let integral = i64::from(pressure) - i64::from(*base);
         if integral.unsigned_abs() > u64::from(*threshold) {
             *base = pressure;
             *threshold = threshold.saturating_add(share(registers.threshold_jump, 256));
-            self.fired[taxel] = integral;
+            *fired = integral;
             return true;
         }
         *threshold = if *threshold > rest {
@@ -44,18 +58,9 @@ impl Afferents {
         false
     }
 
-    /// Initialises the state with the pressures of the first frame; does nothing later.
-    pub(super) fn begin(&mut self, ticks: &[u16], registers: &Registers) {
-        if self.base.is_empty() {
-            self.base = ticks.iter().map(|&t| pressure(t.min(registers.ramp))).collect();
-            self.threshold = vec![rest(registers); ticks.len()];
-            self.fired = vec![0; ticks.len()];
-        }
-    }
-
     /// The spike of a taxel that fired: its polarity, and its intensity word, the magnitude of the integral.
     pub(super) fn spike(&self, taxel: usize) -> (bool, u16) {
-        let integral = self.fired[taxel];
+        let integral = self.0[taxel].map_or(0, |afferent| afferent.fired);
         let size = integral.unsigned_abs() >> (POWER_LAW_FRACTION - WORD_FRACTION);
         (integral > 0, size.min(u16::MAX.into()) as u16)
     }

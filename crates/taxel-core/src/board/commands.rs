@@ -73,11 +73,11 @@ impl Board {
         totals(&self.counts, &self.at_reset, self.markers_dropped)
     }
 
-    /// One status line for each kind of fault whose count has changed since the last call.
+    /// One status line for each kind of fault whose count since reset has changed since the last call.
     pub fn faults(&mut self) -> String {
         let now = [
-            ("queue", self.counts.dropped),
-            ("comparator", self.counts.not_returned),
+            ("queue", self.counts.dropped - self.at_reset.dropped),
+            ("comparator", self.counts.not_returned - self.at_reset.not_returned),
             ("command", self.reader.skipped()),
         ];
         let mut lines = String::new();

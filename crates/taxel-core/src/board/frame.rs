@@ -95,7 +95,6 @@ impl Board {
         if !registers.mechanoreceptor {
             return self.comparators.compare(ticks, &registers, faults);
         }
-        self.afferents.begin(ticks, &registers);
         let afferents = &mut self.afferents;
         self.comparators.fire(ticks, &registers, faults, |taxel, t| afferents.sample(taxel, t, &registers))
     }

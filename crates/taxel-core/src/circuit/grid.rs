@@ -79,7 +79,7 @@ impl Grid {
         }
         if let Some(k) = conductance_us.iter().position(|g| !(0.0..=1e9).contains(g)) {
             let (x, y, g) = (k % m, k / m, conductance_us[k]);
-            return Err(problem!("conductance at x {x}, y {y} is {g} uS: must be from 0 to 1e9"));
+            return Err(problem!("conductance at row {y}, column {x} is {g} uS: must be from 0 to 1e9"));
         }
         let siemens: Vec<f64> = conductance_us.iter().map(|g| 1e-6 * g).collect();
         let mut currents = if self.wire_ohm > 0.0 {
@@ -359,7 +359,7 @@ mod tests {
         for wrong in [-1.0, f64::NAN, f64::INFINITY] {
             let error =
                 grid(0.0, 0.0, 0.0, Idle::Held).currents_ua(&[0.0, 0.0, 0.0, wrong], 1.0, &[0.0; 2], Stop::never());
-            assert!(error.unwrap_err().to_string().contains("x 1, y 1"), "{wrong}");
+            assert!(error.unwrap_err().to_string().contains("row 1, column 1"), "{wrong}");
         }
     }
 }

@@ -121,7 +121,7 @@ pub enum Ending {
         /// What the hand does then.
         press: Press,
     },
-    /// Nobody catches it; a hand lifts it after a while.
+    /// It is not caught; a hand lifts it after a while.
     LeftToRest {
         /// From the drop to the lift, ms.
         rest_ms: f64,

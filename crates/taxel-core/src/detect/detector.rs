@@ -31,6 +31,13 @@ impl From<PlainRule> for Detector {
 }
 
 impl Detector {
+    /// Whether a file that begins with these bytes holds a detector, sound or not.
+    #[must_use]
+    pub fn is_begun_by(begin: &[u8]) -> bool {
+        let text = String::from_utf8_lossy(begin);
+        [Readout::FORMAT, PlainRule::FORMAT].iter().any(|format| text.contains(&format!("\"format\": \"{format}\"")))
+    }
+
     /// Reads a readout or a plain rule from the text of its file, whichever it is, and checks it.
     ///
     /// # Errors
@@ -141,8 +148,11 @@ impl Detector {
 /// The median distance between pictures, us.
 pub(super) fn usual_distance(t: &[i64]) -> Result<f64> {
     let mut apart: Vec<u64> = t.windows(2).map(|w| w[1].abs_diff(w[0])).collect();
+    if t.is_empty() {
+        return Err(problem!("there are no pictures: nothing can be detected"));
+    }
     if apart.is_empty() {
-        return Err(problem!("{} picture(s) do not say how long a frame lasts: give frame_us", t.len()));
+        return Err(problem!("one picture does not say how long a frame lasts: give frame_us"));
     }
     let middle = apart.len() / 2;
     Ok(*apart.select_nth_unstable(middle).1 as f64)

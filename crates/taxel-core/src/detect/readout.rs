@@ -169,15 +169,14 @@ impl Readout {
         if let Some(mine) = &self.array
             && !mine.fits(array)
         {
+            let others = (mine.rows, mine.columns) == (array.rows, array.columns);
+            let which = if others { ", of which others exist" } else { "" };
             return Err(problem!(
-                "array {} of {} x {} taxels: the readout was trained on {}, {} x {}{}",
-                array.name,
+                "an array of {} x {} taxels: the readout was trained on {} x {}{which}",
                 array.rows,
                 array.columns,
-                mine.name,
                 mine.rows,
-                mine.columns,
-                if (mine.rows, mine.columns) == (array.rows, array.columns) { ", of which others exist" } else { "" }
+                mine.columns
             ));
         }
         for (label, one) in &self.neurons {

@@ -120,9 +120,12 @@ impl<M: Measure> Stream for ByStamp<M> {
                 self.pass(present, events.t[k], out);
                 present = events.t[k];
             }
+            let place = events.array.index(events.x[k], events.y[k]);
+            if !events.array.has(place) {
+                continue;
+            }
             self.fresh = true;
             if intensity.present[k] {
-                let place = events.array.index(events.x[k], events.y[k]);
                 let value = f32::from(intensity.ticks[k]);
                 self.held.set(place, value);
                 self.loaded.take(place, value);

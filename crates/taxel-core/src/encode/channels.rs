@@ -4,7 +4,7 @@
 use super::blocks::{BLOCK, Block, Next};
 use crate::held::Held;
 use crate::vectors::wide;
-use crate::{Array, EventsView, Result, problem};
+use crate::{Array, Error, EventsView, Result, problem};
 
 /// Times beyond this, us (36 000 years), are refused, so that no sum of times can overflow.
 pub(super) const FARTHEST: u64 = 1 << 60;
@@ -23,7 +23,7 @@ wide! {
             }
             if bad != 0 {
                 let bad = new.iter().find(|v| !v.is_finite()).unwrap_or(&f32::NAN);
-                return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
+                return Err(not_finite(t, *bad));
             }
             if other != 0 {
                 *held = *new;
@@ -32,6 +32,12 @@ wide! {
         }
         Ok(())
     }
+}
+
+/// The error for a picture that holds a value that is not finite; NaN is one that is missing.
+pub(super) fn not_finite(t: i64, value: f32) -> Error {
+    let filled = if value.is_nan() { "; Frames.held fills the missing ones with the last value before" } else { "" };
+    problem!("frame at {t} us holds {value}: values must be finite{filled}")
 }
 
 /// The mapping between taxels and channels.

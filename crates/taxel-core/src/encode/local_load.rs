@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{Block, Next};
+use super::by_stamp::{ByStamp, Measure};
 use super::law::Law;
-use super::loaded::given;
+use super::loaded::{Loaded, given};
 use super::local_sums::{LocalSums, Sums, Values};
 use super::recent::{Recent, Window};
 use super::sampled::{Rule, Sampled};
@@ -13,7 +14,7 @@ use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::spikes::{ms, us};
-use crate::{Array, EventsView, FramesView, Result, Spike, SpikeKind, Stop};
+use crate::{Array, EventsView, FramesView, Result, Spike, SpikeKind, Stop, problem};
 
 /// The quantities of what is above the rest.
 const OF_REST: [&str; 4] = ["area", "largest", "places", "total"];
@@ -65,6 +66,13 @@ pub struct LocalLoad {
     pub local_ms: Vec<f64>,
     /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
     pub period_ms: f64,
+    /// Levels of the largest sums, in units of noise, ascending; none by default.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<f64>,
+    /// The part of a level below which it is left, from 0.01 to 1; default 1. Below 1, noise near a level does not
+    /// cross it again and again.
+    #[serde(skip_serializing_if = "is_one")]
+    pub release: f64,
     /// The taxels' rest and noise. It is valid for one board on one day: a saved readout has none and receives one when
     /// it is used.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -79,9 +87,17 @@ impl Default for LocalLoad {
             rest: LocalRest::default(),
             local_ms: vec![],
             period_ms: super::periods::stamp_period(),
+            levels: vec![],
+            release: 1.0,
             tare: None,
         }
     }
+}
+
+/// Whether a level is left where it was reached, which JSON leaves out.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_one(release: &f64) -> bool {
+    (release - 1.0).abs() < f64::EPSILON
 }
 
 impl LocalLoad {
@@ -90,6 +106,8 @@ impl LocalLoad {
         least_noise: "", Range::within(1e-9, 1e9);
         local_ms: "ms", Range::ABOVE_0;
         period_ms: "ms", Range::WHOLE_US;
+        levels: "", Range::ABOVE_0;
+        release: "", Range::within(0.01, 1.0);
     }
 
     /// The names of the quantities, a train each.
@@ -145,6 +163,15 @@ impl LocalLoad {
         self.sums(array, &[]).map(LargestSum)
     }
 
+    fn running_us(&self) -> Vec<f64> {
+        self.local_ms.iter().map(|&tau| us(tau)).collect()
+    }
+
+    /// The number of largest sums that have levels: above the rest, and above and below each running mean.
+    fn sums_with_levels(&self) -> usize {
+        1 + 2 * self.local_ms.len()
+    }
+
     fn sums(&self, array: &Array, running_us: &[f64]) -> Result<LocalSums> {
         let tare = given("local load", self.tare.as_ref())?;
         let least = (self.least_noise, self.noise_floor);
@@ -152,12 +179,11 @@ impl LocalLoad {
     }
 
     fn sampled(&self, array: &Array, emit: Emit) -> Result<Sampled<Load>> {
-        let running_us: Vec<f64> = self.local_ms.iter().map(|&tau| us(tau)).collect();
         let whole = |ms: f64| us(ms).round() as i64;
         let windows: Vec<Window> =
             self.windows().map(|([from, to], of)| Window { from: whole(from), to: whole(to), of }).collect();
         let recent = Recent::new(windows[0].of, &windows);
-        let rule = Load { sums: self.sums(array, &running_us)?, recent, quantities: vec![], emit };
+        let rule = Load { sums: self.sums(array, &self.running_us())?, recent, quantities: vec![], emit };
         Sampled::new(self, rule, array, self.period_ms)
     }
 }
@@ -169,25 +195,36 @@ fn quantities(spikes: &[Spike]) -> Vec<f64> {
 
 impl Law for LocalLoad {
     fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
+        let of_levels = Described::by(&Self::default(), &[], Self::RANGES).or("levels", Vec::<f64>::new());
+        of_levels.or("release", 1.0).or_nothing("tare")
     }
 
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
+        if let Some(k) = self.levels.windows(2).position(|pair| pair[0] >= pair[1]) {
+            return Err(problem!("levels[{}]: must be above the one before", k + 1));
+        }
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         array.check_neighbours("local load")?;
-        Ok(Box::new(self.sampled(array, Emit::Spikes)?))
+        if self.levels.is_empty() {
+            return Ok(Box::new(self.sampled(array, Emit::Spikes)?));
+        }
+        let loaded = Loaded::new("local load", array, self.tare.as_ref(), self.noise_floor)?;
+        let sums = self.sums(array, &self.running_us())?;
+        let level = |&at: &f64| Level { at, left_below: self.release * at, reached: false };
+        let levels = (0..self.sums_with_levels()).flat_map(|_| self.levels.iter().map(level)).collect();
+        Ok(Box::new(ByStamp::new(Levels { sums, largest: vec![], levels }, loaded, array)))
     }
 
     fn trains(&self, _array: &Array) -> usize {
-        self.quantities().len()
+        if self.levels.is_empty() { self.quantities().len() } else { 2 * self.sums_with_levels() * self.levels.len() }
     }
 
     fn kind(&self) -> SpikeKind {
-        SpikeKind::Graded
+        if self.levels.is_empty() { SpikeKind::Graded } else { SpikeKind::Unsigned }
     }
 
     fn set_tare(&mut self, tare: &Tare) {
@@ -209,9 +246,63 @@ impl LargestSum {
 
     /// Sets the rest of the taxel at `place`, row by row, from now on.
     pub fn set_rest(&mut self, place: usize, rest: f64) {
-        if let Some(channel) = self.0.channel(place) {
-            self.0.set_rest(channel, rest);
+        self.0.set_rest_at(place, rest);
+    }
+}
+
+/// A level of one of the largest sums.
+#[derive(Clone)]
+struct Level {
+    at: f64,
+    left_below: f64,
+    reached: bool,
+}
+
+/// Crossings of levels by the largest sums.
+#[derive(Clone)]
+struct Levels {
+    sums: LocalSums,
+    /// The largest sums of the last stamp: above the rest, then above and below each running mean.
+    largest: Vec<f64>,
+    /// All levels of the first sum, then those of the next.
+    levels: Vec<Level>,
+}
+
+impl Measure for Levels {
+    fn trains(&self) -> usize {
+        2 * self.levels.len()
+    }
+
+    fn drifts(&self) -> bool {
+        true
+    }
+
+    fn set_rest(&mut self, place: usize, rest: f64) {
+        self.sums.set_rest_at(place, rest);
+    }
+
+    fn emit(&mut self, t: i64, _loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {
+        let Self { sums, largest, levels } = self;
+        largest.clear();
+        sums.take(t, Values::Picture(held.as_flattened()), |Sums { largest: [up, down], .. }| {
+            let present = if largest.is_empty() { &[up][..] } else { &[up, down][..] };
+            largest.extend_from_slice(present);
+        });
+        let each = levels.len() / largest.len();
+        let falls = levels.len();
+        let mut left = vec![];
+        for (train, level) in levels.iter_mut().enumerate() {
+            // In single precision, as plain rules compare it.
+            let now = f64::from(largest[train / each] as f32);
+            if !level.reached && now >= level.at {
+                level.reached = true;
+                out.push(Spike { t: ms(t), train: train as u32, value: 1.0 });
+            } else if level.reached && now < level.left_below {
+                level.reached = false;
+                left.push(Spike { t: ms(t), train: (falls + train) as u32, value: 1.0 });
+            }
         }
+        out.append(&mut left);
     }
 }
 

@@ -358,9 +358,11 @@ impl LocalSums {
         }
     }
 
-    /// The number of the existing taxel with this index in the array.
-    pub(super) fn channel(&self, place: usize) -> Option<usize> {
-        self.grid.channel(place)
+    /// Sets the rest of the taxel with this index in the array, if it exists.
+    pub(super) fn set_rest_at(&mut self, place: usize, rest: f64) {
+        if let Some(channel) = self.grid.channel(place) {
+            self.set_rest(channel, rest);
+        }
     }
 
     /// Sets the rest of the existing taxel with this number.

@@ -8,6 +8,7 @@ use super::loaded::Loaded;
 use super::local_load::{LargestSum, LocalLoad};
 use super::stream::Stream;
 use super::tare::Tare;
+use crate::rest::step_of;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike};
 
@@ -30,13 +31,27 @@ impl Quantity {
     ///
     /// # Errors
     ///
-    /// `Problem` without a tare, or with one of another array; for the local load, with one without the taxels' noise.
+    /// `Problem` for channels, of which no taxel is known to have neighbours; without a tare, or with one of another
+    /// array; for the local load, with one without the taxels' noise.
     pub fn stream(several: &[Self], array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Box<dyn Stream>> {
+        for quantity in several {
+            array.check_neighbours(quantity.rule())?;
+        }
         let loaded = Loaded::new("plain rule", array, tare, noise_floor)?;
-        let local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
+        let mut local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
+        local.least_noise *= step_of(noise_floor);
         let local = several.contains(&Self::LocalLoad).then(|| local.largest(array)).transpose()?;
         let loads = Loads { quantities: several.to_vec(), values: vec![0.0; several.len()], local };
         Ok(Box::new(ByStamp::new(loads, loaded, array)))
+    }
+
+    /// A plain rule by this quantity, in errors.
+    fn rule(self) -> &'static str {
+        match self {
+            Self::Area => "a plain rule by area",
+            Self::Total => "a plain rule by total",
+            Self::LocalLoad => "a plain rule by local load",
+        }
     }
 }
 

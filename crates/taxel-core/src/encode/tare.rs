@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::channels::not_finite;
 use crate::held::Held;
 use crate::rest::{Rest, Value};
 use crate::{Array, EventsView, FramesView, Result, problem, reading};
@@ -45,14 +46,17 @@ impl Tare {
             return Err(problem!("tare from {} to {} us: start must lie before stop", self.start_us, self.stop_us));
         }
         if let Some(place) = self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
-            return Err(problem!("tare: rest of taxel {place} is not finite"));
+            return Err(problem!("tare: rest of the taxel at {} is not finite", self.array.place_of(place)));
         }
         let Some(noise) = &self.noise else { return Ok(()) };
         if noise.len() != self.array.len() {
             return Err(problem!("tare: noise of {} taxels for {rows} x {columns}: must be one each", noise.len()));
         }
         match noise.iter().position(|noise| noise.is_some_and(|n| !(n >= 0.0 && n.is_finite()))) {
-            Some(place) => Err(problem!("tare: noise of taxel {place} must be 0 or more and finite")),
+            Some(place) => {
+                let place = self.array.place_of(place);
+                Err(problem!("tare: noise of the taxel at {place} must be 0 or more and finite"))
+            }
             None => Ok(()),
         }
     }
@@ -272,7 +276,7 @@ impl TareBuilder {
             return Err(problem!("frame at {t} us after {} us: times ascend", self.present));
         }
         if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
-            return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
+            return Err(not_finite(t, *bad));
         }
         self.present = t;
         let start = *self.start.get_or_insert(t);
@@ -289,7 +293,7 @@ impl TareBuilder {
     ///
     /// `Problem` if there was no event, the interval is empty, or an event was later.
     pub fn finish(mut self, stop: i64, note: &str) -> Result<Tare> {
-        let Some(start) = self.start else { return Err(problem!("tare: no event came")) };
+        let Some(start) = self.start else { return Err(problem!("tare: nothing came")) };
         if stop <= start {
             return Err(problem!("tare from {start} to {stop} us: start must lie before stop"));
         }
@@ -306,7 +310,7 @@ impl TareBuilder {
         };
         let (rest, noise) = (of_each(Integral::mean), of_each(Integral::deviation));
         if rest.iter().all(Option::is_none) {
-            return Err(problem!("tare from {start} to {stop} us: no event came"));
+            return Err(problem!("tare from {start} to {stop} us: nothing came"));
         }
         Ok(Tare { rest, noise: Some(noise), array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
     }

@@ -8,5 +8,5 @@ mod mix;
 mod shortest;
 
 pub(crate) use cone_r::Asked;
-pub use cone_r::{ConeR, ConeRFit, ConeRProblem, Shares};
+pub use cone_r::{ConeR, ConeRFit, ConeRProblem, GapMultipliers, Shares};
 pub use cone_x::{ConeX, ConeXFit, ConeXProblem, Horizon};

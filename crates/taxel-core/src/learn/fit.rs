@@ -8,13 +8,14 @@ use super::statement::Parts;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// CONE-X: the weights satisfy all rows, and in continuous time the neuron, run on the patterns, fires at its
-    /// targets only; `gap` bounds the objective. CONE-R, which has no hard rows: the objective is proven to be within
-    /// `tolerance` of its least value.
+    /// The weights satisfy all rows of CONE-X (CONE-R has no hard rows), in continuous time the neuron, run on the
+    /// patterns, fires at its targets only, and the objective is proven to be within `tolerance` of its least value.
     Solved,
+    /// CONE-X: as solved, but the search ended before the objective was proven to be the least.
+    Feasible,
     /// No weights satisfy all rows of CONE-X; a certificate proves it.
     Infeasible,
-    /// Neither is known; the weights are the best so far.
+    /// None of these is known; the weights are the best so far.
     Stopped,
 }
 
@@ -24,6 +25,7 @@ impl Status {
     pub fn name(self) -> &'static str {
         match self {
             Self::Solved => "solved",
+            Self::Feasible => "feasible",
             Self::Infeasible => "infeasible",
             Self::Stopped => "stopped",
         }

@@ -25,7 +25,7 @@ pub(crate) use examples::{
 pub(crate) use objective::{Choice, NOTHING, Objective, relative_gap};
 pub use objective::{Divisor, DivisorC, DivisorD, Norm, Parts, Sides};
 pub(crate) use peak::{Peak, exceeds, largest};
-pub(crate) use relaxed::{Point, Relaxed, Tangents};
+pub(crate) use relaxed::{Point, Proof, Relaxed, Tangents};
 pub(crate) use rows::end_of;
 pub use rows::{Margin, Row, Stated, Statement};
 pub(crate) use silence::Silence;

@@ -21,6 +21,8 @@ pub(super) struct GridStream {
     compared: bool,
     /// The decay over one step of the grid.
     step: Step,
+    /// Where the state last was: the potential there, what left from there, and how many steps of the grid ago.
+    left: (f64, KernelSum, f64),
 }
 
 impl GridStream {
@@ -36,6 +38,7 @@ impl GridStream {
             point: 0.0,
             compared: false,
             step: shape.step(neuron.step_ms),
+            left: (0.0, KernelSum::default(), 1.0),
         }
     }
 
@@ -100,10 +103,11 @@ impl GridStream {
 
     fn jump(&mut self, point: f64) {
         let steps = point - self.point;
+        self.left = (self.state.b, self.leaving(), steps);
         self.state = if steps > 1.0 {
-            self.shape.after(self.leaving(), steps * self.neuron.step_ms)
+            self.shape.after(self.left.1, steps * self.neuron.step_ms)
         } else {
-            self.step.apply(self.leaving())
+            self.step.apply(self.left.1)
         };
         self.arriving = 0.0;
         self.point = point;
@@ -118,11 +122,17 @@ impl GridStream {
         if !self.threshold.compare(t, self.state.b, slope, self.grid.rounding_ms(t)) {
             return;
         }
-        out.push(OutputSpike { t, slope });
+        out.push(OutputSpike { t, slope: (self.state.b - self.potential_before()) / self.neuron.step_ms });
         self.threshold.fire(t);
         if self.neuron.after_spike == AfterSpike::Reset {
             self.state = KernelSum::default();
             self.arriving = 0.0;
         }
+    }
+
+    /// The potential at the grid point before this one.
+    fn potential_before(&self) -> f64 {
+        let (potential, left, steps) = self.left;
+        if steps > 1.0 { self.shape.after(left, (steps - 1.0) * self.neuron.step_ms).b } else { potential }
     }
 }

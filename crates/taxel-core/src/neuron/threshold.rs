@@ -8,7 +8,8 @@ use super::rounding::rounding_ms;
 pub struct OutputSpike {
     /// The time at which the potential crossed the threshold (on a grid: the first point at or above it), ms.
     pub t: f64,
-    /// The slope of potential minus threshold at the crossing, mV/ms.
+    /// The slope of the potential at the crossing, mV/ms; on a grid its mean slope over the step that ends there. 0 or
+    /// less where the refractory time, or a falling threshold, held the spike back until then.
     pub slope: f64,
 }
 

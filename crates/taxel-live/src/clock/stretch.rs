@@ -8,6 +8,11 @@ pub(super) const PART_US: i64 = 10_000;
 /// Number of points stored for each part.
 pub(super) const QUICK: usize = 2;
 
+/// Number of stretches from which the line is fitted: 64 s, within which the rate of a quartz is constant.
+pub(super) const STRETCHES: usize = 256;
+/// Duration beyond which a slope larger than that of a quartz is accepted, us.
+pub(super) const LONG_US: i64 = 10_000_000;
+
 /// Fraction of the points that may be below the line.
 const EARLY: f64 = 0.01;
 

@@ -76,13 +76,13 @@ impl Copies {
         }
         self.pictured = Instant::now();
         let published = self.shared.published();
-        if published.counters.decoded == self.decoded {
+        if published.counters.decoding.decoded == self.decoded {
             return None;
         }
-        self.decoded = published.counters.decoded;
+        self.decoded = published.counters.decoding.decoded;
         let array = &self.shared.options.array;
         let picture = json!({
-            "t_us": published.counters.board_us,
+            "t_us": published.counters.board.board_us,
             "rows": array.rows,
             "columns": array.columns,
             "ticks": published.picture,

@@ -10,19 +10,45 @@ use taxel_core::wire;
 use super::sending::Sent;
 use crate::bridged::Bridged;
 use crate::capture;
-use crate::clock::Offset;
+use crate::clock::{Offset, Pace};
 use crate::latency::Quantiles;
 
 /// Counts of what arrived, how it was processed, and what was lost at which stage.
 ///
 /// Once [`Live::stop`](super::Live::stop) has returned, `capture.datagrams = decoded + capture.dropped_by_queue` and
-/// `wire.bytes = 5 wire.words + wire.skipped`; if there is a readout, `events = read_out + events_dropped`.
+/// `wire.bytes = 5 wire.words + wire.skipped`; if there is a readout, `events = read_out + events_dropped`. In JSON, as in
+/// Python, all are fields of one object but for those of the socket, the wire and the bridge.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Counters {
     /// Counts of the socket and of the queue behind it.
     pub capture: capture::Counts,
     /// Losses between another computer, which receives the board's datagrams, and this one.
     pub bridged: Option<Bridged>,
+    /// What was decoded.
+    #[serde(flatten)]
+    pub decoding: DecodingCounts,
+    /// What the readout did with the events.
+    #[serde(flatten)]
+    pub readout: ReadoutCounts,
+    /// Counts of each destination: `sent + lost + waiting = detections`.
+    pub sent: Vec<Sent>,
+    /// Counts of the recording's other sources.
+    pub sources: BTreeMap<String, SourceCounts>,
+    /// Latency from the kernel's stamp to the end of decoding, per datagram.
+    pub decode_latency: Quantiles,
+    /// Latency from `known` to the output, by the board's clock.
+    #[serde(rename = "said_latency")]
+    pub output_latency: Quantiles,
+    /// What is known of the board's clock and of its signs of life.
+    #[serde(flatten)]
+    pub board: BoardState,
+    /// Time since the socket was opened, s.
+    pub seconds: f64,
+}
+
+/// Counts of the decoder, and what it refused.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct DecodingCounts {
     /// Datagrams that were decoded.
     pub decoded: u64,
     /// Counts of the decoder of version 1.
@@ -40,6 +66,11 @@ pub struct Counters {
     pub wire_late: u64,
     /// Number of decoded events.
     pub events: u64,
+}
+
+/// Counts of the readout and of its detections.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct ReadoutCounts {
     /// Events that the readout has processed.
     pub read_out: u64,
     /// Events that did not fit in the queue before the readout.
@@ -56,17 +87,17 @@ pub struct Counters {
     pub outside: Option<u64>,
     /// Detections that [`Live::next`](super::Live::next) did not read in time; the sinks received them.
     pub detections_dropped: u64,
-    /// Counts of each destination: `sent + lost + waiting = detections`.
-    pub sent: Vec<Sent>,
-    /// Counts of the recording's other sources.
-    pub sources: BTreeMap<String, SourceCounts>,
-    /// Latency from the kernel's stamp to the end of decoding, per datagram.
-    pub decode_latency: Quantiles,
-    /// Latency from `known` to the output, by the board's clock.
-    #[serde(rename = "said_latency")]
-    pub output_latency: Quantiles,
+    /// Whether a tare is being measured.
+    pub taring: bool,
+}
+
+/// When the board was last received, at which time of its clock, and its start and stop markers.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct BoardState {
     /// The relation of the host's clock to the board's; from the first datagram on.
     pub offset: Option<Offset>,
+    /// The drift and the delays that arrivals show, and whether they can be, four times a second.
+    pub pace: Option<Pace>,
     /// When the latest datagram arrived, ns since 1970.
     pub arrived_ns: Option<i64>,
     /// The longest interval between two heartbeats of a board of version 2 since it began or was reset, us.
@@ -77,13 +108,59 @@ pub struct Counters {
     pub markers: u64,
     /// Whether the last marker was a start; `None` before the first.
     pub marked_start: Option<bool>,
-    /// Time since the socket was opened, s.
-    pub seconds: f64,
-    /// Whether a tare is being measured.
-    pub taring: bool,
+}
+
+/// Without any datagram for so long a source is quiet, ns.
+const QUIET_NS: i64 = 1_000_000_000;
+
+/// A source with heartbeats is lost after so many of the longest intervals between them, and after this time at least, ns.
+const MISSING_HEARTBEATS: i64 = 3;
+const LOST_NS: i64 = 500_000_000;
+
+/// Whether datagrams arrive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ArrivalState {
+    /// None has arrived so far.
+    Nothing,
+    /// They arrive.
+    Arriving,
+    /// None for a while from a board that sends no heartbeats.
+    Quiet,
+    /// None from a board whose heartbeats should have arrived.
+    Lost,
+}
+
+/// Whether datagrams arrive, since when none do, and how long they may be missing.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Arrival {
+    /// Whether they arrive.
+    pub state: ArrivalState,
+    /// When the latest one arrived, ns since 1970.
+    pub since_ns: Option<i64>,
+    /// How long ago that was, s.
+    pub silent_s: f64,
+    /// The longest interval between two heartbeats, us.
+    pub heartbeat_us: Option<i64>,
 }
 
 impl Counters {
+    /// Whether datagrams arrive, at `now_ns` since 1970.
+    #[must_use]
+    pub fn arrival(&self, now_ns: i64) -> Arrival {
+        let silent_ns = self.board.arrived_ns.map_or(0, |arrived_ns| (now_ns - arrived_ns).max(0));
+        let lost_ns = self.board.heartbeat_us.map(|interval| (MISSING_HEARTBEATS * interval * 1000).max(LOST_NS));
+        let state = match (self.board.arrived_ns, lost_ns) {
+            (None, _) => ArrivalState::Nothing,
+            (Some(_), Some(lost_ns)) if silent_ns > lost_ns => ArrivalState::Lost,
+            (Some(_), None) if silent_ns > QUIET_NS => ArrivalState::Quiet,
+            _ => ArrivalState::Arriving,
+        };
+        #[allow(clippy::cast_precision_loss)]
+        let silent_s = silent_ns as f64 / 1e9;
+        Arrival { state, since_ns: self.board.arrived_ns, silent_s, heartbeat_us: self.board.heartbeat_us }
+    }
+
     /// Whether no datagram has arrived, not even one that was lost.
     #[must_use]
     pub fn nothing_came(&self) -> bool {
@@ -94,7 +171,7 @@ impl Counters {
     /// wait are left out.
     #[must_use]
     pub(super) fn since(&self, earlier: &Self) -> Self {
-        let decoded = self.decoded - earlier.decoded;
+        let decoded = self.decoding.decoded - earlier.decoding.decoded;
         let (now, before) = (&self.capture, &earlier.capture);
         let dropped_by_queue = now.dropped_by_queue - before.dropped_by_queue;
         let datagrams = decoded + dropped_by_queue;
@@ -112,13 +189,33 @@ impl Counters {
         Self {
             capture,
             bridged: self.bridged.map(|now| now.since(&earlier.bridged.unwrap_or_default())),
-            decoded,
+            decoding: self.decoding.since(&earlier.decoding),
+            readout: self.readout.since(&earlier.readout),
+            board: BoardState { markers: self.board.markers - earlier.board.markers, ..self.board.clone() },
+            seconds: self.seconds - earlier.seconds,
+            ..self.clone()
+        }
+    }
+}
+
+impl DecodingCounts {
+    fn since(&self, earlier: &Self) -> Self {
+        Self {
+            decoded: self.decoded - earlier.decoded,
             wire: self.wire.since(&earlier.wire),
+            wire_version: self.wire_version,
             wire_v2: self.wire_v2.since(&earlier.wire_v2),
             wire_refused: self.wire_refused - earlier.wire_refused,
             wire_changes: self.wire_changes - earlier.wire_changes,
             wire_late: self.wire_late - earlier.wire_late,
             events: self.events - earlier.events,
+        }
+    }
+}
+
+impl ReadoutCounts {
+    fn since(&self, earlier: &Self) -> Self {
+        Self {
             read_out: self.read_out - earlier.read_out,
             events_dropped: self.events_dropped - earlier.events_dropped,
             late: self.late - earlier.late,
@@ -126,9 +223,7 @@ impl Counters {
             wrong: self.wrong - earlier.wrong,
             outside: self.outside.map(|now| now - earlier.outside.unwrap_or(0)),
             detections_dropped: self.detections_dropped - earlier.detections_dropped,
-            markers: self.markers - earlier.markers,
-            seconds: self.seconds - earlier.seconds,
-            ..self.clone()
+            taring: self.taring,
         }
     }
 }

@@ -10,7 +10,7 @@ use super::counters::Counters;
 use super::options::LiveOptions;
 use super::readout_queue::Quiet;
 use crate::capture::Datagram;
-use crate::clock::{BoardClock, leaves};
+use crate::clock::{BoardClock, Pace, leaves};
 
 /// Shortest interval at which the readout's time is advanced during silence; if frames are longer, it is advanced once
 /// per frame.
@@ -21,6 +21,8 @@ pub(super) struct DecodeStage {
     promise: Promise,
     arrivals: Arrivals,
     clock: BoardClock,
+    /// What the clock showed when its last stretch ended.
+    pace: Option<Pace>,
     /// Events that were decoded and not passed on yet.
     events: Events,
     held: Held,
@@ -109,6 +111,7 @@ impl DecodeStage {
             promise: Promise::default(),
             arrivals: Arrivals::default(),
             clock: BoardClock::default(),
+            pace: None,
             events: Events::empty(options.array.clone()),
             held: Held::unknown(options.array.len()),
             latest: None,
@@ -157,8 +160,10 @@ impl DecodeStage {
             self.promise.note(info, arrived_ns / 1000, (self.gap_frames * self.frame_us) as i64);
         }
         let last = self.events.t[*row..].last().copied();
-        if let Some(left) = leaves(info, last, *bytes, self.frame_us()) {
-            self.clock.note(left, *arrived_ns);
+        if let Some(left) = leaves(info, last, *bytes, self.frame_us())
+            && self.clock.note(left, *arrived_ns)
+        {
+            self.pace = self.clock.pace();
         }
     }
 
@@ -202,20 +207,21 @@ impl DecodeStage {
 
     /// Writes the stage's counts.
     pub(super) fn publish(&self, counters: &mut Counters) {
-        counters.decoded = self.decoded;
-        counters.wire = *self.decoder.counts();
-        counters.wire_v2 = self.decoder.two().counts();
-        counters.wire_version = self.decoder.version();
-        counters.wire_refused = self.decoder.refused();
-        counters.wire_changes = self.decoder.changes();
-        counters.wire_late = self.late;
-        counters.events += self.events.len() as u64;
-        counters.arrived_ns = self.arrivals.latest_ns;
-        counters.heartbeat_us = self.arrivals.heartbeat_us;
-        counters.offset = self.clock.offset();
-        counters.board_us = counters.board_us.max(self.events.t.iter().max().copied());
-        counters.markers += self.events.markers.len() as u64;
-        counters.marked_start = self.events.markers.last().map(|m| m.start).or(counters.marked_start);
+        counters.decoding.decoded = self.decoded;
+        counters.decoding.wire = *self.decoder.counts();
+        counters.decoding.wire_v2 = self.decoder.two().counts();
+        counters.decoding.wire_version = self.decoder.version();
+        counters.decoding.wire_refused = self.decoder.refused();
+        counters.decoding.wire_changes = self.decoder.changes();
+        counters.decoding.wire_late = self.late;
+        counters.decoding.events += self.events.len() as u64;
+        counters.board.arrived_ns = self.arrivals.latest_ns;
+        counters.board.heartbeat_us = self.arrivals.heartbeat_us;
+        counters.board.offset = self.clock.offset();
+        counters.board.pace.clone_from(&self.pace);
+        counters.board.board_us = counters.board.board_us.max(self.events.t.iter().max().copied());
+        counters.board.markers += self.events.markers.len() as u64;
+        counters.board.marked_start = self.events.markers.last().map(|m| m.start).or(counters.board.marked_start);
     }
 
     /// Sets the version of the wire to which the board was set; returns whether it is a different one.

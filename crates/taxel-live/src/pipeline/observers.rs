@@ -30,7 +30,8 @@ impl Observers {
     /// Adds a viewer of the events, if it is still connected.
     pub(super) fn add_viewer(&mut self, answer: &channel::Sender<ViewerEvents>, held: &Held) {
         let counters = &self.shared.published().counters;
-        let (queue, events) = viewer_queue(&self.shared.options.array, held, counters.board_us, counters.events);
+        let (queue, events) =
+            viewer_queue(&self.shared.options.array, held, counters.board.board_us, counters.decoding.events);
         if answer.send(events).is_ok() {
             self.viewers.push(queue);
         }

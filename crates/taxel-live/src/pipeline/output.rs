@@ -49,8 +49,8 @@ impl DetectionOutput {
         state.waiting.extend(found.drain(..).take(room));
         if lost > 0 {
             let counters = &mut shared.published().counters;
-            counters.detections += lost as u64;
-            counters.detections_dropped += lost as u64;
+            counters.readout.detections += lost as u64;
+            counters.readout.detections_dropped += lost as u64;
         }
         state.targets.is_some()
     }
@@ -77,7 +77,7 @@ impl Targets {
     /// Passes a detection to the sinks first, then to the recording and the receivers.
     fn output(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
         let output_ns = now_ns();
-        let offset = shared.published().counters.offset;
+        let offset = shared.published().counters.board.offset;
         let output = OutputDetection {
             output_us: offset.map_or(detection.known, |o| o.board_us(output_ns)),
             detection,
@@ -97,8 +97,8 @@ impl Targets {
         let late_ns = (output.output_us - output.detection.known) * 1000;
         let dropped = self.queue.try_send(output).is_err();
         let mut published = shared.published();
-        published.counters.detections += 1;
-        published.counters.detections_dropped += u64::from(dropped);
+        published.counters.readout.detections += 1;
+        published.counters.readout.detections_dropped += u64::from(dropped);
         published.output_latency.note(late_ns);
         Ok(())
     }

@@ -74,7 +74,7 @@ impl ReadOutStage {
             }
             None => {
                 let dropped = shared.readout_queue.push(events, promised);
-                shared.published().counters.events_dropped = dropped;
+                shared.published().counters.readout.events_dropped = dropped;
             }
         }
         self.announced = self.announced.max(promised);

@@ -176,7 +176,7 @@ impl RecordStage {
         }
         let new = decoded != self.considered;
         self.considered = decoded;
-        if let (true, Some(t_us)) = (new, self.shared.published().counters.board_us) {
+        if let (true, Some(t_us)) = (new, self.shared.published().counters.board.board_us) {
             self.picture_buffer.push(now, now_ns(), t_us, held.picture());
         }
         times.into_iter().for_each(|t| self.picture_buffer.around(t));

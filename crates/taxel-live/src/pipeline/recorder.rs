@@ -189,7 +189,7 @@ impl Recorder {
         if let Some(registers) = &self.header.registers {
             self.registers(registers)?;
         }
-        let t_us = now.board_us.and_then(|t| self.timed(t));
+        let t_us = now.board.board_us.and_then(|t| self.timed(t));
         self.with_track(|track| track.held(now_ns(), t_us, held))
     }
 
@@ -430,17 +430,17 @@ fn kind_of_name(path: &Path) -> Result<&str> {
 pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::Counts {
     // Datagrams that wait at the end belong to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
-    let mut decoder = recording::damage(&now.wire);
-    decoder.insert("bytes_of_version_1_refused".to_owned(), now.wire_refused);
-    let missing = recording::damage_of_version_2(&now.wire_v2).map(|(causes, missing)| {
+    let mut decoder = recording::damage(&now.decoding.wire);
+    decoder.insert("bytes_of_version_1_refused".to_owned(), now.decoding.wire_refused);
+    let missing = recording::damage_of_version_2(&now.decoding.wire_v2).map(|(causes, missing)| {
         decoder.extend(causes);
         missing
     });
     // Version 1 does not number datagrams: a recording with any of it cannot state that none is missing.
-    let knows = now.wire_v2.intact > 0 && now.wire.bytes == 0;
+    let knows = now.decoding.wire_v2.intact > 0 && now.decoding.wire.bytes == 0;
     recording::Counts {
         received: now.capture.datagrams,
-        recorded: now.decoded,
+        recorded: now.decoding.decoded,
         dropped_by_kernel: now.capture.dropped_by_kernel,
         dropped_by_queue: now.capture.dropped_by_queue,
         decoder,
@@ -457,17 +457,17 @@ mod tests {
     #[test]
     fn only_a_recording_of_nothing_but_version_2_says_that_nothing_is_missing() {
         let mut now = Counters::default();
-        (now.wire_v2.datagrams, now.wire_v2.intact) = (100, 100);
+        (now.decoding.wire_v2.datagrams, now.decoding.wire_v2.intact) = (100, 100);
         assert_eq!(losses(&now, None).missing, Some(0));
         assert_eq!(losses(&now, None).verdict(), "nothing lost");
         let begun = now.clone();
         // The board has sent version 1 since the recording began.
-        now.wire.bytes = 50;
+        now.decoding.wire.bytes = 50;
         assert_eq!(losses(&now, Some(&begun)).missing, None);
-        (now.wire_v2.datagrams, now.wire_v2.intact) = (110, 110);
+        (now.decoding.wire_v2.datagrams, now.decoding.wire_v2.intact) = (110, 110);
         assert_eq!(losses(&now, Some(&begun)).missing, None, "some of it");
-        now.wire_v2.missing += 3;
-        now.wire_refused += 25;
+        now.decoding.wire_v2.missing += 3;
+        now.decoding.wire_refused += 25;
         let lost = losses(&now, Some(&begun));
         assert_eq!(lost.missing, Some(3));
         assert!(

@@ -74,7 +74,7 @@ impl RunningReadout {
 
     /// Publishes whether it measures a tare, and the rest that it reads with, before the first events.
     pub(super) fn begin(&self, shared: &Shared) {
-        shared.published().counters.taring = matches!(self.mode, Mode::Taring(_));
+        shared.published().counters.readout.taring = matches!(self.mode, Mode::Taring(_));
         self.publish_rest(shared);
     }
 
@@ -141,10 +141,10 @@ impl RunningReadout {
         }
         if !self.events.is_empty() || end.last {
             let counters = &mut shared.published().counters;
-            counters.read_out += self.events.len() as u64;
+            counters.readout.read_out += self.events.len() as u64;
             if let Mode::Reading(readout) = &self.mode {
-                (counters.late, counters.wrong) = (readout.late(), readout.wrong());
-                counters.outside = readout.outside();
+                (counters.readout.late, counters.readout.wrong) = (readout.late(), readout.wrong());
+                counters.readout.outside = readout.outside();
             }
         }
         Ok(())
@@ -159,7 +159,7 @@ impl RunningReadout {
         self.mode = Mode::Reading(readout);
         self.publish_rest(shared);
         let mut published = shared.published();
-        published.counters.taring = false;
+        published.counters.readout.taring = false;
         published.tare = Some(tare);
         Ok(())
     }

@@ -221,7 +221,7 @@ impl SendingState {
     fn opened(&mut self, tried: Result<Option<Device>>) {
         match tried {
             Ok(Some(device)) => self.device = Some(device),
-            Ok(None) => self.counts.trouble = Some("nobody reads".to_owned()),
+            Ok(None) => self.counts.trouble = Some("no reader".to_owned()),
             Err(error) => self.counts.trouble = Some(error.to_string()),
         }
     }
@@ -246,7 +246,7 @@ impl SendingState {
                 }
                 Err(error) => {
                     let why = if error.kind() == ErrorKind::BrokenPipe {
-                        "nobody reads any more".to_owned()
+                        "the reader is gone".to_owned()
                     } else {
                         error.to_string()
                     };

@@ -150,7 +150,7 @@ impl Shared {
 
     /// Writes a note, with the current time or without one.
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
-        let board_us = self.published().counters.board_us.filter(|_| timed);
+        let board_us = self.published().counters.board.board_us.filter(|_| timed);
         match &*lock(&self.recording.recorder) {
             Some(recorder) => {
                 self.picture_around(board_us);

@@ -228,11 +228,11 @@ impl Stages {
     fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let array = &self.shared.options.array;
         let published = self.shared.published();
-        if published.counters.taring {
+        if published.counters.readout.taring {
             return Err(problem!("a tare is being taken: zero taxels when that is done").into());
         }
-        let now = published.counters.offset.map(|offset| offset.board_us(now_ns()));
-        let Some(t) = published.counters.board_us.max(self.read_out.announced()).max(now) else {
+        let now = published.counters.board.offset.map(|offset| offset.board_us(now_ns()));
+        let Some(t) = published.counters.board.board_us.max(self.read_out.announced()).max(now) else {
             return Err(problem!("nothing came yet: no taxel can be zeroed").into());
         };
         let mut zeroings = vec![];

@@ -352,12 +352,36 @@ impl Track {
             return Err(problem!("picture of {n} taxels, {columns} a row: must be whole rows").into());
         }
         let grey = self.grey_scale().draw(t_us, columns, ticks);
-        let picture = json!({
-            "timestamp": time(at_ns), "frame_id": "taxel", "width": columns, "height": ticks.len() / columns,
-            "encoding": "mono8", "step": columns, "data": base64(&grey.bytes), "t_us": t_us,
-            "rest": grey.rest, "full_ticks": grey.full,
+        let about = json!({ "rest": grey.rest, "full_ticks": grey.full });
+        self.push_grey((at_ns, t_us), columns, &grey.bytes, about)
+    }
+
+    /// Writes a picture for viewers of values that are above rest already, in a unit: as [`Track::picture`]; white is at
+    /// least `least`, and the message states it in the unit (`full`, `unit`). Values that are not finite
+    /// or below 0 are black.
+    ///
+    /// # Errors
+    ///
+    /// As [`Track::datagram`]; `Core(Problem)` if there is no value for each taxel.
+    pub fn picture_above(&self, at: (i64, i64), above: &[f32], least: f64, rest: &str, unit: &str) -> Result<()> {
+        if above.len() != self.taxels {
+            return Err(problem!("picture of {} values: the array has {} taxels", above.len(), self.taxels).into());
+        }
+        let above: Vec<f64> = above.iter().map(|&v| if v.is_finite() { f64::from(v).max(0.0) } else { 0.0 }).collect();
+        let (bytes, full) = self.grey_scale().white().grey(at.1, &above, least);
+        self.push_grey(at, self.columns, &bytes, json!({ "rest": rest, "full": full, "unit": unit }))
+    }
+
+    /// Adds a picture to the channel; `at` is its time in the file, ns, and the board's, us.
+    fn push_grey(&self, at: (i64, i64), columns: usize, bytes: &[u8], about: serde_json::Value) -> Result<()> {
+        let mut picture = json!({
+            "timestamp": time(at.0), "frame_id": "taxel", "width": columns, "height": bytes.len() / columns,
+            "encoding": "mono8", "step": columns, "data": base64(bytes), "t_us": at.1,
         });
-        self.push_json(Topic::Pressure, at_ns, &picture)
+        if let (Some(picture), serde_json::Value::Object(about)) = (picture.as_object_mut(), about) {
+            picture.extend(about);
+        }
+        self.push_json(Topic::Pressure, at.0, &picture)
     }
 
     /// Writes the taxels' values before the recording's first datagram, ticks by taxel index; 65 535 for a taxel

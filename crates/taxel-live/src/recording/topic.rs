@@ -56,7 +56,7 @@ impl Topic {
         let belongs = move |topic: &Self| match topic {
             Self::Samples => stream,
             Self::Pictures => pictures,
-            Self::Datagrams | Self::Pressure => !stream && !pictures,
+            Self::Datagrams => !stream && !pictures,
             Self::Counts => true,
             _ => !stream,
         };

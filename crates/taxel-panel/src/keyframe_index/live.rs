@@ -254,7 +254,7 @@ mod tests {
         let index = LiveIndex::new(array.clone(), 3);
         let blank = vec![UNKNOWN; array.len()];
         let start = Keyframe::blank(array.len());
-        let mut state = ArrayState::new(array.columns, 3, &start, COLUMN_US, 0);
+        let mut state = ArrayState::new(&array, 3, &start, COLUMN_US, 0);
         index.push(Piece { held: Some(blank.clone()), ..Piece::default() }, &state);
         assert_eq!(index.range(), None);
         index.push(

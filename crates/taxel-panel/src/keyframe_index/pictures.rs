@@ -6,14 +6,19 @@
 use std::sync::Arc;
 
 use taxel_core::Array;
+use taxel_core::array::Places;
 use taxel_core::held::UNKNOWN;
+use taxel_core::rest::{NOISE_FLOOR, above_noise, touched_from};
+use taxel_core::tracked_rest::TrackedRest;
 use taxel_live::Result;
 use taxel_live::pipeline::Change;
 use taxel_live::recording::Remarks;
 
-use super::{ChangeReader, KeyframeIndex, Read};
-use crate::array_state::Keyframe;
+use super::{ChangeReader, KeyframeIndex, Pictures, Read};
+use crate::array_state::{Keyframe, RestSource};
+use crate::centre::Coordinates;
 use crate::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
+use crate::weights::Weights;
 
 /// Memory that the curves may take, bytes.
 const TIME_COLUMN_BYTES: usize = 256 << 20;
@@ -26,6 +31,9 @@ const BINS: i64 = 1000;
 
 /// Number of changes that are read at once.
 const AT_ONCE: usize = 4096;
+
+/// A tracked rest is stored where that of a taxel is further than this from the stored one, in ticks of the noise floor.
+const REST_MOVED: f64 = 0.5;
 
 /// Where a source's pictures are in the array of the recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,6 +48,75 @@ pub struct PicturePlace {
     pub columns: u16,
 }
 
+/// What the values of a source's pictures are above.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PictureRest {
+    /// Where it is known from. That of a quiet stretch is tracked from its values on; without any the values are above 0.
+    pub source: RestSource,
+    /// The rest of each cell, in the unit; [`Value::NO_REST`](taxel_core::rest::Value::NO_REST) where it is unknown.
+    pub values: Vec<f64>,
+    /// Ticks, in which the noise floor is, by the unit.
+    pub ticks_by_unit: f64,
+    /// Whether values fall from that of a quiet stretch: less may mean more pressure.
+    pub falls: bool,
+}
+
+/// The pictures of a source as they are given.
+#[derive(Debug, Clone)]
+pub struct PictureSource<'a> {
+    /// Where they are in the array.
+    pub place: PicturePlace,
+    /// Their times, us, ascending.
+    pub t: Vec<i64>,
+    /// Their values row by row, picture after picture; NaN where one is missing.
+    pub values: &'a [f32],
+    /// What they are above.
+    pub rest: PictureRest,
+}
+
+impl PictureSource<'_> {
+    /// The rest of the cells in steps, each from the picture of this number on: once where it is fixed, else where it moved.
+    #[allow(clippy::cast_possible_truncation)]
+    fn rests(&self, steps: Steps) -> Vec<(usize, Vec<u16>)> {
+        let PictureRest { source, values, ticks_by_unit, falls } = &self.rest;
+        let fixed = |values: &[f64]| values.iter().map(|&value| steps.of_rest(value)).collect();
+        match source {
+            RestSource::None => return vec![(0, vec![steps.zero; values.len()])],
+            RestSource::Given => return vec![(0, fixed(values))],
+            RestSource::Quiet => {}
+        }
+        let begins: Vec<f64> = values.iter().map(|rest| rest * ticks_by_unit).collect();
+        let mut tracked = TrackedRest::new(self.place.columns.into(), NOISE_FLOOR, begins);
+        if *falls {
+            tracked = tracked.falling();
+        }
+        let mut stored: Vec<Option<f64>> = vec![];
+        let mut rests: Vec<(usize, Vec<u16>)> = vec![];
+        for (k, (&t, picture)) in self.t.iter().zip(self.values.chunks_exact(values.len())).enumerate() {
+            tracked.take(t, picture.iter().map(|value| value * *ticks_by_unit as f32));
+            let moved = |(now, then): (Option<f64>, &Option<f64>)| match (now, then) {
+                (Some(now), Some(then)) => (now - then).abs() > REST_MOVED,
+                (now, then) => now.is_some() != then.is_some(),
+            };
+            if stored.is_empty() || tracked.rests().zip(&stored).any(moved) {
+                stored = tracked.rests().collect();
+                let of = |rest: &Option<f64>| rest.map_or(UNKNOWN, |rest| steps.of_rest(rest / ticks_by_unit));
+                rests.push((k, stored.iter().map(of).collect()));
+            }
+        }
+        if rests.is_empty() { vec![(0, fixed(values))] } else { rests }
+    }
+
+    /// The noise floor in steps: values further above a rest that was found count as loaded.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn floor(&self, steps: Steps) -> u16 {
+        match self.rest.source {
+            RestSource::Quiet => (touched_from(0.0, NOISE_FLOOR) / self.rest.ticks_by_unit / steps.size) as u16,
+            RestSource::Given | RestSource::None => 0,
+        }
+    }
+}
+
 /// The pictures of a source, in steps.
 #[derive(Debug, Clone)]
 struct Source {
@@ -47,9 +124,29 @@ struct Source {
     t: Vec<i64>,
     /// Row by row, picture after picture; [`UNKNOWN`] where a value is missing.
     ticks: Vec<u16>,
+    rest_source: RestSource,
+    falls: bool,
+    /// The rest of its cells, each from the picture of this number on; there is one at least.
+    rests: Vec<(usize, Vec<u16>)>,
 }
 
 impl Source {
+    fn new(from: PictureSource<'_>, steps: Steps) -> Self {
+        let (ticks, rests) = (steps.ticks(from.values), from.rests(steps));
+        let PictureRest { source: rest_source, falls, .. } = from.rest;
+        Self { place: from.place, t: from.t, ticks, rest_source, falls, rests }
+    }
+
+    /// The rest of its cells at a picture; before the first one, that of the first.
+    fn rest(&self, k: usize) -> &[u16] {
+        &self.rests[self.rests.partition_point(|&(from, _)| from <= k).max(1) - 1].1
+    }
+
+    /// Whether another rest holds from this picture on.
+    fn rest_moves(&self, k: usize) -> bool {
+        k > 0 && self.rests.binary_search_by_key(&k, |&(from, _)| from).is_ok()
+    }
+
     fn cells(&self) -> usize {
         usize::from(self.place.rows) * usize::from(self.place.columns)
     }
@@ -103,6 +200,12 @@ impl Steps {
         };
         values.iter().map(tick).collect()
     }
+
+    /// A rest, which no value is above where it is not finite.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn of_rest(self, value: f64) -> u16 {
+        if value.is_finite() { (value / self.size + f64::from(self.zero)).round() as u16 } else { UNKNOWN }
+    }
 }
 
 /// What a file of pictures states beside them.
@@ -114,6 +217,8 @@ pub struct PictureFile {
     pub picture_us: Option<i64>,
     /// Notes, markers, detections.
     pub remarks: Remarks,
+    /// The source that each note is of; "" where it is of all of them.
+    pub note_sources: Vec<String>,
     /// One line that states what was lost.
     pub verdict: String,
     /// The trial of its file that is shown, and all of them, where there are several.
@@ -135,6 +240,11 @@ pub struct PictureIndex {
     pub zero: u16,
     /// Number of pictures.
     pub pictures: u64,
+    /// Steps above rest that count as none: of several sources with a rest that was found, the most.
+    pub floor: u16,
+    /// The force that a step of the sums is, N; `None` where they are sums of the values.
+    pub newtons: Option<f64>,
+    weights: Weights,
     array: Array,
     sources: Vec<Source>,
     time_columns: Option<TimeColumns>,
@@ -145,20 +255,23 @@ pub struct PictureIndex {
 type Cursor = Vec<usize>;
 
 impl PictureIndex {
-    /// Indexes pictures: for each source its place in `array`, the times (us, ascending) and the values of its pictures.
+    /// Indexes pictures of sources that have places in `array`.
     #[must_use]
-    pub fn new(array: Array, file: PictureFile, sources: Vec<(PicturePlace, Vec<i64>, &[f32])>) -> Self {
-        let steps = Steps::of(sources.iter().map(|(_, _, values)| *values), array.len());
-        let source =
-            |(place, t, values): (PicturePlace, Vec<i64>, &[f32])| Source { place, t, ticks: steps.ticks(values) };
-        let sources: Vec<Source> = sources.into_iter().map(source).collect();
+    pub fn new(array: Array, file: PictureFile, sources: Vec<PictureSource<'_>>) -> Self {
+        let steps = Steps::of(sources.iter().map(|source| source.values), array.len());
+        let floor = sources.iter().map(|source| source.floor(steps)).max().unwrap_or(0);
+        let sources: Vec<Source> = sources.into_iter().map(|source| Source::new(source, steps)).collect();
         let first = sources.iter().filter_map(|source| source.t.first()).min();
         let last = sources.iter().filter_map(|source| source.t.last()).max();
+        let (weights, newtons) = Weights::of(&array, &file.unit);
         let mut index = Self {
             file,
             step: steps.size,
             zero: steps.zero,
             pictures: sources.iter().map(|source| source.t.len() as u64).sum(),
+            floor,
+            newtons: newtons.map(|newtons| newtons * steps.size),
+            weights,
             range: first.copied().zip(last.copied()),
             array,
             sources,
@@ -168,9 +281,15 @@ impl PictureIndex {
         index
     }
 
-    /// The places of its sources.
-    pub fn places(&self) -> impl Iterator<Item = &PicturePlace> {
-        self.sources.iter().map(|source| &source.place)
+    /// The places of its sources, where the rest of each comes from, and whether its values fall from it.
+    pub fn places(&self) -> impl Iterator<Item = (&PicturePlace, RestSource, bool)> {
+        self.sources.iter().map(|source| (&source.place, source.rest_source, source.falls))
+    }
+
+    /// Time of the last picture up to a time, us.
+    #[must_use]
+    pub fn picture_until(&self, t: i64) -> Option<i64> {
+        self.sources.iter().filter_map(|source| source.t[..source.until(t)].last().copied()).max()
     }
 
     /// The source and the number of the next picture, with its time.
@@ -178,6 +297,16 @@ impl PictureIndex {
         let ahead = self.sources.iter().zip(cursor).enumerate();
         let ahead = ahead.filter_map(|(source, (of, &k))| of.t.get(k).map(|&t| (source, k, t)));
         ahead.min_by_key(|&(_, _, t)| t)
+    }
+
+    /// Mean time from one picture of a source to the next, us; 0 where there is one alone.
+    #[must_use]
+    pub fn picture_us(&self) -> i64 {
+        let mean = |source: &Source| {
+            let (first, last) = source.t.first().zip(source.t.last())?;
+            Some((last - first) / i64::try_from(source.t.len()).ok()?.saturating_sub(1).max(1))
+        };
+        self.sources.iter().filter_map(mean).max().unwrap_or(0)
     }
 
     /// Start and width of a bin of the overview, us, and the number of bins.
@@ -191,18 +320,47 @@ impl PictureIndex {
     /// Computes the curves of the whole recording.
     fn measure(&mut self) {
         let Some((first, _)) = self.range else { return };
-        let mut columns = TimeColumns::new(self.array.rows.into(), TIME_COLUMN_BYTES);
+        let mut columns = TimeColumns::new(&self.array, TIME_COLUMN_BYTES);
+        let mut channels = vec![0; columns.channel_count()];
         let mut cursor = vec![0; self.sources.len()];
         let mut loads = vec![Load::default(); self.sources.len()];
+        let at = Coordinates::new(&self.array);
         while let Some((source, k, t)) = self.next(&cursor) {
             cursor[source] += 1;
-            loads[source] = Load::of(&self.sources[source], k, self.zero);
+            loads[source] = self.load(&self.sources[source], k, &at);
             let column = column_of(t, COLUMN_US);
             columns.extend_to(column);
-            columns.set_curve(column, loads.iter().fold(Load::default(), Load::plus).curve());
+            let load = loads.iter().fold(Load::default(), Load::plus);
+            columns.set_curve(column, load.curve(&at, &self.weights));
+            if !channels.is_empty() {
+                self.above(&self.sources[source], k).for_each(|(taxel, above)| channels[taxel] = above);
+                columns.set_channels(column, &channels);
+            }
         }
         let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
         self.time_columns = whole.then_some(columns);
+    }
+
+    /// The taxels of a source's picture, each with its steps above rest.
+    fn above<'a>(&'a self, source: &'a Source, k: usize) -> impl Iterator<Item = (usize, u16)> + 'a {
+        let values = source.picture(k).iter().zip(source.rest(k));
+        let above = move |(&ticks, &rest): (&u16, &u16)| above_noise(ticks, rest, self.floor);
+        source.taxels(self.array.columns).zip(values.map(above))
+    }
+
+    /// The load of a source's picture.
+    fn load(&self, source: &Source, k: usize, at: &Coordinates) -> Load {
+        let mut load = Load::default();
+        for (taxel, above) in self.above(source, k) {
+            let above = u64::from(above);
+            let (x, y) = at.get(taxel);
+            load.sum += above;
+            load.weighted += self.weights.weighed(taxel, above);
+            load.sum_x += above * x;
+            load.sum_y += above * y;
+            load.area += u32::from(above > 0);
+        }
+        load
     }
 }
 
@@ -210,45 +368,29 @@ impl PictureIndex {
 #[derive(Debug, Clone, Copy, Default)]
 struct Load {
     sum: u64,
+    weighted: u64,
     sum_x: u64,
     sum_y: u64,
     area: u32,
 }
 
 impl Load {
-    fn of(source: &Source, k: usize, zero: u16) -> Self {
-        let (mut all, columns) = (Self::default(), usize::from(source.place.columns));
-        for (y, row) in (0..).zip(source.picture(k).chunks_exact(columns)) {
-            let (mut sum, mut moment) = (0_u64, 0_u64);
-            for (x, &ticks) in (0..).zip(row) {
-                let above = if ticks == UNKNOWN { 0 } else { u64::from(ticks.saturating_sub(zero)) };
-                sum += above;
-                moment += above * x;
-                all.area += u32::from(above > 0);
-            }
-            all.sum += sum;
-            all.sum_x += moment + sum * u64::from(source.place.left);
-            all.sum_y += sum * y;
-        }
-        all
-    }
-
     fn plus(self, other: &Self) -> Self {
         Self {
             sum: self.sum + other.sum,
+            weighted: self.weighted + other.weighted,
             sum_x: self.sum_x + other.sum_x,
             sum_y: self.sum_y + other.sum_y,
             area: self.area + other.area,
         }
     }
 
-    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
-    fn curve(self) -> Curve {
+    fn curve(self, at: &Coordinates, weights: &Weights) -> Curve {
         if self.sum == 0 {
             return NOTHING;
         }
-        let (x, y) = (self.sum_x as f64 / self.sum as f64, self.sum_y as f64 / self.sum as f64);
-        Curve { sum: self.sum.min(u32::MAX.into()) as u32, area: self.area, x: x as f32, y: y as f32 }
+        let (x, y) = at.centre(self.sum, self.sum_x, self.sum_y);
+        Curve { sum: weights.sum(self.sum, self.weighted), area: self.area, x, y }
     }
 }
 
@@ -256,12 +398,18 @@ struct PictureChanges {
     index: Arc<PictureIndex>,
     cursor: Cursor,
     held: Vec<u16>,
+    rest: Vec<u16>,
+    /// Whether the rest has changed with the last picture.
+    rest_moved: bool,
 }
 
 impl ChangeReader for PictureChanges {
     fn read(&mut self, out: &mut Vec<Change>) -> Result<Read> {
+        if std::mem::take(&mut self.rest_moved) {
+            return Ok(Read::Rest(self.rest.clone()));
+        }
         let begun = out.len();
-        while out.len() - begun < AT_ONCE {
+        while out.len() - begun < AT_ONCE && !self.rest_moved {
             let Some((number, k, t)) = self.index.next(&self.cursor) else { break };
             self.cursor[number] += 1;
             let (source, before) = (&self.index.sources[number], out.len());
@@ -284,8 +432,71 @@ impl ChangeReader for PictureChanges {
                     Change { t, taxel: taxel as u32, ticks, up: true, repaired: false }
                 }));
             }
+            if source.rest_moves(k) {
+                self.rest_moved = true;
+                source
+                    .taxels(self.index.array.columns)
+                    .zip(source.rest(k))
+                    .for_each(|(of, &rest)| self.rest[of] = rest);
+            }
         }
         Ok(if out.len() == begun { Read::End } else { Read::Changes })
+    }
+}
+
+impl Pictures for PictureIndex {
+    fn array(&self) -> &Array {
+        &self.array
+    }
+
+    fn numbered(&self) -> bool {
+        self.file.picture_us.is_some()
+    }
+
+    fn rest_source(&self) -> RestSource {
+        let mut all = self.sources.iter().map(|source| source.rest_source);
+        let first = all.next().unwrap_or(RestSource::None);
+        if all.all(|one| one == first) { first } else { RestSource::None }
+    }
+
+    fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    fn sensors(&self) -> Vec<Array> {
+        let sensor = |source: &Source| {
+            let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
+            let of = |all: &[f64]| taxels.iter().map(|&taxel| all[taxel]).collect::<Vec<f64>>();
+            let place = &source.place;
+            Array {
+                rows: place.rows,
+                columns: place.columns,
+                pitch_mm: self.array.pitch_mm,
+                name: place.name.clone(),
+                exists: self.array.exists.as_ref().map(|exists| taxels.iter().map(|&taxel| exists[taxel]).collect()),
+                places: self.array.places.as_ref().map(|places| Places {
+                    x: of(&places.x),
+                    y: of(&places.y),
+                    area: places.area.as_deref().map(of),
+                    unit: places.unit,
+                }),
+            }
+        };
+        self.sources.iter().map(sensor).collect()
+    }
+
+    fn until(&self, source: usize, t: i64) -> usize {
+        self.sources[source].until(t)
+    }
+
+    #[allow(clippy::cast_possible_truncation)]
+    fn picture(&self, source: usize, k: usize) -> Option<(i64, Vec<f32>)> {
+        let of = &self.sources[source];
+        let value = |&ticks: &u16| match ticks {
+            UNKNOWN => f32::NAN,
+            ticks => ((f64::from(ticks) - f64::from(self.zero)) * self.step) as f32,
+        };
+        of.t.get(k).map(|&t| (t, of.picture(k).iter().map(value).collect()))
     }
 }
 
@@ -295,11 +506,11 @@ impl KeyframeIndex for Arc<PictureIndex> {
     }
 
     fn noise_floor(&self) -> u16 {
-        0
+        self.floor
     }
 
-    fn holds_pictures(&self) -> bool {
-        true
+    fn pictures(&self) -> Option<Arc<dyn Pictures>> {
+        Some(Arc::clone(self) as Arc<dyn Pictures>)
     }
 
     fn range(&self) -> Option<(i64, i64)> {
@@ -307,19 +518,24 @@ impl KeyframeIndex for Arc<PictureIndex> {
     }
 
     fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
-        let mut held = vec![UNKNOWN; self.array.len()];
+        let (mut held, mut rest) = (vec![UNKNOWN; self.array.len()], vec![UNKNOWN; self.array.len()]);
         let cursor: Cursor = self.sources.iter().map(|source| source.until(t)).collect();
         for (source, &next) in self.sources.iter().zip(&cursor).filter(|(_, next)| **next > 0) {
             source.taxels(self.array.columns).zip(source.picture(next - 1)).for_each(|(k, &ticks)| held[k] = ticks);
+        }
+        for (source, &next) in self.sources.iter().zip(&cursor) {
+            let of_last = source.rest(next.saturating_sub(1));
+            source.taxels(self.array.columns).zip(of_last).for_each(|(k, &ticks)| rest[k] = ticks);
         }
         let keyframe = Keyframe {
             latest: self.keyframe_before(t.saturating_add(1)),
             events: cursor.iter().map(|&next| next as u64).sum(),
             held: held.clone(),
-            rest: vec![self.zero; self.array.len()],
+            rest: rest.clone(),
             tracked: None,
         };
-        Ok((keyframe, Box::new(PictureChanges { index: Arc::clone(self), cursor, held })))
+        let changes = PictureChanges { index: Arc::clone(self), cursor, held, rest, rest_moved: false };
+        Ok((keyframe, Box::new(changes)))
     }
 
     fn keyframe_before(&self, t: i64) -> Option<i64> {
@@ -349,9 +565,16 @@ mod tests {
 
     fn index(left: &(Vec<i64>, Vec<f32>), right: &(Vec<i64>, Vec<f32>)) -> Arc<PictureIndex> {
         let array = Array::new(2, 7, 1.0, "feet").unwrap();
-        let sources =
-            vec![(place("left", 0), left.0.clone(), &*left.1), (place("right", 4), right.0.clone(), &*right.1)];
-        Arc::new(PictureIndex::new(array, PictureFile::default(), sources))
+        let rest = PictureRest { source: RestSource::None, values: vec![0.0; 6], ticks_by_unit: 1.0, falls: false };
+        let source = |place, (t, values): &'_ (Vec<i64>, Vec<f32>)| (place, t.clone(), values.clone());
+        let all = [source(place("left", 0), left), source(place("right", 4), right)];
+        let sources = all.iter().map(|(place, t, values)| PictureSource {
+            place: place.clone(),
+            t: t.clone(),
+            values,
+            rest: rest.clone(),
+        });
+        Arc::new(PictureIndex::new(array, PictureFile::default(), sources.collect()))
     }
 
     fn drawn(random: &mut StdRng, fractions: bool) -> (Vec<i64>, Vec<f32>) {

@@ -17,6 +17,7 @@ use super::{Activity, ChangeReader, KeyframeIndex, Read};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
+use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::Change;
 use taxel_live::recording::{Ending, Header, NOTHING_LOST, Place, Reader, Remarks, Topic, begin_with};
 use taxel_live::{Error, Result};
@@ -74,6 +75,8 @@ pub struct RecordingIndex {
     pub activity: Activity,
     /// Notes, markers, detections, registers.
     pub remarks: Remarks,
+    /// The drift and the delays that its datagrams' arrivals show; `None` of raw bytes.
+    pub pace: Option<Pace>,
     /// One line that states what was lost.
     pub verdict: String,
     /// Whether the end of the file is missing.
@@ -124,6 +127,7 @@ impl RecordingIndex {
             event_rate: (0, COLUMN_US, vec![]),
             activity: Activity::new(&header_array),
             remarks: Remarks::default(),
+            pace: None,
             verdict,
             unfinished,
         };
@@ -156,28 +160,38 @@ impl RecordingIndex {
         }
     }
 
-    /// Decodes a block, with the pending events after the last one. Returns the number of bytes decoded.
+    /// Decodes a block, with the pending events after the last one, and notes what else it holds. Returns the number of
+    /// bytes decoded.
     fn block(
         &self,
         k: usize,
         place: &mut Place,
         decoding: &mut Decoding,
         events: &mut Events,
-        mut remarks: Option<&mut Remarks>,
+        mut beside: Option<(&mut Remarks, &mut BoardClock)>,
     ) -> Result<u64> {
         let mut bytes = 0;
+        // A frame is shorter than a second.
+        #[allow(clippy::cast_possible_truncation)]
+        let frame_us = self.header.registers.map_or(0, |registers| registers.frame_us() as i64);
         match (&self.source, &mut *decoding) {
             (Source::Mcap(reader), Decoding::Datagrams(decoder)) => {
                 reader.block(k, place, |message| {
                     if message.topic == Topic::Datagrams {
-                        decoder.push(message.data, Some(message.at_ns / 1000), events);
+                        let before = events.len();
+                        let info = decoder.push(message.data, Some(message.at_ns / 1000), events);
+                        let last = events.t[before..].last().copied();
+                        let left = leaves(&info, last, message.data.len(), frame_us);
+                        if let (Some((_, clock)), Some(left)) = (&mut beside, left) {
+                            clock.note(left, message.at_ns);
+                        }
                         bytes += message.data.len() as u64;
                     } else if message.topic == Topic::Held {
                         begin_with(decoder, message.data);
                     } else if message.topic == Topic::Pressure {
                         return Ok(());
                     }
-                    if let Some(remarks) = &mut remarks {
+                    if let Some((remarks, _)) = &mut beside {
                         remarks.add(&message);
                     }
                     Ok(())
@@ -225,7 +239,7 @@ impl RecordingIndex {
     fn build(&mut self) -> Result<()> {
         let taxels = self.header.array.len();
         let mut state = ArrayState::new(
-            self.header.array.columns,
+            &self.header.array,
             self.noise_floor(),
             &Keyframe::blank(taxels),
             COLUMN_US,
@@ -267,6 +281,7 @@ impl RecordingIndex {
         self.event_rate = contents.event_rate.into_bins();
         self.activity = contents.activity;
         self.remarks = contents.remarks;
+        self.pace = contents.clock.pace();
         state.update_curve();
         let columns = state.time_columns().clone();
         let whole =
@@ -289,6 +304,7 @@ impl RecordingIndex {
             event_rate: EventRate::default(),
             activity: Activity::new(&self.header.array),
             remarks: Remarks::default(),
+            clock: BoardClock::default(),
         };
         for k in 0..self.blocks() {
             let mut piece = Decoded { key: None, thin: false, held: None, changes: vec![] };
@@ -306,7 +322,7 @@ impl RecordingIndex {
                 &mut place,
                 &mut decoding,
                 &mut events,
-                Some(&mut contents.remarks),
+                Some((&mut contents.remarks, &mut contents.clock)),
             )?);
             if !held_before {
                 piece.held = contents.remarks.held.clone().filter(|held| held.len() == taxels);
@@ -347,6 +363,7 @@ struct Contents {
     event_rate: EventRate,
     activity: Activity,
     remarks: Remarks,
+    clock: BoardClock,
 }
 
 struct RecordingChanges {

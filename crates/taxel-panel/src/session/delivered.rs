@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::time_columns::LATE_US;
 
-/// Minimum time from one rest to the next.
+/// Minimum time from one rest to the next, while the view moves.
 const REST_EVERY: Duration = Duration::from_millis(500);
 
 /// See the module.
@@ -43,10 +43,16 @@ impl Delivered {
         if self.restart { i64::MIN } else { self.from }
     }
 
-    /// Whether the next picture contains the rest, of which this is the number.
-    pub(super) fn needs_rest(&self, rests: u64) -> bool {
-        let changed = || self.rest.is_none_or(|(known, at)| known != rests && at.elapsed() >= REST_EVERY);
-        self.restart || changed()
+    /// The rest that the client has is of another state, whose numbers say nothing of this one's.
+    pub(super) fn invalidate_rest(&mut self) {
+        self.rest = None;
+    }
+
+    /// Whether the next picture contains the rest, of which this is the number. While the view `moves` another picture follows;
+    /// one that stands may be the last, so it has its own rest.
+    pub(super) fn needs_rest(&self, rests: u64, moves: bool) -> bool {
+        let due = |at: Instant| !moves || at.elapsed() >= REST_EVERY;
+        self.restart || self.rest.is_none_or(|(known, at)| known != rests && due(at))
     }
 
     /// Notes a picture up to column `last`, of columns of `column_us`; `rests` where it contains the rest.

@@ -5,12 +5,13 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 use taxel_core::encode::Encoder;
-use taxel_core::problem;
 use taxel_live::locked::lock;
 
 use super::delivered::Delivered;
 use super::following::Following;
 use super::playback::Playback;
+use crate::encoded_spikes::EncodedSpikes;
+use crate::folder::size;
 use crate::hub::Hub;
 use crate::keyframe_index::KeyframeIndex;
 use crate::live_source::LiveSource;
@@ -216,7 +217,7 @@ impl Viewport {
             watched: self.options.watched,
             column_us: self.options.column_us,
         };
-        let needs_rest = |rests: u64| self.delivered.needs_rest(rests);
+        let needs_rest = |rests: u64| self.delivered.needs_rest(rests, moves != 0);
         let (bytes, last, rests) = match &mut self.position {
             Position::Following => self.following.picture(self.live.as_ref()?, about, needs_rest),
             Position::At(place) => {
@@ -310,6 +311,7 @@ impl Viewport {
             self.restart();
         }
         self.position = Position::At(Some(Box::new(place?)));
+        self.delivered.invalidate_rest();
         self.dirty = true;
         self.following.stop_encoding();
         Ok(())
@@ -385,11 +387,12 @@ impl Viewport {
     pub(super) async fn encode(&mut self, request: &Request<'_>) -> Answer {
         self.options.encoder = None;
         if let Some(wanted) = request.get("encoder").filter(|value| !value.is_null()) {
+            let index = self.index()?;
+            let encoder = Encoder::from_json(&wanted.to_string()).map_err(taxel_live::Error::from);
+            let encoder = encoder.and_then(|encoder| encodes(&index, &encoder).map(|()| encoder));
             let refused =
-                |error: taxel_core::Error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) };
-            let encoder = Encoder::from_json(&wanted.to_string()).map_err(refused)?;
-            encodes(&self.index()?, &encoder).map_err(refused)?;
-            self.options.encoder = Some(encoder);
+                |error: taxel_live::Error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) };
+            self.options.encoder = Some(encoder.map_err(refused)?);
         }
         self.reopen().await
     }
@@ -498,10 +501,11 @@ impl Viewport {
         t: Option<i64>,
     ) -> Answer<Vec<Value>> {
         let begun = Instant::now();
-        let refused = |error: taxel_live::Error| Refusal::of("name", error);
+        // The reason names the file.
+        let refused = |error: taxel_live::Error| Refusal { reason: error.to_string(), field: Some("name".to_owned()) };
         let indexed = opening::index(hub, &name, trial.as_deref()).await.map_err(refused)?;
         let labels = read_labels(hub, &name, indexed.us()).await;
-        let bytes = std::fs::metadata(hub.folder.file(&name).map_err(refused)?).map_or(0, |about| about.len());
+        let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;
         let mut answer = vec![indexed.opened(&name, bytes, begun)];
         let index = indexed.index();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
@@ -520,12 +524,10 @@ impl Viewport {
     }
 }
 
-/// Whether an encoder encodes what an index holds.
-fn encodes(index: &Arc<dyn KeyframeIndex>, encoder: &Encoder) -> taxel_core::Result<()> {
-    if index.holds_pictures() {
-        return Err(problem!(
-            "the panel shows the spikes of events, and this recording holds pictures: see taxel encode"
-        ));
+/// Refuses an encoder that does not encode what an index holds.
+fn encodes(index: &Arc<dyn KeyframeIndex>, encoder: &Encoder) -> taxel_live::Result<()> {
+    match index.pictures() {
+        Some(pictures) => EncodedSpikes::of_pictures(encoder, &pictures, COLUMN_US, None)?.check(),
+        None => Ok(encoder.stream(index.array()).map(drop)?),
     }
-    encoder.stream(index.array()).map(drop)
 }

@@ -1,9 +1,11 @@
 """Recipes by name, one data file each: where none is named, `taxel train` chooses the one that fits the recording.
 
-A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", or units of frames), the
-encoder, or several as `encoders` by name, whether labels are moved to what the sensor felt (`align`), what all neurons
-share (`learner`), what is a neuron's own (`neurons`), and the parameters of any `other` label, or whose they are;
-without `other` it is for its neurons' labels alone. A new recipe is a new file in this folder.
+A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", units of frames, or
+"grids": frames of taxels with known neighbours, whose labels are all its own neurons' before what fits the unit, any
+others where nothing fits it), the encoder, or several as `encoders` by name, whether labels are moved to what the
+sensor felt (`align`), what all neurons share (`learner`), what is a neuron's own (`neurons`), which labels are `also`
+called otherwise, and the parameters of any `other` label, or whose they are; without `other` it is for its neurons'
+labels alone. A new recipe is a new file in this folder.
 """
 
 from __future__ import annotations
@@ -18,14 +20,17 @@ from typing import Any
 
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown, text
+from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["fitting", "for_labels", "names", "read"]
+__all__ = ["chosen", "fitting", "for_labels", "knows", "names", "read"]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
+#: Of more taxels than these a grid's kinds of touch are not learnt by `_ANY`, whose 22 trains a taxel take minutes.
+_MOST_CHANNELS = 32
 
 
 @cache
@@ -40,16 +45,57 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in Path(__file__).parent.glob("*.toml")))
 
 
-def fitting(source: Events | Frames) -> str:
-    """Return the name of the recipe that fits a recording, by what it holds (events, or the frames' unit).
+def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
+    """Return the name of the recipe that fits a recording, by what it holds, and its labels.
+
+    Parameters
+    ----------
+    source : Events or Frames
+    labels : sequence of str
+        What is to be learnt. Contact and lift of a grid have one recipe whatever the unit. All others have that of the
+        unit, and where there is none, that of grids if it is one of more than 32 taxels; but "foot_off" that of
+        channels.
 
     Examples
     --------
+    >>> grid = Frames([[[0.0, 0.0]] * 2], [0], unit="counts")
+    >>> fitting(grid, ["contact", "lift"]), fitting(grid, ["contact", "foot off"])
+    ('touch', 'gait_plate')
     >>> fitting(Frames([[[0.0]]], [0], unit="N")), fitting(Frames([[[0.0]]], [0], unit="V"))
     ('gait_insole', 'gait_channel')
+    >>> fitting(Frames([[[0.0] * 6] * 6], [0], unit="V"), ["soft", "hard"])
+    'touch'
     """
-    kind = source.unit if isinstance(source, Frames) else "events"
-    return next((name for name in names() if kind in read(name).get("fits", ())), _ANY)
+    return chosen(source, labels)[0]
+
+
+def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, str]:
+    """Return the name of the recipe that fits a recording and its labels, as `fitting`, and for what it is taken.
+
+    Examples
+    --------
+    >>> chosen(Frames([[[0.0] * 6] * 6], [0], unit="V"), ["soft", "hard"])
+    ('touch', 'a grid of 6 x 6 taxels')
+    """
+    every = {name: read(name) for name in names()}
+    of = {kind: name for name, values in every.items() for kind in values.get("fits", ())}
+    if not isinstance(source, Frames):
+        return (of["events"], "events of a board") if "events" in of else (_ANY, "no other fits events")
+    array, grids = source.array, of.get("grids")
+    if grids is None or not labels or array.taxels < 2 or not array._has_neighbours:
+        grids, what = None, counted(array.taxels, "channel" if array.is_channels else "taxel")
+    else:
+        what = f"a grid of {array.rows} x {array.columns} taxels"
+        others = [label for label in labels if _own(every[grids], label) is None]
+        if not others:
+            return grids, f"{' and '.join(labels)} on {what}"
+    if source.unit in of:
+        return of[source.unit], f"pictures in {source.unit}"
+    # Foot-off and the like are no kinds of touch.
+    steps = grids is not None and any(_own(values, label) for label in others for values in every.values())
+    if grids is not None and array.taxels > _MOST_CHANNELS and not steps:
+        return grids, what
+    return _ANY, f"{what} in {source.unit}"
 
 
 def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
@@ -87,8 +133,10 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
 def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     """Return a recipe's values with one neuron a label, if it is one that is chosen by the recording (`fits`).
 
-    "foot off", "Foot-off" and "foot_off" are one. Any other label than the recipe's own has the parameters that `other`
-    holds, or those of the neuron that it names. A recipe with neither `fits` nor `other` stays as it is.
+    "foot off", "Foot-off" and "foot_off" are one. A label in `also` has the parameters of the neuron that it names
+    there, any other label than the recipe's own those that `other` holds, or those of the neuron that it names. A
+    recipe with neither `fits` nor `other` stays as it is. A label whose last word alone is known, as "grasp_end", is
+    that neuron's too if no other label is: "soft_press" and "hard_press" are kinds.
 
     Raises
     ------
@@ -106,9 +154,12 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     other = values.get("other")
     if other is not None and not isinstance(other, Mapping):
         other = own[text("recipe: other", other, own)]
+    owns = {label: _own(values, text("label", label)) for label in labels}
+    last = {label: _own(values, _plain(label).rpartition("_")[2]) for label in labels}
     neurons = {}
     for label in labels:
-        neuron = own.get(label, own.get(_plain(text("label", label)), other))
+        alone = sum(last[label] in (owns[one], last[one]) for one in labels) == 1
+        neuron = own.get(label, own.get(owns[label] or (last[label] if alone else None), other))
         if neuron is None:
             raise ProblemError(
                 f"recipe: it is for {' and '.join(own)}, not for {shown(label)}: leave that label out, or choose "
@@ -116,6 +167,24 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
             )
         neurons[label] = dict(neuron)
     return {**values, "neurons": neurons}
+
+
+def knows(recipe: str, label: str) -> bool:
+    """Return whether a recipe has a neuron of its own for a label.
+
+    Examples
+    --------
+    >>> knows("touch", "Lift"), knows("touch", "foot_off")
+    (True, False)
+    """
+    return _own(read(recipe), text("label", label)) is not None
+
+
+def _own(values: Mapping[str, Any], label: str) -> str | None:
+    """Return the name of the recipe's own neuron for a label, or None."""
+    plain = _plain(label)
+    name = values.get("also", {}).get(plain, plain)
+    return name if name in values.get("neurons", {}) else None
 
 
 def _plain(label: str) -> str:

@@ -64,7 +64,7 @@ class Bag:
         found = [one for one in self.reader.connections if one.topic == topic]
         types = sorted({one.msgtype for one in found})
         if not found:
-            there = ", ".join(sorted({one.topic for one in self.reader.connections})) or "none"
+            there = ", ".join(sorted(self.topics())) or "none"
             raise FormatError(f"{self.path}: has no topic {topic}; its topics are {there}")
         if len(types) > 1:
             raise FormatError(f"{self.path}: topic {topic} has messages of several types ({', '.join(types)})")
@@ -77,6 +77,10 @@ class Bag:
         for one in found:
             self._check_digest(one)
         return found
+
+    def topics(self) -> set[str]:
+        """Return the names of all topics."""
+        return {one.topic for one in self.reader.connections}
 
     def undefined(self, name: str) -> str:
         """Return the name of a type that is not defined: this one, or one that it is made of; "" if none."""
@@ -117,22 +121,7 @@ class Bag:
 
 @contextmanager
 def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
-    """Open a bag.
-
-    Parameters
-    ----------
-    path : Path
-    types : Path, optional
-        A folder of .msg or .idl files, for types that the bag does not define.
-    ros : str, optional
-        A release of ROS, as "humble", whose types are used for those that neither defines.
-
-    Raises
-    ------
-    ImportError : rosbags is not installed
-    ProblemError : an unknown release, or a folder without definitions
-    FormatError : damaged, or of a kind that rosbags does not read
-    """
+    """Open a bag; parameters and errors are those of `taxel.formats.ros.topics`."""
     try:
         from rosbags import rosbag1, rosbag2  # noqa: PLC0415  an extra
     except ImportError:
@@ -146,7 +135,10 @@ def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
         raise
     # Damaged files also raise errors of rosbags' parts: of struct, of SQLite, of YAML, of zstd.
     except Exception as error:
-        raise FormatError(f"{path}: cannot be read as a ROS bag: {first_line(error)}") from None
+        why = first_line(error)
+        if "index" in why.lower() and path.suffix == ".bag":
+            why = "its index is missing or damaged, as of a recording that was cut off; rosbag reindex makes it anew"
+        raise FormatError(f"{path}: cannot be read as a ROS bag: {why}") from None
 
 
 def _store(connections: Sequence[Connection], types: Path | None, ros: str | None) -> Typestore:

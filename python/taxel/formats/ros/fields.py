@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from taxel._core import FormatError
 
-__all__ = ["IMAGE", "grid", "leaves", "values"]
+__all__ = ["IMAGE", "grid", "is_empty", "leaves", "values"]
 
 IMAGE = "sensor_msgs/msg/Image"
-#: Types whose numbers are no readings: times, and the bytes of compressed images and of points.
+#: Types whose numbers are no readings: times, shapes, and the bytes of compressed images and of points.
 _WITHOUT_READINGS = (
     "std_msgs/msg/Header",
+    "std_msgs/msg/MultiArrayLayout",
     "builtin_interfaces/msg/Time",
     "builtin_interfaces/msg/Duration",
     "sensor_msgs/msg/CompressedImage",
@@ -45,6 +46,11 @@ def leaves(message: Any, path: str = "", *, listed: bool = False) -> Iterator[tu
             yield from leaves(getattr(message, one.name), f"{path}.{one.name}".lstrip("."), listed=listed)
     elif listed and isinstance(message, int | float | np.number):
         yield path, values(message, "")
+
+
+def is_empty(found: Sequence[tuple[str, NDArray[Any]]]) -> bool:
+    """Return whether the arrays of a message (`leaves`) are all empty, as some publishers begin; false without any."""
+    return bool(found) and not any(numbers.size for _, numbers in found)
 
 
 def values(message: Any, path: str) -> NDArray[Any]:

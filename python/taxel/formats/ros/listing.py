@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from taxel._core import FormatError
 from taxel.formats.ros.bag import Bag, opened
-from taxel.formats.ros.fields import grid, leaves
+from taxel.formats.ros.fields import grid, is_empty, leaves
 
 __all__ = ["Topic", "topics"]
 
@@ -64,7 +66,7 @@ def topics(path: Path, types: Path | None = None, ros: str | None = None) -> lis
 
 
 def _of_topic(bag: Bag, topic: str) -> list[Topic]:
-    """Return the fields of a topic; all its messages are counted, and the first is decoded."""
+    """Return the fields of a topic by its first message, or by the first whose arrays are not empty; count all."""
     connections = [one for one in bag.reader.connections if one.topic == topic]
     kind = connections[0].msgtype
     undefined = bag.undefined(kind)
@@ -72,15 +74,17 @@ def _of_topic(bag: Bag, topic: str) -> list[Topic]:
         count = sum(one.msgcount for one in connections)
         return [Topic(topic, kind, "", (), "", count, None, f"no definition of {undefined}")]
     first: Any = None
+    found: list[tuple[str, NDArray[Any]]] = []
     times: list[int] = []
     for connection, at, data in bag.messages(connections):
-        if first is None:
+        # Some publishers send empty arrays before they have a reading.
+        if first is None or is_empty(found):
             first = bag.decoded(connection, data)
             try:
                 found = list(leaves(first))
             except FormatError as error:
                 return [Topic(topic, kind, "", (), "", sum(c.msgcount for c in connections), None, str(error))]
-            if not any(held.size > 1 for _, held in found):
+            if not any(held.size > 1 for _, held in found) and not is_empty(found):
                 return []
         times.append(at)
     if first is None:

@@ -16,7 +16,7 @@ from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats.checks import sensor
 from taxel.formats.ros.bag import Bag, opened
-from taxel.formats.ros.fields import grid, leaves, values
+from taxel.formats.ros.fields import grid, is_empty, leaves, values
 
 __all__ = ["Chosen", "Read", "read"]
 
@@ -59,6 +59,8 @@ class Read:
         How many of them have the bag's time, as their stamp is 0 or not after the ones before.
     left_out : int
         How many messages have another length.
+    unread : tuple of str
+        The other topics of the bag, those that were chosen aside.
     """
 
     topic: str
@@ -71,6 +73,7 @@ class Read:
     has_stamps: bool
     by_the_bag: int
     left_out: int
+    unread: tuple[str, ...]
 
 
 def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: str | None = None) -> list[Read]:
@@ -100,7 +103,8 @@ def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: s
             for one in held:
                 if one.topic == connection.topic:
                     one.add(message, at)
-        return [one.read(connections[one.topic][0].msgtype) for one in held]
+        unread = tuple(sorted(bag.topics() - connections.keys()))
+        return [one.read(connections[one.topic][0].msgtype, unread) for one in held]
 
 
 class _Held:
@@ -122,16 +126,17 @@ class _Held:
 
     def add(self, message: Any, at: int) -> None:
         """Add a message."""
-        if self.field is None:
+        if self.field is None and not is_empty(list(leaves(message))):
             self.field = self._only_field(message)
         try:
-            numbers = values(message, self.field)
+            # Before a first reading there may be no field to choose by; such messages are of another length.
+            numbers = np.empty(0) if self.field is None else values(message, self.field)
         except LookupError:
             raise FormatError(f"{self.place}: no field with numbers; there are {_there(message)}") from None
         except FormatError as error:
             raise FormatError(f"{self.place}: {error}") from None
-        if not self.values:
-            self.stated = grid(message, self.field)
+        if numbers.size and not any(one.size for one in self.values):
+            self.stated = None if self.field is None else grid(message, self.field)
             self.unit = "counts" if numbers.dtype.kind in "ui" else "as sent"
         if numbers.dtype.kind == "f" and (np.abs(numbers) > VALUE).any():
             raise FormatError(
@@ -147,11 +152,15 @@ class _Held:
 
     def _only_field(self, message: Any) -> str:
         there = [path for path, numbers in leaves(message) if numbers.size > 1]
+        if not there:
+            raise FormatError(
+                f"{self.place}: no field with more numbers than one; taxel info lists topics that have one"
+            )
         if len(there) != 1:
             raise FormatError(f"{self.place}: say which field (--field NAME, field=); there are {_there(message)}")
         return there[0]
 
-    def read(self, kind: str) -> Read:
+    def read(self, kind: str, unread: tuple[str, ...]) -> Read:
         """Return the pictures of the messages."""
         if not self.values:
             raise FormatError(f"{self.place}: holds no message")
@@ -183,6 +192,7 @@ class _Held:
             has_stamps,
             by_the_bag,
             int(np.count_nonzero(~fits)),
+            unread,
         )
 
     def _stated(self) -> Array:

@@ -15,7 +15,7 @@ def interruptible(work: Callable[[], T]) -> T:
     """Return what `work` returns, which runs in a thread of its own; raise what it raises.
 
     A signal is handled while the caller waits: after Ctrl-C the thread computes to its end, and its result is dropped.
-    The process does not wait for it.
+    The process waits for it before it exits, since SciPy's SuperLU frees memory in use by a thread that Python ends.
     """
     result: list[T] = []
     raised: list[BaseException] = []
@@ -29,7 +29,7 @@ def interruptible(work: Callable[[], T]) -> T:
         finally:
             done.set()
 
-    threading.Thread(target=run, name="taxel-fem", daemon=True).start()
+    threading.Thread(target=run, name="taxel-fem").start()
     done.wait()
     if raised:
         raise raised[0]

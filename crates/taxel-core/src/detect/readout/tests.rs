@@ -98,7 +98,7 @@ fn a_readout_refuses_neurons_that_were_trained_otherwise() {
 fn another_array_and_a_missing_tare_are_refused() {
     let array = Array::new(63, 64, 2.67, "other").unwrap();
     let said = readout().stream(&array, 192.0, None).err().unwrap().to_string();
-    assert!(said.starts_with("array other of 63 x 64 taxels: the readout was trained on thesis"), "{said}");
+    assert!(said.starts_with("an array of 63 x 64 taxels: the readout was trained on 64 x 64"), "{said}");
     let said = readout().stream(&Array::thesis(), 192.0, None).err().unwrap().to_string();
     assert!(said.contains("tare"), "{said}");
     // A readout without an array of its own accepts every array with the same number of trains.

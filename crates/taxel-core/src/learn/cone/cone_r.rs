@@ -6,8 +6,8 @@ use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::learn::engines::Start;
 use crate::learn::fit::{Engine, Fit, Left, Round, Status};
 use crate::learn::statement::{
-    Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Relaxed, Sides, Statement, bounds_of,
-    check_bounds, check_examples, check_silence, check_trains, end_of,
+    Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Proof, Relaxed, Row, Sides, Statement,
+    bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
 };
 use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
@@ -137,7 +137,7 @@ impl ConeR {
     }
 }
 
-/// The multipliers that prove a fit: the nonzero ones, by row (silent rows first, then targets).
+/// The multipliers from which a similar fit starts: the nonzero ones, by row (silent rows first, then targets).
 ///
 /// Each is a share of its row's weight in 6.14 (of twice that weight for a C of both sides): from 0 to 1 for a silent
 /// row; for a target from -1/2 to 1/2, from -1 to 0 if C counts only potentials below.
@@ -149,6 +149,18 @@ pub struct Shares {
     pub values: Vec<f64>,
 }
 
+/// The slopes of the tangents below the terms of 6.14 that prove the gap of a fit: the nonzero ones, 1/mV. Of CONE-X
+/// (6.11) the rows are hard, and their multipliers take the place of D and C.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct GapMultipliers {
+    /// Of D and C, or of hard rows.
+    pub rows: Vec<(Row, f64)>,
+    /// Of B, by pattern and target.
+    pub behind: Vec<((usize, usize), f64)>,
+    /// Of the l2 term, one per synapse, zeros included.
+    pub pull: Vec<f64>,
+}
+
 /// A fit of CONE-R.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConeRFit {
@@ -158,6 +170,8 @@ pub struct ConeRFit {
     pub rows: usize,
     /// The multipliers, from which a similar fit may start together with the weights.
     pub multipliers: Shares,
+    /// The multipliers that prove the gap.
+    pub proof: GapMultipliers,
     /// Targets, as (pattern, target), that no weights within the bounds bring to the threshold.
     pub unreachable: Vec<(usize, usize)>,
     /// Output spikes on the training patterns that follow a previous one within `tau` without a target in between.
@@ -357,6 +371,7 @@ impl ConeRProblem {
             multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
             unreachable: self.unreachable(&objective),
             refires: self.refires(&weights, pattern)?,
+            proof: self.named(found.proof),
             fit: Fit {
                 status: if found.gap <= parameters.tolerance { Status::Solved } else { Status::Stopped },
                 weights,
@@ -367,6 +382,24 @@ impl ConeRProblem {
                 engine: found.engine,
             },
         })
+    }
+
+    /// The nonzero multipliers of a proof, by the names of their rows.
+    fn named(&self, mut proof: Proof) -> GapMultipliers {
+        proof.divide(1.0, self.statement.unit);
+        let (silent, targets) = proof.multipliers.split_at(self.rows.silent.len());
+        let names = || self.rows.targets.names.iter().copied();
+        let silence = silent.iter().enumerate().filter(|row| *row.1 != 0.0).map(|(row, &multiplier)| {
+            let (pattern, t) = self.rows.silent.name(row);
+            (Row::Silence { pattern, t }, multiplier)
+        });
+        let targets = names().zip(targets).filter(|row| *row.1 != 0.0);
+        let targets = targets.map(|((pattern, target), &multiplier)| (Row::Target { pattern, target }, multiplier));
+        GapMultipliers {
+            rows: silence.chain(targets).collect(),
+            behind: names().zip(proof.behind).filter(|row| row.1 != 0.0).collect(),
+            pull: proof.pull,
+        }
     }
 
     fn start_from(&self, objective: &Objective, start: Option<(&[f64], Option<&Shares>)>) -> Result<Start> {

@@ -7,6 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::cone_r::GapMultipliers;
 use super::exact::{Best, Exact};
 use super::shortest::{End, Shortest};
 use crate::allowed::{Numbers, Range, ranges};
@@ -207,12 +208,14 @@ pub struct ConeXFit {
     /// The margin of the last problem solved: smaller than the default if the caller fixed none and no weights keep the
     /// default.
     pub asked: Margin,
-    /// Why a fit is stopped, or why the objective of a solved fit is not proven to within the tolerance.
+    /// Why a fit is stopped, or why the objective of a feasible one is not proven to within the tolerance.
     pub reason: Option<String>,
     /// The binding rows with their multipliers: a start for a similar problem.
     pub held: Vec<(Row, f64)>,
     /// The proof that no weights exist, if the fit is infeasible.
     pub certificate: Option<Certificate>,
+    /// The proof of the gap, if there are weights.
+    pub proof: Option<GapMultipliers>,
 }
 
 /// The problem that a set of examples states, ready to be solved.
@@ -363,6 +366,10 @@ impl ConeXProblem {
         if let Some(certificate) = &mut found.certificate {
             certificate.gap *= unit;
         }
+        if let Some(proof) = &mut found.proof {
+            let rows = proof.rows.iter_mut().map(|row| &mut row.1);
+            rows.chain(proof.behind.iter_mut().map(|row| &mut row.1)).chain(&mut proof.pull).for_each(|m| *m /= unit);
+        }
         Ok(found)
     }
 
@@ -379,6 +386,7 @@ impl ConeXProblem {
             fit: Fit { status: Status::Stopped, gap: f64::INFINITY, ..found.fit.clone() },
             reason: Some(reason),
             certificate: None,
+            proof: None,
             held: vec![],
             ..found.clone()
         }
@@ -393,8 +401,8 @@ impl Exact {
         }
         let Shortest { weights, held, rounds, end } = self.shortest(start, progress, stop)?;
         // The other terms are at least 0, so a bound on the l2 term bounds the objective.
-        let least = self.objective.of_square(self.bound_of_square(&held)?);
-        let best = Best { weights, least, held, engine: Engine::Native, rounds };
+        let (least, proof) = self.bound_of_length(&held)?;
+        let best = Best { weights, least, proof, held, engine: Engine::Native, rounds };
         Ok(match end {
             End::Infeasible(certificate) => self.refuted(certificate, rounds),
             End::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
@@ -415,7 +423,7 @@ impl Exact {
                 weights: vec![f64::NAN; self.statement.trains],
                 objective: none,
                 parts: Parts { l1: none, l2: none, B: none, C: none, D: none },
-                gap: 0.0,
+                gap: f64::NAN,
                 rounds,
                 engine: Engine::Native,
             },
@@ -425,12 +433,13 @@ impl Exact {
             reason: None,
             held: certificate.rows.clone(),
             certificate: Some(certificate),
+            proof: None,
         }
     }
 
     /// Evaluates the weights over all rows, whichever engine found them.
     fn report(&self, best: Best, cut_short: Option<&str>) -> Result<ConeXFit> {
-        let Best { mut weights, least, held, engine, rounds } = best;
+        let Best { mut weights, least, proof, held, engine, rounds } = best;
         let Bounds { lower, upper } = &self.objective.bounds;
         // Rounding can move a weight across its bound.
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {
@@ -443,7 +452,11 @@ impl Exact {
         let nothing = NOTHING * self.objective.b * lifts.sum::<f64>();
         let known = gap <= self.tolerance || objective - least <= nothing;
         let unmet = self.unmet(&weights)?;
-        let status = if unmet.is_none() { Status::Solved } else { Status::Stopped };
+        let status = match unmet {
+            None if known => Status::Solved,
+            None => Status::Feasible,
+            Some(_) => Status::Stopped,
+        };
         let open = || format!("the objective is only proven to lie within {gap:.1e} of its least value");
         let reason = match (cut_short, unmet.or_else(|| (!known).then(open))) {
             (Some(why), Some(what)) => Some(format!("{why}; {what}")),
@@ -458,6 +471,7 @@ impl Exact {
             violation,
             held,
             certificate: None,
+            proof: Some(proof),
         })
     }
 }

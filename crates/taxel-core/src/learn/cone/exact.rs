@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::cone_r::GapMultipliers;
 use crate::learn::fit::Engine;
 use crate::learn::statement::{
     Margin, Objective, Parts, Peak, Row, Silence, Stated, Statement, Targets, exceeds, largest,
@@ -37,8 +38,9 @@ pub(super) struct Exact {
 /// The best weights so far, with a lower bound on their objective.
 pub(super) struct Best {
     pub(super) weights: Vec<f64>,
-    /// A lower bound on the objective of any weights.
+    /// A lower bound on the objective of any weights, and the multipliers that prove it.
     pub(super) least: f64,
+    pub(super) proof: GapMultipliers,
     pub(super) held: Vec<(Row, f64)>,
     pub(super) engine: Engine,
     pub(super) rounds: usize,

@@ -4,8 +4,9 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use super::cone_r::GapMultipliers;
 use super::exact::{Best, Exact, MET, MOST_ROUNDS, Slopes};
-use crate::learn::engines::mixed::{self, Terms};
+use crate::learn::engines::mixed::{self, Proof, Terms};
 use crate::learn::engines::{HardRows, nearest};
 use crate::learn::fit::{Left, Round};
 use crate::learn::statement::{Bounds, Peak, Row, Stated, Targets, largest};
@@ -53,7 +54,9 @@ impl Exact {
             let tolerance = if near { NEAR } else { self.tolerance };
             let found =
                 mixed::minimise(&terms, &rows.hard(), &objective.bounds, size, going.as_ref(), tolerance, stop)?;
-            best.least = best.least.max(found.bound);
+            if found.bound > best.least {
+                (best.least, best.proof) = (found.bound, rows.named(found.proof));
+            }
             if found.stopped || best.rounds >= MOST_ROUNDS {
                 return Ok(best);
             }
@@ -108,6 +111,8 @@ struct Dense {
     limit: Vec<f64>,
     /// The names of the rows in `below`.
     names: Vec<Row>,
+    /// The target whose row was subtracted from a row of silence beside it, and the factor of the difference.
+    beside: Vec<Option<(usize, f64)>>,
     there: HashSet<(usize, u64)>,
     slopes: Slopes,
 }
@@ -122,6 +127,7 @@ impl Dense {
             below: vec![],
             limit: vec![],
             names: vec![],
+            beside: vec![],
             there: HashSet::new(),
             slopes,
         };
@@ -153,12 +159,14 @@ impl Dense {
             // them limits the slope instead and is as long as the other rows; it is equivalent because the target's row
             // holds with equality.
             let tau = problem.statement.neuron.tau;
-            if let Some((target, at)) = self.targets.next(pattern, t).filter(|(target, _)| target - t < BESIDE * tau) {
-                let steep = tau / (target - t);
+            let near = self.targets.next(pattern, t).filter(|&k| self.targets.times[k] - t < BESIDE * tau);
+            let beside = near.map(|k| (k, tau / (self.targets.times[k] - t)));
+            if let Some((k, steep)) = beside {
+                let at = self.targets.row(k);
                 coefficients.iter_mut().zip(at.at).for_each(|(c, at)| *c = steep * (*c - at));
                 limit = steep * (limit - at.threshold);
             }
-            self.push(row, &coefficients, limit);
+            self.push(row, &coefficients, limit, beside);
         }
         Ok(())
     }
@@ -166,12 +174,13 @@ impl Dense {
     fn add_slope(&mut self, k: usize) {
         let (row, stated) = self.slopes.0[k].clone();
         if !self.names.contains(&row) {
-            self.push(row, &stated.coefficients, stated.limit);
+            self.push(row, &stated.coefficients, stated.limit, None);
         }
     }
 
-    fn push(&mut self, row: Row, coefficients: &[f64], limit: f64) {
+    fn push(&mut self, row: Row, coefficients: &[f64], limit: f64, beside: Option<(usize, f64)>) {
         self.names.push(row);
+        self.beside.push(beside);
         self.below.extend_from_slice(coefficients);
         self.limit.push(limit);
     }
@@ -199,10 +208,31 @@ impl Dense {
         self.below = (0..keep.len()).filter(kept).flat_map(|k| self.below[k * n..(k + 1) * n].to_vec()).collect();
         self.limit = (0..keep.len()).filter(kept).map(|k| self.limit[k]).collect();
         self.names = (0..keep.len()).filter(kept).map(|k| self.names[k]).collect();
+        self.beside = (0..keep.len()).filter(kept).map(|k| self.beside[k]).collect();
         let silent =
             |row: &Row| if let Row::Silence { pattern, t } = row { Some((*pattern, t.to_bits())) } else { None };
         self.there = self.names.iter().filter_map(silent).collect();
         keep
+    }
+
+    /// The nonzero multipliers of a proof, by the names of their rows; those of a difference go to both of its rows.
+    fn named(&self, proof: Proof) -> GapMultipliers {
+        let Proof { mut equality, inequality, behind, pull } = proof;
+        let mut rows = vec![];
+        for ((&row, beside), z) in self.names.iter().zip(&self.beside).zip(inequality) {
+            let (target, steep) = beside.map_or((None, 1.0), |(k, steep)| (Some(k), steep));
+            rows.push((row, steep * z));
+            if let Some(k) = target {
+                equality[k] -= steep * z;
+            }
+        }
+        let names = || self.targets.names.iter().copied();
+        let targets = names().zip(equality).map(|((pattern, target), y)| (Row::Target { pattern, target }, y));
+        GapMultipliers {
+            rows: rows.into_iter().chain(targets).filter(|(_, multiplier)| *multiplier != 0.0).collect(),
+            behind: names().zip(behind).filter(|(_, multiplier)| *multiplier != 0.0).collect(),
+            pull,
+        }
     }
 
     /// The largest violation of any row of the working set.

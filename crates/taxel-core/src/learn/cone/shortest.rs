@@ -2,10 +2,12 @@
 
 use std::collections::HashSet;
 
+use super::cone_r::GapMultipliers;
 use super::exact::{Exact, MOST_ROUNDS, Slopes};
 use crate::learn::engines::{DualActiveSet, Multipliers, RowId, Verdict};
 use crate::learn::fit::{Left, Round};
-use crate::learn::statement::{Certificate, Peak, Row, Statement};
+use crate::learn::statement::{Bounds, Certificate, Norm, Peak, Row, Statement};
+use crate::vectors::dot;
 use crate::{Result, Stop, problem};
 
 /// Cuts demand the full margin, but only violations of this share of it are cut: a cut then also settles the instants
@@ -122,8 +124,9 @@ impl Exact {
         Certificate::check(&self.statement, &self.objective.bounds, named(&targets, &others, &ray.multipliers))
     }
 
-    /// A lower bound on `|w|^2` by any multipliers: the minimum of the Lagrangian within the bounds.
-    pub(super) fn bound_of_square(&self, held: &[(Row, f64)]) -> Result<f64> {
+    /// A lower bound on the l2 term by any multipliers, from the minimum of the Lagrangian of `|w|^2 / 2` within the
+    /// bounds, and the multipliers that prove it: the tangent of the l2 term touches at that minimum.
+    pub(super) fn bound_of_length(&self, held: &[(Row, f64)]) -> Result<(f64, GapMultipliers)> {
         let trains = self.statement.trains;
         let (mut sum, mut row, mut allowed) = (vec![0.0; trains], vec![0.0; trains], 0.0);
         for &(name, multiplier) in held {
@@ -131,13 +134,18 @@ impl Exact {
             sum.iter_mut().zip(&row).for_each(|(g, a)| *g += multiplier * a);
             allowed += multiplier * limit;
         }
-        let least: f64 = (sum.iter().zip(&self.objective.bounds.lower).zip(&self.objective.bounds.upper))
-            .map(|((&g, &l), &u)| {
-                let w = (-g).clamp(l, u);
-                0.5 * w * w + g * w
-            })
-            .sum();
-        Ok((2.0 * (least - allowed)).max(0.0))
+        let Bounds { lower, upper } = &self.objective.bounds;
+        let least: Vec<f64> = sum.iter().zip(lower.iter().zip(upper)).map(|(g, (l, u))| (-g).clamp(*l, *u)).collect();
+        let square = dot(&least, &least);
+        let bound = self.objective.of_square((2.0 * (0.5 * square + dot(&sum, &least) - allowed)).max(0.0));
+        let factor = match self.objective.norm {
+            Norm::Norm if square > 0.0 => self.objective.l2 / square.sqrt(),
+            Norm::Norm => 0.0,
+            Norm::Square => 2.0 * self.objective.l2,
+        };
+        let times = |(row, multiplier): &(Row, f64)| (*row, factor * multiplier);
+        let rows = if factor > 0.0 { held.iter().map(times).collect() } else { vec![] };
+        Ok((bound, GapMultipliers { rows, behind: vec![], pull: least.iter().map(|w| factor * w).collect() }))
     }
 }
 

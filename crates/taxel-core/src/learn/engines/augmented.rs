@@ -94,22 +94,23 @@ impl Relaxed {
             .collect();
         let mut best = self.point(objective, zero);
         let mut engine = Lagrangian::new(self, objective, start, &best);
-        let mut bound = engine.bound_at_zero(&best).max(0.0);
+        let mut proof = self.no_proof();
+        proof.improve(engine.proof_at_zero(&best));
         engine.most = best.parts.sum();
         if engine.started {
             let candidate = self.point(objective, engine.weights.clone());
-            bound = bound.max(engine.bound());
+            proof.improve(engine.proof());
             if candidate.parts.sum() < best.parts.sum() {
                 best = candidate;
             }
             engine.most = best.parts.sum();
         }
         let (mut rounds, mut rows, mut stalled) = (0, 0, 0);
-        let mut gap = best.gap(bound);
+        let mut gap = best.gap(proof.bound);
         let mut stopped = false;
         while gap > tolerance && rounds < ROUNDS && stalled < 12 {
             rounds += 1;
-            let accuracy = 0.03 * (best.parts.sum() - bound);
+            let accuracy = 0.03 * (best.parts.sum() - proof.bound);
             let (mut reached, mut finer) = (false, 0);
             for _ in 0..STEPS {
                 if stop.asked() {
@@ -125,13 +126,13 @@ impl Relaxed {
             }
             rows = engine.inside.len();
             let candidate = self.point(objective, engine.candidate());
-            bound = bound.max(engine.bound());
+            proof.improve(engine.proof());
             let before = (gap, best.parts.sum());
             if candidate.parts.sum() < best.parts.sum() {
                 best = candidate;
             }
             engine.most = best.parts.sum();
-            gap = best.gap(bound);
+            gap = best.gap(proof.bound);
             stalled = if gap > 0.9 * before.0 && engine.most > 0.99 * before.1 { stalled + 1 } else { 0 };
             progress(rounds, rows, best.parts.sum(), gap);
             engine.sharpen(reached);
@@ -139,7 +140,7 @@ impl Relaxed {
                 break;
             }
         }
-        Rounds { best, bound, rounds, rows, shares: engine.shares, stopped }
+        Rounds { best, proof, rounds, rows, shares: engine.shares, stopped }
     }
 }
 

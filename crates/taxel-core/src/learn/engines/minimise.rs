@@ -3,7 +3,7 @@
 use super::augmented::Start;
 use super::rounds::Rounds;
 use crate::learn::fit::{Engine, Left, Round};
-use crate::learn::statement::{Objective, Parts, Point, Relaxed, Tangents};
+use crate::learn::statement::{Objective, Parts, Point, Proof, Relaxed, Tangents};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -17,6 +17,7 @@ pub(crate) struct Found {
     pub(crate) rows: usize,
     pub(crate) engine: Engine,
     pub(crate) shares: Vec<f64>,
+    pub(crate) proof: Proof,
 }
 
 impl Relaxed {
@@ -55,14 +56,13 @@ impl Relaxed {
         } else {
             let near = weights.is_some();
             let from = self.point(objective, weights.unwrap_or(zero));
-            self.by_rounds(objective, tolerance, (from, 0.0, near), &mut report, stop)?
+            self.by_rounds(objective, tolerance, (from, self.no_proof(), near), &mut report, stop)?
         };
-        let open = |best: &Point, bound| best.gap(bound) > tolerance;
-        if by == Engine::Native && !found.stopped && open(&found.best, found.bound) {
+        if by == Engine::Native && !found.stopped && found.best.gap(found.proof.bound) > tolerance {
             by = Engine::ConeSolver;
             before = found.rounds;
             let mut report = |round, rows, least, gap| report(before + round, rows, least, gap);
-            let near = (found.best, found.bound, true);
+            let near = (found.best, found.proof, true);
             found = self.by_rounds(objective, tolerance, near, &mut report, stop)?;
         }
         let least = found.best.parts.sum() / scale;
@@ -70,8 +70,11 @@ impl Relaxed {
         for part in [&mut parts.l1, &mut parts.l2, &mut parts.B, &mut parts.C, &mut parts.D] {
             *part /= scale;
         }
+        let gap = found.best.gap(found.proof.bound);
+        let mut proof = found.proof;
+        proof.divide(scale, 1.0);
         Ok(Found {
-            gap: found.best.gap(found.bound),
+            gap,
             weights: found.best.weights,
             objective: least,
             parts,
@@ -79,11 +82,12 @@ impl Relaxed {
             rows: found.rows,
             engine: by,
             shares: found.shares,
+            proof,
         })
     }
 
     /// The lower bound that these shares of the multipliers' ranges prove, together with the weights they belong to.
-    fn proven_by(&self, objective: &Objective, point: &Point, shares: &[f64]) -> f64 {
+    fn proven_by(&self, objective: &Objective, point: &Point, shares: &[f64]) -> Proof {
         let times = |(row, share): (usize, &f64)| share * self.hinge_weight(objective, row);
         let length = dot(&point.weights, &point.weights).sqrt();
         let pull = if length > 0.0 { objective.l2 / length } else { 0.0 };
@@ -94,7 +98,7 @@ impl Relaxed {
             multipliers: &shares.iter().enumerate().map(times).collect::<Vec<_>>(),
             pull: &point.weights.iter().map(|w| pull * w).collect::<Vec<_>>(),
         };
-        self.bound(objective, &at, point.parts.sum())
+        self.proof(objective, &at, point.parts.sum())
     }
 
     /// Starts from a similar fit: solves over the rows that are near their kinks there, until no other row matters.
@@ -117,11 +121,12 @@ impl Relaxed {
         let mut best = self.point(objective, weights);
         let mut at = best.excess.clone();
         // The multipliers of a fit to the same rows may already prove it.
-        let (mut bound, mut rounds) = (self.proven_by(objective, &best, &shares).max(0.0), 0);
-        if best.gap(bound) <= tolerance {
+        let (mut proof, mut rounds) = (self.no_proof(), 0);
+        proof.improve(self.proven_by(objective, &best, &shares));
+        if best.gap(proof.bound) <= tolerance {
             let rows = shares.iter().filter(|share| **share != 0.0).count();
-            progress(1, rows, best.parts.sum(), best.gap(bound));
-            return Ok(Rounds { best, bound, rounds: 1, rows, shares, stopped: false });
+            progress(1, rows, best.parts.sum(), best.gap(proof.bound));
+            return Ok(Rounds { best, proof, rounds: 1, rows, shares, stopped: false });
         }
         for _ in 0..ATTEMPTS {
             let live: Vec<usize> = (0..silent).filter(|&row| at[row] > -near || shares[row] != 0.0).collect();
@@ -131,22 +136,28 @@ impl Relaxed {
             let small = self.of_rows(&live);
             let begin = live.iter().map(|&row| shares[row]).chain(shares[silent..].iter().copied());
             let from = Start { weights: Some(best.weights.clone()), shares: Some(begin.collect()) };
-            let mut report = |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(bound));
+            let mut report =
+                |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(proof.bound));
             let found = small.augmented(objective, 0.3 * tolerance, from, &mut report, stop);
             rounds += found.rounds;
-            bound = bound.max(found.bound);
+            let place = |k: usize| live.get(k).copied().unwrap_or(silent + k - live.len().min(k));
             for (k, &share) in found.shares.iter().enumerate() {
-                shares[live.get(k).copied().unwrap_or(silent + k - live.len().min(k))] = share;
+                shares[place(k)] = share;
             }
+            let mut multipliers = vec![0.0; shares.len()];
+            for (k, &multiplier) in found.proof.multipliers.iter().enumerate() {
+                multipliers[place(k)] = multiplier;
+            }
+            proof.improve(Proof { multipliers, ..found.proof });
             let point = self.point(objective, found.best.weights);
             at.clone_from(&point.excess);
             if point.parts.sum() < best.parts.sum() {
                 best = point;
             }
-            let gap = best.gap(bound);
+            let gap = best.gap(proof.bound);
             progress(rounds, found.rows, best.parts.sum(), gap);
             if gap <= tolerance || found.stopped {
-                return Ok(Rounds { best, bound, rounds, rows: found.rows, shares, stopped: found.stopped });
+                return Ok(Rounds { best, proof, rounds, rows: found.rows, shares, stopped: found.stopped });
             }
         }
         Err(Start { weights: Some(best.weights), shares: Some(shares) })

@@ -21,6 +21,7 @@ use crate::{Error, Result, Stop};
 use best::{Best, Found, Start};
 use interior::Interior;
 use program::Program;
+pub(crate) use program::Proof;
 pub(crate) use program::Terms;
 
 /// At looser tolerances the interior point is returned as it is: the caller then needs violated rows, not exact

@@ -7,7 +7,7 @@
 //! decreases 6.14. An exact line search on 6.14 keeps the step from overshooting where hinges change their state.
 
 use super::cone_program::{ConeProgram, HardRows, Hinges};
-use crate::learn::statement::{Norm, Objective, Point, Relaxed, Tangents};
+use crate::learn::statement::{Norm, Objective, Point, Proof, Relaxed, Tangents};
 use crate::vectors::add;
 use crate::{Error, Result, Stop};
 
@@ -30,7 +30,7 @@ const MOST_ROUNDS: usize = 500;
 /// The result of the rounds, proven or not.
 pub(crate) struct Rounds {
     pub(crate) best: Point,
-    pub(crate) bound: f64,
+    pub(crate) proof: Proof,
     pub(crate) rounds: usize,
     pub(crate) rows: usize,
     /// The multiplier of each row as a share: of D's weight from 0 to 1, of the kink of C from its lower slope up to 1
@@ -57,8 +57,8 @@ struct Kept {
 }
 
 impl Relaxed {
-    /// Minimises 6.14 (scaled so that it is about 1) from a point with a known `bound`, or from a small program of its
-    /// own.
+    /// Minimises 6.14 (scaled so that it is about 1) from a point with a known lower bound, or from a small program of
+    /// its own.
     ///
     /// # Errors
     ///
@@ -67,12 +67,12 @@ impl Relaxed {
         &self,
         objective: &Objective,
         tolerance: f64,
-        start: (Point, f64, bool),
+        start: (Point, Proof, bool),
         progress: &mut dyn FnMut(usize, usize, f64, f64),
         stop: Stop<'_>,
     ) -> Result<Rounds> {
         let mut accuracy = (0.001 * tolerance).min(1e-7);
-        let (mut best, mut bound, near_best) = start;
+        let (mut best, mut proof, near_best) = start;
         let objective = &objective.within_reach(best.parts.sum());
         let (mut rounds, mut rows, near) = (0, 0, NEAR * self.theta_0);
         let mut shares = vec![0.0; best.excess.len()];
@@ -87,7 +87,7 @@ impl Relaxed {
             let states = self.states(&best, near);
             let kept = self.kept(objective, &states);
             let Some(answer) = solve(&kept, accuracy)? else {
-                return Ok(Rounds { best, bound, rounds, rows, shares, stopped: true });
+                return Ok(Rounds { best, proof, rounds, rows, shares, stopped: true });
             };
             (rounds, rows) = (rounds + 1, kept.rows.len());
             let trial = self.point(objective, answer.weights.clone());
@@ -104,9 +104,9 @@ impl Relaxed {
                 multipliers: &multipliers,
                 pull: &answer.pull,
             };
-            let proven = self.bound(objective, &at, best.parts.sum());
-            if proven > bound {
-                bound = proven;
+            let proven = self.proof(objective, &at, best.parts.sum());
+            if proven.bound > proof.bound {
+                proof = proven;
                 shares = multipliers;
                 for (row, share) in shares.iter_mut().enumerate() {
                     *share /= self.hinge_weight(objective, row).max(f64::MIN_POSITIVE);
@@ -114,11 +114,11 @@ impl Relaxed {
             }
             let before = best.parts.sum();
             best = self.better(objective, best, answer.weights);
-            let (least, gap) = (best.parts.sum(), best.gap(bound));
+            let (least, gap) = (best.parts.sum(), best.gap(proof.bound));
             progress(rounds, rows, least, gap);
             let stalled = before - least <= STALLED * least;
             if gap <= tolerance || (stalled && accuracy < FINEST) || rounds == MOST_ROUNDS {
-                return Ok(Rounds { best, bound, rounds, rows, shares, stopped: false });
+                return Ok(Rounds { best, proof, rounds, rows, shares, stopped: false });
             }
             if stalled {
                 accuracy *= 0.01;

@@ -163,6 +163,12 @@ impl SilentRows {
         first + after.saturating_sub(near + 1)..first + after
     }
 
+    /// The pattern of a row, and its time, ms.
+    pub(crate) fn name(&self, row: usize) -> (usize, f64) {
+        let pattern = self.lanes.partition_point(|lane| lane.first <= row) - 1;
+        (pattern, self.lanes[pattern].grid.time((row - self.lanes[pattern].first) as f64))
+    }
+
     /// The number of rows of the first pattern, including points without a requirement.
     pub(crate) fn of_first(&self) -> usize {
         self.lanes.first().map_or(0, |lane| lane.points)

@@ -134,13 +134,37 @@ impl Relaxed {
         Point { weights, excess, behind, parts }
     }
 
+    /// The proof of a lower bound on 6.14 by these tangents, given that its least value is at most `most`.
+    pub(crate) fn proof(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> Proof {
+        let squares = at.behind.iter().map(|&x| 2.0 * objective.b * objective.counts_in_b(x));
+        Proof {
+            bound: self.bound(objective, at, most),
+            multipliers: at.multipliers.to_vec(),
+            behind: squares.collect(),
+            pull: match objective.norm {
+                Norm::Square => at.weights.iter().map(|w| 2.0 * objective.l2 * w).collect(),
+                Norm::Norm => at.pull.to_vec(),
+            },
+        }
+    }
+
+    /// The proof that 6.14 is at least 0.
+    pub(crate) fn no_proof(&self) -> Proof {
+        Proof {
+            bound: 0.0,
+            multipliers: vec![0.0; self.silent.len() + self.targets.len()],
+            behind: vec![0.0; self.targets.len()],
+            pull: vec![0.0; self.trains],
+        }
+    }
+
     /// A lower bound on 6.14 over all weights within the bounds, given that its least value is at most `most`.
     ///
     /// Every term is replaced by a tangent below it at some weights (which need not be within the bounds): silence by
     /// multipliers between 0 and D's weight, targets by multipliers between C's slopes, the norm by a `pull` no
     /// longer than its factor, a square by its slope. The remaining function, linear plus l1 over the box, is minimised
     /// synapse by synapse. The bound therefore holds for any multipliers, however they were found.
-    pub(crate) fn bound(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> f64 {
+    fn bound(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> f64 {
         let reach = objective.reach(most);
         let silent = self.silent.len();
         let mut gradient = vec![0.0; self.trains];
@@ -194,4 +218,32 @@ pub(crate) struct Tangents<'a> {
     pub(crate) behind: &'a [f64],
     pub(crate) multipliers: &'a [f64],
     pub(crate) pull: &'a [f64],
+}
+
+/// A lower bound on 6.14, and the slopes of the tangents that prove it.
+#[derive(Debug, Clone)]
+pub(crate) struct Proof {
+    pub(crate) bound: f64,
+    /// One per row, of C and D.
+    pub(crate) multipliers: Vec<f64>,
+    /// One per target, of B.
+    pub(crate) behind: Vec<f64>,
+    /// One per synapse, of the l2 term.
+    pub(crate) pull: Vec<f64>,
+}
+
+impl Proof {
+    /// Takes another proof if that proves more.
+    pub(crate) fn improve(&mut self, other: Self) {
+        if other.bound > self.bound {
+            *self = other;
+        }
+    }
+
+    /// The same proof for 6.14 with every term divided by `scale`, and potentials in units of `unit`.
+    pub(crate) fn divide(&mut self, scale: f64, unit: f64) {
+        self.bound /= scale;
+        let slopes = self.multipliers.iter_mut().chain(&mut self.behind).chain(&mut self.pull);
+        slopes.for_each(|slope| *slope /= scale * unit);
+    }
 }

@@ -90,10 +90,9 @@ impl Targets {
         TargetRow { threshold: self.thresholds[k], at: &self.at[columns.clone()], behind: &self.behind[columns] }
     }
 
-    /// The pattern's first target at or after `t`: its time, ms, and its rows.
-    pub(crate) fn next(&self, pattern: usize, t: f64) -> Option<(f64, TargetRow<'_>)> {
-        let k = self.names.iter().zip(&self.times).position(|(name, &time)| name.0 == pattern && time >= t)?;
-        Some((self.times[k], self.row(k)))
+    /// The number of the pattern's first target at or after `t`.
+    pub(crate) fn next(&self, pattern: usize, t: f64) -> Option<usize> {
+        self.names.iter().zip(&self.times).position(|(name, &time)| name.0 == pattern && time >= t)
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = TargetRow<'_>> + Clone {

@@ -120,7 +120,7 @@ pub(super) const FIELDS: [Field; 16] = [
         shift: 16,
         mask: 0xffff,
         offset: 0,
-        least: 1,
+        least: 4,
         greatest: 65535,
     },
     Field {

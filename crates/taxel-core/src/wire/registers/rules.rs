@@ -53,11 +53,11 @@ pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, S
             ),
         ));
     }
-    if ramp + 3 > 3 * step_period {
+    if ramp + 5 > 3 * step_period {
         return Some((
             3,
             format!(
-                "ramp {} ticks leaves no 3 ticks of step_period {} us = {} ticks in which it falls (rule 3)",
+                "ramp {} ticks leaves no 5 ticks of step_period {} us = {} ticks in which it falls (rule 3)",
                 ramp,
                 us(step_period),
                 3 * step_period

@@ -37,7 +37,10 @@ pub struct Packer {
     stride: u8,
     word: Layout,
     sequence: u32,
+    /// Events were dropped since the last datagram was begun.
     dropped: bool,
+    /// Events were dropped before the current datagram was begun, and after the one before it.
+    after_loss: bool,
     body: Vec<u8>,
     events: usize,
     base: u64,
@@ -66,6 +69,7 @@ impl Packer {
             word,
             sequence: 0,
             dropped: false,
+            after_loss: false,
             body: Vec::with_capacity(BODY_BYTES),
             events: 0,
             base: 0,
@@ -92,7 +96,7 @@ impl Packer {
         self.events
     }
 
-    /// Notes that an event was dropped; the next datagram carries the flag.
+    /// Notes that an event was dropped; the next datagram that is begun carries the flag.
     pub fn dropped(&mut self) {
         self.dropped = true;
     }
@@ -106,6 +110,7 @@ impl Packer {
         }
         if self.events == 0 {
             (self.base, self.at, self.line) = (t, t, first_line(x));
+            self.after_loss = std::mem::take(&mut self.dropped);
             self.position = before(self.line, self.stride);
         }
         let word = self.word;
@@ -231,6 +236,7 @@ impl Packer {
     ) {
         let Settings { board, session, frame_sync, differences, .. } = self.settings;
         let flag = |on: bool, bit: u8| if on { bit } else { 0 };
+        let after_loss = if events > 0 { self.after_loss } else { std::mem::take(&mut self.dropped) };
         let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
         let header = Header {
             kind: kind.number(),
@@ -240,9 +246,7 @@ impl Packer {
             session,
             stride: self.stride,
             line,
-            flags: flag(frame_sync, FRAME_SYNC)
-                | flag(differences && !states, DIFFERENCES)
-                | flag(std::mem::take(&mut self.dropped), DROPPED),
+            flags: flag(frame_sync, FRAME_SYNC) | flag(differences && !states, DIFFERENCES) | flag(after_loss, DROPPED),
             span,
         };
         self.sequence = self.sequence.wrapping_add(1);

@@ -228,9 +228,11 @@ impl WriteQueue {
     fn drain(&self) -> Result<()> {
         let mut slot = lock(&self.writer);
         let Some(writer) = slot.as_mut() else {
-            // Writing has failed meanwhile, with the error in the queue; or the recording has ended, and no message is
-            // added any more.
-            return self.lock().failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(&self.path)));
+            // Writing has failed meanwhile, with the error in the queue; or the file was abandoned, and what still waits
+            // for it is not written.
+            let mut state = self.lock();
+            state.queue = Queue::default();
+            return state.failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(&self.path)));
         };
         std::mem::swap(&mut self.lock().queue, &mut writer.batch);
         self.room.notify_all();

@@ -145,7 +145,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             );
             // Curves and changes by a state of the same column width, from the beginning, without a keyframe.
             let blank = Keyframe::blank(index.header.array.len());
-            let mut slow = ArrayState::new(index.header.array.columns, index.noise_floor(), &blank, us, 1 << 28);
+            let mut slow = ArrayState::new(&index.header.array, index.noise_floor(), &blank, us, 1 << 28);
             changes.iter().filter(|change| change.t <= t).for_each(|change| slow.apply_one(change));
             slow.advance(t);
             slow.update_curve();

@@ -1,31 +1,26 @@
 //! Lower bounds on 6.14.
 
 use super::Lagrangian;
-use crate::learn::statement::{Norm, Point, Tangents};
+use crate::learn::statement::{Norm, Point, Proof, Tangents};
 use crate::vectors::{add, dot};
 
 impl Lagrangian<'_> {
     /// The lower bound that the present multipliers prove.
-    pub(super) fn bound(&mut self) -> f64 {
+    pub(super) fn proof(&mut self) -> Proof {
         self.multipliers();
-        let pull = self.pull();
-        self.proves(&pull)
-    }
-
-    pub(super) fn proves(&self, pull: &[f64]) -> f64 {
         let at = Tangents {
             weights: &self.weights,
             excess: &self.excess,
             behind: &self.behind,
             multipliers: &self.factors,
-            pull,
+            pull: &self.pull(),
         };
-        self.problem.bound(self.objective, &at, self.most)
+        self.problem.proof(self.objective, &at, self.most)
     }
 
     /// The lower bound at weights of 0, with the subgradient of the norm nearest to the sum of all other slopes
     /// there.
-    pub(super) fn bound_at_zero(&self, zero: &Point) -> f64 {
+    pub(super) fn proof_at_zero(&self, zero: &Point) -> Proof {
         let (problem, o) = (self.problem, self.objective);
         let silent = problem.silent.len();
         let slope = |(k, &x): (usize, &f64)| match k < silent {
@@ -71,6 +66,6 @@ impl Lagrangian<'_> {
             multipliers: &multipliers,
             pull: &pull,
         };
-        problem.bound(o, &at, zero.parts.sum())
+        problem.proof(o, &at, zero.parts.sum())
     }
 }

@@ -3,7 +3,7 @@
 use super::dense::times;
 use super::interior::PrimalDual;
 use super::polish::polish;
-use super::program::{Guess, Point, Program, retain};
+use super::program::{Guess, Point, Program, Proof, retain};
 use crate::learn::engines::nearest;
 use crate::learn::fit::Engine;
 use crate::learn::statement::{NOTHING, relative_gap};
@@ -37,6 +37,7 @@ pub(crate) struct Found {
     pub(crate) inequality: Vec<f64>,
     /// A lower bound on the objective over these rows, and therefore over these and more.
     pub(crate) bound: f64,
+    pub(crate) proof: Proof,
     pub(crate) engine: Engine,
     pub(crate) stopped: bool,
     pub(crate) start: Start,
@@ -50,6 +51,8 @@ pub(super) struct Best<'a> {
     pub(super) met: bool,
     pub(super) objective: f64,
     pub(super) bound: f64,
+    /// The point whose multipliers prove the bound.
+    proof: Point,
 }
 
 impl<'a> Best<'a> {
@@ -62,13 +65,17 @@ impl<'a> Best<'a> {
             pull: vec![0.0; program.width()],
         };
         // No term is below 0, so 0 is a lower bound.
-        Self { program, point, guess: None, met: false, objective: f64::INFINITY, bound: 0.0 }
+        let proof = point.clone();
+        Self { program, point, guess: None, met: false, objective: f64::INFINITY, bound: 0.0, proof }
     }
 
     pub(super) fn offer(&mut self, point: Point, guess: Option<Guess>) {
         let objective = self.program.objective(&point.weights);
         let met = self.program.met(&point.weights);
-        self.bound = self.bound.max(self.program.bound(&point));
+        let bound = self.program.bound(&point);
+        if bound > self.bound {
+            (self.bound, self.proof) = (bound, point.clone());
+        }
         if self.objective.is_infinite() || (met && !self.met) || (met == self.met && objective < self.objective) {
             (self.point, self.guess, self.met, self.objective) = (point, guess, met, objective);
         }
@@ -121,6 +128,7 @@ impl<'a> Best<'a> {
             weights: self.point.weights.iter().map(|w| w * program.weight).collect(),
             inequality: multipliers.map(|(z, scale)| z * program.cost / scale).collect(),
             bound: self.bound * program.cost,
+            proof: program.proof(&self.proof),
             engine,
             stopped,
             start: Start { state, exact: self.guess.map(|guess| (self.point, guess)) },

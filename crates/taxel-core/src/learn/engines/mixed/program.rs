@@ -72,6 +72,17 @@ pub(super) struct Program {
     pub(super) weight: f64,
     pub(super) cost: f64,
     pub(super) of_below: Vec<f64>,
+    /// Those of the equality rows.
+    of_equal: Vec<f64>,
+}
+
+/// The multipliers that prove a bound, in the caller's units: of the rows, of B, and the slope of the l2 term's tangent.
+#[derive(Debug, Clone)]
+pub(crate) struct Proof {
+    pub(crate) equality: Vec<f64>,
+    pub(crate) inequality: Vec<f64>,
+    pub(crate) behind: Vec<f64>,
+    pub(crate) pull: Vec<f64>,
 }
 
 /// Retains the entries that `keep` marks, and all entries beyond its end.
@@ -101,7 +112,7 @@ impl Program {
             }
             (rows, limits, scales)
         };
-        let (equal, equal_to, _) = scaled(rows.equal, rows.equal_to);
+        let (equal, equal_to, of_equal) = scaled(rows.equal, rows.equal_to);
         let (below, limit, of_below) = scaled(rows.below, rows.limit);
         let behind: Vec<f64> = terms.behind.iter().map(|v| v * weight).collect();
         let square = terms.norm == Norm::Square;
@@ -128,6 +139,7 @@ impl Program {
             weight,
             cost,
             of_below,
+            of_equal,
         }
     }
 
@@ -273,6 +285,26 @@ impl Program {
     /// The relative distance between the objective and the bound that these multipliers prove.
     pub(super) fn gap(&self, point: &Point) -> f64 {
         relative_gap(self.objective(&point.weights), self.bound(point))
+    }
+
+    /// The multipliers of a point that prove its bound, in the caller's units.
+    pub(super) fn proof(&self, point: &Point) -> Proof {
+        let Point { weights, equality, inequality, pull } = point;
+        let lifted = |missed: f64| 2.0 * self.lift * missed * self.cost;
+        let pulled = |(pull, w): (&f64, &f64)| match self.norm {
+            Norm::Norm => pull * self.cost / self.weight,
+            Norm::Square => 2.0 * self.l2 * w * self.cost / self.weight,
+        };
+        Proof {
+            equality: equality.iter().zip(&self.of_equal).map(|(y, scale)| y * self.cost / scale).collect(),
+            inequality: inequality
+                .iter()
+                .zip(&self.of_below)
+                .map(|(z, scale)| z.max(0.0) * self.cost / scale)
+                .collect(),
+            behind: self.missed(weights).into_iter().map(lifted).collect(),
+            pull: pull.iter().zip(weights).map(pulled).collect(),
+        }
     }
 
     /// A lower bound on the objective, valid for any multipliers (those of inequalities at least 0) and any point.

@@ -1,0 +1,94 @@
+//! Whether a board keeps pace with its own clock: the drift and the delays that its arrivals show.
+
+use std::collections::VecDeque;
+
+use serde::Serialize;
+
+use super::offset::Offset;
+use super::stretch::{LONG_US, Point, STRETCHES};
+use crate::latency::{Latencies, Quantiles};
+
+/// Reading: no two clocks differ by more (crystals by 0.01 %, the worst oscillators by 1 %), ppm.
+const MOST_DRIFT_PPM: f64 = 10_000.0;
+/// Reading: no datagram on a local network is later than this, us.
+const MOST_DELAY_US: f64 = 1e6;
+/// Only by a drift beyond what is fitted does one in two arrive so much sooner than the soonest can, us.
+const SOON_US: f64 = 1e5;
+
+/// Why a drift between two clocks, or the delays of datagrams, cannot be; `None` if they can. `delay_us` is that of 99
+/// in 100 datagrams at most, `median_us` that of one in two.
+#[must_use]
+pub fn doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
+    let mut wrong = vec![];
+    if drift_ppm.abs() > MOST_DRIFT_PPM {
+        wrong.push(format!("a drift of {drift_ppm:+.0} ppm (clocks differ by less than {MOST_DRIFT_PPM:.0})"));
+    }
+    if delay_us > MOST_DELAY_US {
+        wrong.push(format!("a delay of {:.1} s", delay_us / 1e6));
+    }
+    if median_us < -SOON_US {
+        wrong.push(format!("a median delay of {:.1} s", median_us / 1e6));
+    }
+    (!wrong.is_empty()).then(|| {
+        format!(
+            "{} cannot be: the sender did not keep pace with its own clock, as an emulator on a busy machine does, or \
+             paused; its times hold, but not when they were on this computer's clock",
+            wrong.join(" and ")
+        )
+    })
+}
+
+/// The drift and the delays that arrivals show.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Pace {
+    /// Drift of the host's clock relative to the board's, parts per million.
+    pub drift_ppm: f64,
+    /// Delays beyond the shortest, of all datagrams so far.
+    pub delay: Quantiles,
+    /// Why they cannot be, with the likely cause; `None` if they can.
+    pub doubt: Option<String>,
+}
+
+/// Delays, and the fastest arrivals of the last 64 s, whichever line was fitted to them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Arrivals {
+    delays: Latencies,
+    fastest: VecDeque<Point>,
+}
+
+impl Arrivals {
+    /// Notes how much later than the line a datagram arrived.
+    pub(super) fn note(&mut self, late_ns: i64) {
+        self.delays.note(late_ns);
+    }
+
+    /// Notes the fastest arrival of a stretch.
+    pub(super) fn end_stretch(&mut self, fastest: Option<Point>) {
+        if self.fastest.len() == STRETCHES {
+            self.fastest.pop_front();
+        }
+        self.fastest.extend(fastest);
+    }
+
+    /// The drift over all of these arrivals, ppm; `None` within their first seconds. A line follows no drift that
+    /// cannot be: it is given up, and another begins.
+    #[allow(clippy::cast_precision_loss)]
+    fn drift_ppm(&self) -> Option<f64> {
+        let (first, last) = self.fastest.front().zip(self.fastest.back())?;
+        let passed = last.0 - first.0;
+        (passed >= LONG_US).then(|| (last.1 - first.1) as f64 / passed as f64 * 1e3)
+    }
+
+    #[cfg(test)]
+    pub(super) fn remembered(&self) -> usize {
+        self.fastest.len()
+    }
+
+    /// What they show beside the line.
+    pub(super) fn pace(&self, line: Offset) -> Pace {
+        let beyond = self.drift_ppm().filter(|drift| drift.abs() > MOST_DRIFT_PPM);
+        let (drift_ppm, delay) = (beyond.unwrap_or(line.drift_ppm), self.delays.quantiles());
+        let doubt = doubt(drift_ppm, delay.p99_us.unwrap_or(0.0), delay.p50_us.unwrap_or(0.0));
+        Pace { drift_ppm, delay, doubt }
+    }
+}

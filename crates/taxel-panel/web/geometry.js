@@ -1,0 +1,329 @@
+// The geometry of a sensor on the page: how its taxels are drawn, which of them is where, and in which unit its centre is.
+
+import { fitted } from "./dom.js";
+import { counted, rounded } from "./words.js";
+
+/** @typedef {import("./protocol.js").ArrayInfo} ArrayInfo */
+/** @typedef {import("./protocol.js").PictureSource} PictureSource */
+/** @typedef {[number, number]} Taxel column and row */
+/** @typedef {{ x: boolean, y: boolean }} Flips */
+/** @typedef {{ words: Uint32Array, levels: Float32Array, ground: string, edge: string }} Colours by taxel a pixel, and its height from 0 to 1;
+ *   the colours of the sensor's ground and of its edge */
+
+/** Of a sensor with places, room around the outermost ones, in the distance between neighbours. */
+const MARGIN = 0.75;
+/** Size of a place's dot in the distance between neighbours. */
+const DOT = 0.62;
+/** Height of the least bar, so that a channel without load is seen, as a share of all. */
+const LEAST_BAR = 0.02;
+
+/** What all sensors have: rows, columns, and the sources that stand side by side. */
+class Sensor {
+  /** @param {ArrayInfo} array @param {PictureSource[]} sources */
+  constructor(array, sources) {
+    this.array = array;
+    this.sources = sources;
+    this.rows = array.rows;
+    this.columns = array.columns;
+    this.exists = array.exists;
+  }
+
+  /** @param {number} x @param {number} y @returns {boolean} */
+  has(x, y) {
+    return x >= 0 && y >= 0 && x < this.columns && y < this.rows && (!this.exists || this.exists[y * this.columns + x] === "1");
+  }
+
+  /** @param {number} x @returns {PictureSource | undefined} the source that a column is of, where there are several */
+  source(x) {
+    return this.sources.length < 2 ? undefined : this.sources.find(({ left, columns }) => x >= left && x < left + columns);
+  }
+
+  /** @param {Taxel} taxel @returns {string} its name: source, row and column within it */
+  named([x, y]) {
+    const source = this.source(x);
+    return `${source ? `${source.name}, ` : ""}row ${y}, column ${x - (source?.left ?? 0)}`;
+  }
+
+  /**
+   * @param {Taxel} from @param {Taxel} by columns and rows
+   * @returns {Taxel} the taxel as far away, or the nearest one beyond places without a taxel; where there is none, the one it is from
+   */
+  moved([x, y], [dx, dy]) {
+    const held = (/** @type {number} */ at, /** @type {number} */ count) => Math.max(0, Math.min(count - 1, at));
+    let [column, row] = [held(x + dx, this.columns), held(y + dy, this.rows)];
+    const [stepX, stepY] = [Math.sign(dx), Math.sign(dy)];
+    while (column >= 0 && row >= 0 && column < this.columns && row < this.rows) {
+      if (this.has(column, row)) return [column, row];
+      [column, row] = [column + stepX, row + stepY];
+    }
+    return [x, y];
+  }
+
+  /** @returns {Taxel} where a crosshair begins */
+  get middle() {
+    const middle = /** @type {Taxel} */ ([this.columns >> 1, this.rows >> 1]);
+    return this.has(...middle) ? middle : this.moved([0, middle[1]], [1, 0]);
+  }
+
+  /** @returns {number | null} area of each taxel, mm2; null where it is not known, or not the same for all */
+  get taxel_mm2() {
+    const { pitch_mm, places } = this.array;
+    if (pitch_mm) return typeof pitch_mm === "number" ? pitch_mm ** 2 : pitch_mm[0] * pitch_mm[1];
+    const areas = (places?.unit === "mm" && places.area?.filter((_, taxel) => this.has(taxel % this.columns, Math.floor(taxel / this.columns)))) || [];
+    return areas.length && areas.every((area) => area === areas[0]) ? areas[0] : null;
+  }
+
+  /** @param {number} count @returns {string} an area, in taxels; in mm2, too, where that of a taxel is known */
+  area(count) {
+    const { taxel_mm2 } = this;
+    return counted(count, "taxel") + (taxel_mm2 === null ? "" : ` (${rounded(count * taxel_mm2)} mm²)`);
+  }
+}
+
+/** Taxels in rows and columns: one pixel each. */
+class Grid extends Sensor {
+  kind = /** @type {const} */ ("grid");
+  axes = /** @type {[string, string]} */ (["column", "row"]);
+
+  /** @param {ArrayInfo} array @param {PictureSource[]} sources */
+  constructor(array, sources) {
+    super(array, sources);
+    /** @type {[number, number]} */
+    this.limits = [0, Math.max(this.rows, this.columns)];
+    const { pitch_mm } = array;
+    this.mm = typeof pitch_mm === "number" ? [pitch_mm, pitch_mm] : pitch_mm;
+    const ratio = this.mm ? this.mm[1] / this.mm[0] : 1;
+    // A sensor much longer than wide stays within the page, and one of few rows can be pointed at: its taxels are no squares then.
+    this.aspect = Math.max(1 / 3, Math.min(8, (ratio * this.columns) / Math.max(1, this.rows)));
+    this.image = new ImageData(this.columns, this.rows);
+    this.pixels = new Uint32Array(this.image.data.buffer);
+  }
+
+  /** @param {Taxel} taxel @param {Flips} flips @returns {[number, number]} where it is, in shares of width and height */
+  place([x, y], flips) {
+    return [((flips.x ? this.columns - 1 - x : x) + 0.5) / this.columns, ((flips.y ? this.rows - 1 - y : y) + 0.5) / this.rows];
+  }
+
+  /** @param {number} across @param {number} down shares of width and height @param {Flips} flips @returns {Taxel} */
+  at(across, down, flips) {
+    const index = (/** @type {number} */ share, /** @type {number} */ count) => Math.max(0, Math.min(count - 1, Math.floor(share * count)));
+    const [x, y] = [index(across, this.columns), index(down, this.rows)];
+    return [flips.x ? this.columns - 1 - x : x, flips.y ? this.rows - 1 - y : y];
+  }
+
+  /** @param {number} x @param {number} y @returns {string} a centre, in columns and rows; in mm, too, where the pitch is known */
+  centre(x, y) {
+    return `${x.toFixed(1)}, ${y.toFixed(1)}${this.mm ? ` (${rounded(x * this.mm[1])}, ${rounded(y * this.mm[0])} mm)` : ""}`;
+  }
+
+  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
+  paint(canvas, context, { words }, flips) {
+    const { rows, columns, pixels } = this;
+    if (canvas.width !== columns || canvas.height !== rows) [canvas.width, canvas.height] = [columns, rows];
+    if (!flips.x && !flips.y) pixels.set(words);
+    else {
+      for (let y = 0; y < rows; y++) {
+        for (let x = 0; x < columns; x++) pixels[(flips.y ? rows - 1 - y : y) * columns + (flips.x ? columns - 1 - x : x)] = words[y * columns + x];
+      }
+    }
+    context.putImageData(this.image, 0, 0);
+  }
+}
+
+/** A pixel's word as a colour. @param {number} word @returns {string} */
+const css = (word) => `rgb(${word & 255} ${(word >> 8) & 255} ${(word >> 16) & 255})`;
+
+/** Taxels at places: a dot each, or a cell of its area, within the outline of its source. */
+class Placed extends Sensor {
+  kind = /** @type {const} */ ("places");
+  axes = /** @type {[string, string]} */ (["x", "y"]);
+
+  /** @param {ArrayInfo} array @param {PictureSource[]} sources @param {import("./protocol.js").TaxelPlaces} places */
+  constructor(array, sources, places) {
+    super(array, sources);
+    this.places = places;
+    this.taxels = places.x.map((_, taxel) => taxel).filter((taxel) => this.has(taxel % this.columns, Math.floor(taxel / this.columns)));
+    const [xs, ys] = [places.x, places.y].map((all) => this.taxels.map((taxel) => all[taxel]));
+    const near = this.taxels.map((_, i) => Math.min(...this.taxels.map((_, k) => (k === i ? Infinity : Math.hypot(xs[k] - xs[i], ys[k] - ys[i])))));
+    const finite = near.filter((distance) => distance > 0 && distance < Infinity).sort((a, b) => a - b);
+    /** Distance between neighbours. */
+    this.near = finite[finite.length >> 1] ?? 1;
+    const { near: unit } = this;
+    const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    this.from = [left - MARGIN * unit, top - MARGIN * unit];
+    this.extent = [right - left + 2 * MARGIN * unit, bottom - top + 2 * MARGIN * unit];
+    this.aspect = Math.max(1 / 3, Math.min(8, this.extent[0] / this.extent[1]));
+    /** @type {[number, number]} */
+    this.limits = [Math.min(left, top), Math.max(right, bottom)];
+    const sides = sources.length ? sources : [{ left: 0, columns: this.columns }];
+    this.outlines = sides.map((side) => outline(this.taxels.filter((t) => t % this.columns >= side.left && t % this.columns < side.left + side.columns).map((t) => [places.x[t], places.y[t]])));
+  }
+
+  /** @returns {number} how much of the frame's height, and of its width, a unit takes: the same on the screen */
+  scaled() {
+    return Math.min(1 / this.extent[0], 1 / this.aspect / this.extent[1]);
+  }
+
+  /** @param {number} x @param {number} y @param {Flips} flips @returns {[number, number]} shares of width and height */
+  share(x, y, flips) {
+    const scale = this.scaled();
+    const across = 0.5 + (x - this.from[0] - this.extent[0] / 2) * scale;
+    const down = 0.5 + (y - this.from[1] - this.extent[1] / 2) * scale * this.aspect;
+    return [flips.x ? 1 - across : across, flips.y ? 1 - down : down];
+  }
+
+  /** @param {Taxel} taxel @param {Flips} flips @returns {[number, number]} */
+  place([x, y], flips) {
+    const taxel = y * this.columns + x;
+    return this.share(this.places.x[taxel], this.places.y[taxel], flips);
+  }
+
+  /** @param {number} across @param {number} down @param {Flips} flips @returns {Taxel} the nearest one */
+  at(across, down, flips) {
+    let [least, nearest] = [Infinity, 0];
+    for (const taxel of this.taxels) {
+      const [x, y] = this.share(this.places.x[taxel], this.places.y[taxel], flips);
+      const distance = Math.hypot((x - across) * this.aspect, y - down);
+      if (distance < least) [least, nearest] = [distance, taxel];
+    }
+    return [nearest % this.columns, Math.floor(nearest / this.columns)];
+  }
+
+  /** @param {number} x @param {number} y @returns {string} a centre, in the unit of the places */
+  centre(x, y) {
+    return `${rounded(x)}, ${rounded(y)} ${this.places.unit ?? "in the places' own unit"}`;
+  }
+
+  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
+  paint(canvas, context, { words, ground, edge }, flips) {
+    const { width, height, ratio } = fitted(canvas);
+    const { near, places } = this;
+    const unit = this.scaled() * width;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    /** @param {number} x @param {number} y @returns {[number, number]} */
+    const at = (x, y) => {
+      const [across, down] = this.share(x, y, flips);
+      return [across * width, down * height];
+    };
+    context.lineJoin = "round";
+    for (const points of this.outlines) {
+      context.beginPath();
+      for (const [x, y] of points) context.lineTo(...at(x, y));
+      context.closePath();
+      // A wide line around the places, and a narrower one on it, leave an edge.
+      for (const [colour, wide] of /** @type {[string, number][]} */ ([[edge, 1.3 * near * unit], [ground, 1.3 * near * unit - 2]])) {
+        [context.strokeStyle, context.fillStyle, context.lineWidth] = [colour, colour, Math.max(1, wide)];
+        context.stroke();
+        context.fill();
+      }
+    }
+    for (const taxel of this.taxels) {
+      const [x, y] = at(places.x[taxel], places.y[taxel]);
+      const side = unit * (places.area ? Math.sqrt(places.area[taxel]) : DOT * near);
+      context.fillStyle = css(words[taxel]);
+      context.beginPath();
+      if (places.area) context.roundRect(x - side / 2, y - side / 2, side, side, side / 8);
+      else context.arc(x, y, side / 2, 0, 2 * Math.PI);
+      context.fill();
+    }
+  }
+}
+
+/** Channels: neither pitch nor places, so that they have no map, centre or area, only a bar each. */
+class Channels extends Sensor {
+  kind = /** @type {const} */ ("channels");
+  axes = /** @type {[string, string]} */ (["", ""]);
+  limits = /** @type {[number, number]} */ ([0, 1]);
+  aspect = 6;
+
+  /** @param {Taxel} taxel @returns {string} its name: source, and number within it */
+  named([x, y]) {
+    const source = this.source(x);
+    return `${source ? `${source.name}, ` : ""}channel ${Math.max(x - (source?.left ?? 0), y)}`;
+  }
+
+  /** @returns {Taxel} */
+  get middle() {
+    return [0, 0];
+  }
+
+  /** @returns {number[]} the places of those that exist */
+  get there() {
+    return Array.from({ length: this.count }, (_, k) => k).filter((k) => !this.exists || this.exists[k] === "1");
+  }
+
+  /** @returns {number} how many bars have room */
+  get count() {
+    return Math.max(this.rows, this.columns);
+  }
+
+  /** @param {Taxel} taxel @param {Flips} flips @returns {[number, number]} */
+  place([x, y], flips) {
+    const share = (Math.max(x, y) + 0.5) / this.count;
+    return [flips.x ? 1 - share : share, 0.5];
+  }
+
+  /** @param {number} across @param {number} _down @param {Flips} flips @returns {Taxel} */
+  at(across, _down, flips) {
+    const k = Math.max(0, Math.min(this.count - 1, Math.floor((flips.x ? 1 - across : across) * this.count)));
+    const taxel = /** @type {Taxel} */ (this.columns > 1 ? [k, 0] : [0, k]);
+    // Between two sources lies an empty column.
+    return this.has(...taxel) ? taxel : this.moved(taxel, [-1, 0]);
+  }
+
+  /** @returns {string} */
+  centre() {
+    return "";
+  }
+
+  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
+  paint(canvas, context, { words, levels }, flips) {
+    const { width, height, ratio } = fitted(canvas);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    const wide = width / this.count;
+    for (const k of this.there) {
+      const high = Math.max(LEAST_BAR, levels[k]) * height;
+      context.fillStyle = css(words[k]);
+      context.fillRect((flips.x ? this.count - 1 - k : k) * wide + Math.min(1, wide / 8), height - high, Math.max(1, wide - Math.min(2, wide / 4)), high);
+    }
+  }
+}
+
+/** @typedef {Grid | Placed | Channels} Geometry */
+
+/**
+ * The geometry of a sensor.
+ * @param {ArrayInfo} array
+ * @param {PictureSource[]} sources that stand side by side in it
+ * @returns {Geometry}
+ */
+export function geometry(array, sources) {
+  if (array.places) return new Placed(array, sources, array.places);
+  return array.pitch_mm === null && Math.min(array.rows, array.columns) === 1 ? new Channels(array, sources) : new Grid(array, sources);
+}
+
+/**
+ * The smallest convex outline around points (Andrew's monotone chain).
+ * @param {number[][]} points
+ * @returns {number[][]}
+ */
+function outline(points) {
+  const sorted = [...points].sort(([x, y], [u, v]) => x - u || y - v);
+  /** @param {number[][]} all @returns {number[][]} the half on one side */
+  const half = (all) => {
+    /** @type {number[][]} */
+    const chain = [];
+    for (const [x, y] of all) {
+      while (chain.length > 1) {
+        const [[a, b], [c, d]] = chain.slice(-2);
+        if ((c - a) * (y - b) - (d - b) * (x - a) > 0) break;
+        chain.pop();
+      }
+      chain.push([x, y]);
+    }
+    return chain.slice(0, -1);
+  };
+  return sorted.length < 3 ? sorted : [...half(sorted), ...half(sorted.reverse())];
+}

@@ -1,0 +1,45 @@
+"""The noise floor of a sensor that is no board: from the noise of its taxels at rest, in its own unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from taxel.detect.examples import Example
+from taxel.frames import Frames
+from taxel.recorded import recorded
+
+__all__ = ["measured_floor"]
+
+#: Reading: so many standard deviations of the noise, so that two neighbours rarely exceed it together.
+_TIMES_NOISE = 6.0
+#: Noise and range are those that this share of the taxels has at most: of the others some may be bad.
+_SHARE = 0.9
+#: At least this share of the range above rest: taxels without noise drift and creep.
+_SHARE_OF_RANGE = 0.01
+
+
+def measured_floor(examples: Sequence[Example]) -> float | None:
+    """Return the noise floor of pictures of a sensor, in its unit; None of a board's, whose registers set it.
+
+    Six standard deviations of the noise in the tare, and a hundredth of the largest value above rest at least, both
+    those that 90 % of the taxels have at most; the largest of all examples, to three digits.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        Those without a tare, or with one that has no noise of the taxels, say nothing.
+    """
+    floors = []
+    for one in examples:
+        source = recorded(one.source)
+        if not isinstance(source, Frames) or source.unit == "ticks":
+            return None
+        if one.tare is None or np.isnan(one.tare.noise).all() or not len(source):
+            continue
+        above = np.fmax.reduce(source.values, axis=0, initial=-np.inf) - one.tare.rest
+        known = np.isfinite(above) & np.isfinite(one.tare.noise)
+        noise, reach = (float(np.quantile(of[known], _SHARE)) for of in (one.tare.noise, above))
+        floors.append(max(_TIMES_NOISE * noise, _SHARE_OF_RANGE * reach))
+    return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None

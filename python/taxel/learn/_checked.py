@@ -1,0 +1,63 @@
+"""The examples of a check: those of a fit, or an error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._base.arguments import several, shown
+from taxel._base.messages import counted
+from taxel._core import ProblemError
+from taxel.learn._examples import examples, windows
+from taxel.learn.cone_r import ConeR
+from taxel.learn.cone_x import ConeX
+from taxel.spikes import SpikeTrains
+
+__all__ = ["checked_examples", "fitted"]
+
+
+def fitted(cone: object) -> NDArray[np.float64]:
+    """Return the weights of a fit; refuse what is none."""
+    if not isinstance(cone, ConeX | ConeR):
+        raise ProblemError(f"cone is {shown(cone)}: must be a taxel.learn.ConeX or ConeR")
+    return cone._fitted()
+
+
+def checked_examples(
+    cone: ConeX | ConeR,
+    trains: int,
+    patterns: Sequence[SpikeTrains],
+    targets: Sequence[ArrayLike],
+    silence: Sequence[ArrayLike | None] | None = None,
+) -> tuple[list[SpikeTrains], list[NDArray[np.float64]], list[Any]]:
+    """Return patterns, targets and windows; refuse others than those of a fit of this many weights."""
+    _, times = examples(patterns, targets)
+    cone._check()
+    each = [None] * len(times) if silence is None else several("silence", silence)
+    asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
+    trained = several("patterns", patterns)
+    if not len(trained) == len(times) == len(asked) or not trained:
+        raise ProblemError(
+            f"{counted(len(trained), 'pattern')}, {counted(len(times), 'list')} of targets"
+            + f" and {len(asked)} of silence" * (silence is not None)
+            + ": must be one of each a pattern, and one pattern or more"
+        )
+    for p, pattern in enumerate(trained):
+        if len(pattern) != trains:
+            raise ProblemError(f"pattern {p}: {counted(len(pattern), 'train')}, must be the {trains} of the fit")
+        if pattern.kind == "signed":
+            raise ProblemError(f"pattern {p}: spikes are signed, split them into ON and OFF trains first")
+        if (np.diff(times[p]) <= 0).any():
+            raise ProblemError(f"targets of pattern {p}: must ascend")
+    for name, bound in (("lb", cone.lb), ("ub", cone.ub)):
+        if np.ndim(bound) and np.size(bound) != trains:
+            raise ProblemError(
+                f"{name}: {np.size(bound)} bounds for {trains} trains, must be one a train, or one for all"
+            )
+    horizon = np.asarray(0.0 if cone.horizon is None else cone.horizon)
+    if horizon.ndim and horizon.size != len(trained):
+        raise ProblemError(f"horizon: {horizon.size} values, must be one, or one a pattern, {len(trained)}")
+    return trained, times, asked

@@ -1,0 +1,55 @@
+"""Commands of five bytes: the whole ones come out with number and value, all other bytes are counted as skipped."""
+
+import random
+
+import cocotb
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge
+
+
+def parsed(data):
+    """Return the commands in a stream, and how many bytes belong to none, those of an unfinished end left out."""
+    commands, held, skipped = [], [], 0
+    for byte in data:
+        if byte & 0x80:
+            skipped += len(held)
+            held = [byte]
+        elif not held:
+            skipped += 1
+        else:
+            held.append(byte)
+        if len(held) == 5:
+            value = 0
+            for k in range(4):
+                value = value << 8 | (held[0] >> (3 - k) & 1) << 7 | held[k + 1]
+            commands.append((held[0] >> 4 & 7, value))
+            held = []
+    return commands, skipped
+
+
+@cocotb.test()
+async def whole_commands_come_out_and_damage_is_counted(dut):
+    Clock(dut.clk, 10, "ns").start()
+    dut.valid.value, dut.reset.value = 0, 1
+    for _ in range(3):
+        await FallingEdge(dut.clk)
+    dut.reset.value = 0
+    data = []
+    while len(data) < 3000:
+        whole = [0x80 | random.randrange(128), *(random.randrange(128) for _ in range(4))]
+        # Some lose bytes, some get others between.
+        data += [byte for byte in whole if random.random() < 0.95]
+        if random.random() < 0.2:
+            data.append(random.randrange(256))
+    found, skipped = [], 0
+    waiting = list(data)
+    while waiting:
+        valid = random.random() < 0.7
+        dut.valid.value, dut.data.value = int(valid), waiting.pop(0) if valid else random.randrange(256)
+        await FallingEdge(dut.clk)
+        skipped += int(dut.skipped.value)
+        if int(dut.command.value):
+            found.append((int(dut.number.value), int(dut.value.value)))
+    assert (found, skipped) == parsed(data)
+    assert len(found) > 300
+    assert skipped > 100

@@ -1,0 +1,33 @@
+// A register in a stream, and one more for what comes while it waits: neither side's signals pass through in a clock.
+module taxel_stream_register #(
+    parameter int BITS = 8
+) (
+    input  logic            clk,
+    input  logic            reset,
+    input  logic            valid_in,
+    output logic            ready_in,
+    input  logic [BITS-1:0] data_in,
+    output logic            valid_out,
+    input  logic            ready_out,
+    output logic [BITS-1:0] data_out
+);
+
+  logic [BITS-1:0] second;  // holds what came last, where the first is full: then nothing more is let in
+
+  always_ff @(posedge clk) begin
+    if (ready_out || !valid_out) begin
+      // What waits goes first.
+      valid_out <= valid_in || !ready_in;
+      data_out  <= ready_in ? data_in : second;
+      ready_in  <= 1'b1;
+    end else if (valid_in && ready_in) begin
+      ready_in <= 1'b0;
+    end
+    if (ready_in) second <= data_in;
+    if (reset) begin
+      valid_out <= 1'b0;
+      ready_in  <= 1'b1;
+    end
+  end
+
+endmodule

@@ -1,0 +1,47 @@
+"""The longest ramps that the rules allow, one read right behind the other, whatever their crossings take."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from logic import RTL
+from pair import Pair
+from taxel.simulate import NOT_RETURNED
+
+#: Ticks between the longest ramp and the step's period, by rule 3.
+FALLS = 5
+
+
+def with_late_crossings(to):
+    """Write the sources with crossings that take each change at once or a clock later, as the proofs have them."""
+    for source in RTL.glob("*.sv"):
+        shutil.copy(source, to)
+    array = to / "taxel_comparator_array.sv"
+    text = array.read_text()
+    assert text.count("  taxel_synchroniser to_") == 4
+    array.write_text(text.replace("  taxel_synchroniser to_", "  taxel_late_synchroniser to_"))
+    late = (RTL / "formal" / "late_synchroniser.sv").read_text()
+    begins = "  always_ff @(posedge clk) begin"
+    assert late.count(begins) == 1
+    late = late.replace(begins, f"  always_ff @(posedge clk) late <= 1'($urandom);\n{begins}")
+    (to / "taxel_late_synchroniser.sv").write_text(late.replace("taxel_synchroniser", "taxel_late_synchroniser"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", [26, 27, 40, 41, 75, 76])
+def test_a_ramp_as_long_as_its_step_allows_loses_no_value(period, tmp_path):
+    with_late_crossings(tmp_path)
+    rng = np.random.default_rng(period)
+    pair = Pair(4, 8, source=tmp_path, seed=period)
+    held, ramp = pair.board.registers, 3 * period - FALLS
+    line = {"line_period": 0.04 * period, "line_read": 0.04 * period}
+    step = {"step_period": 0.01 * period, "step_read": 0.01 * period}
+    pair.write(held.commands_to(held.replace(**line, **step, ramp=ramp, noise_floor=0)))
+    for _ in range(60):
+        drawn = rng.integers(0, ramp + 2, (8, 4))
+        ends = rng.choice([0, 1, ramp - 3, ramp - 2, ramp - 1, ramp, 60_000, NOT_RETURNED], (8, 4))
+        pair.frame(np.where(rng.random((8, 4)) < 0.5, drawn, ends).astype(np.uint16))
+    pair.finish()
+    assert pair.received == pair.expected
+    assert sum(map(len, pair.received)) > 5_000

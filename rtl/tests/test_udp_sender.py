@@ -1,0 +1,128 @@
+"""Frames of Ethernet as the simulated sender makes them, by a parser of their own: RFC 791, RFC 768, IEEE 802.3."""
+
+import shutil
+import struct
+import zlib
+
+import numpy as np
+import pytest
+
+from logic import RTL
+from sender import Sender
+
+FROM, TO = (bytes([192, 168, 52, 8]), 5208), (bytes([192, 168, 52, 1]), 5208)
+#: The least gap between frames, byte times.
+GAP = 12
+
+
+def payload_of(frame: bytes) -> bytes:
+    """Return the payload of a frame with preamble and check sequence, after looking at all that goes with it."""
+    assert frame[:8] == b"\x55" * 7 + b"\xd5"
+    body, check = frame[8:-4], frame[-4:]
+    assert check == struct.pack("<I", zlib.crc32(body))
+    assert len(body) >= 60
+    assert struct.unpack(">6s6sH", body[:14]) == (b"\xff" * 6, b"\x02TAX\0\0", 0x0800)
+    packet = body[14:]
+    words = struct.unpack(">10H", packet[:20])
+    total = sum(words)
+    assert (total & 0xFFFF) + (total >> 16) == 0xFFFF
+    version, length, fragment, hops, protocol, source, target = struct.unpack(">HH2xHBB2x4s4s", packet[:20])
+    assert (version, fragment, hops, protocol) == (0x4500, 0x4000, 64, 17)
+    assert (source, target) == (FROM[0], TO[0])
+    from_port, to_port, udp_length, udp_checksum = struct.unpack(">4H", packet[20:28])
+    assert (from_port, to_port, udp_checksum) == (FROM[1], TO[1], 0)
+    assert udp_length == length - 20
+    # What pads a short frame is zeros, and no more of them than it takes.
+    assert packet[length:] == bytes(max(46 - length, 0))
+    return packet[28:length]
+
+
+def sent(sender: Sender, payloads: list[bytes]) -> list[tuple[bytes, int]]:
+    for payload in payloads:
+        sender.send(payload)
+    sender.finish()
+    return sender.frames()
+
+
+def test_quick_frames_of_each_length_carry_their_payload():
+    rng = np.random.default_rng(1)
+    lengths = [*range(1, 70), 255, 256, 257, 511, 1399, 1400, 1471, 1472]
+    rng.shuffle(lengths)
+    payloads = [rng.bytes(length) for length in lengths]
+    frames = sent(Sender(), payloads)
+    assert [payload_of(frame) for frame, _ in frames] == payloads
+    assert {len(frame) for frame, _ in frames} >= {8 + 64, 8 + 65, 8 + 1518}
+    assert min(gap for _, gap in frames) >= GAP
+
+
+#: The link's clock, ps, in how many of 256 clocks a byte is offered, and a seed.
+CLOCKS = [(8000, 30, 2), (7990, 256, 3), (8012, 140, 4), (40_000, 256, 5)]
+
+
+@pytest.mark.parametrize(("link_ps", "of_256", "seed"), CLOCKS)
+def test_random_payloads_and_clocks(link_ps, of_256, seed):
+    rng = np.random.default_rng(seed)
+    sender = Sender(link_ps=link_ps, phase_ps=int(rng.integers(0, 8000)), seed=seed)
+    sender.offers(of_256)
+    short, long = rng.integers(1, 60, 100), rng.integers(1, 1401, 30)
+    payloads = [rng.bytes(int(length)) for length in rng.permutation(np.concatenate([short, long]))]
+    frames = sent(sender, payloads)
+    assert [payload_of(frame) for frame, _ in frames] == payloads
+    assert min(gap for _, gap in frames[1:]) >= GAP
+
+
+def test_a_reset_forgets_what_was_not_sent_and_breaks_no_later_frame():
+    rng = np.random.default_rng(6)
+    sender = Sender()
+    for length in (700, 900, 1400):
+        sender.send(rng.bytes(length))
+    sender.run(1700)
+    sender.run(100, reset=True)
+    sender.frames()
+    # The core's reset begins with what is left of the payload that was being offered.
+    sender.finish()
+    sender.frames()
+    payloads = [rng.bytes(int(length)) for length in rng.integers(1, 1401, 20)]
+    assert [payload_of(frame) for frame, _ in sent(sender, payloads)] == payloads
+
+
+#: File, what stands there, what stands there instead.
+FAULTS = [
+    ("taxel_udp_sender.sv", "lengths[filled] <= room ? place + BITS'(1) : place;", "lengths[filled] <= place;"),
+    ("taxel_udp_sender.sv", "given[filled] == taken_here[filled]", "1'b1"),
+    ("taxel_udp_sender.sv", "sent        <= !sent;", ""),
+    ("taxel_ethernet_frame.sv", "16'(size) + 16'd28", "16'(size) + 16'd20"),
+    ("taxel_ethernet_frame.sv", "~added(SUM, total)", "~(SUM + total)"),
+    ("taxel_ethernet_frame.sv", "at >= size", "1'b0"),
+    ("taxel_ethernet_frame.sv", "localparam int LEAST = 60 - HEADERS;", "localparam int LEAST = 59 - HEADERS;"),
+    ("taxel_ethernet_frame.sv", "if (preamble) crc <= '1;", "if (reset) crc <= '1;"),
+    ("taxel_ethernet_frame.sv", "crc >> 8", "crc << 8"),
+    ("taxel_ethernet_frame.sv", "localparam int GAP = 12;", "localparam int GAP = 9;"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=range(len(FAULTS)))
+def test_a_fault_of_the_sender_is_seen(fault, tmp_path):
+    file, there, instead = fault
+    for source in RTL.glob("*.sv"):
+        shutil.copy(source, tmp_path)
+    text = (tmp_path / file).read_text()
+    assert text.count(there) == 1
+    (tmp_path / file).write_text(text.replace(there, instead))
+    with pytest.raises((AssertionError, RuntimeError)):
+        check(Sender(source=tmp_path))
+
+
+def check(sender: Sender) -> None:
+    """Send what shows every fault of the list."""
+    rng = np.random.default_rng(7)
+    payloads = [rng.bytes(int(length)) for length in [1, 17, 18, 19, 1400, *rng.integers(1, 300, 60)]]
+    # A core that waits for nothing would be seen by payloads that are lost.
+    frames = sent(sender, payloads)
+    assert [payload_of(frame) for frame, _ in frames] == payloads
+    assert min(gap for _, gap in frames) >= GAP
+
+
+def test_the_sender_without_a_fault_is_not_taken_for_one():
+    check(Sender())

@@ -1,0 +1,346 @@
+"""Training on a sensor of one's own: pictures of a grid in any unit, with an offset and noise of each taxel."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shell import call
+
+import taxel
+from taxel import Array, Frames, SpikeTrains, Tare
+from taxel.cli import _recordings
+from taxel.detect import Example, PlainRule, Recipe, choose, judge, recipes, run, score, training
+from taxel.detect.advice import advised
+from taxel.detect.floors import measured_floor
+from taxel.detect.followed import follow
+from taxel.detect.plain_score import PlainScore
+from taxel.detect.training import trained
+from taxel.encode import ContactArea, LevelCrossing, LocalLoad
+
+LABELS = ("contact", "lift")
+
+
+def touched(
+    shape: tuple[int, int], seed: int, *, gain: float, noise: float, offset: float = 0.0, begin_s: float = 1.0
+) -> tuple[Frames, dict[str, np.ndarray]]:
+    """Return pictures at 100 Hz of 12 touches anywhere, and when they begin and end."""
+    random = np.random.default_rng(seed)
+    count, period = 12, 100
+    first = round(100 * begin_s)
+    values = random.normal(offset, offset / 20, shape) + random.normal(0, noise, (first + count * period, *shape))
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    starts = first + period * np.arange(count) + random.integers(0, 20, count)
+    stops = starts + random.integers(30, 60, count)
+    for start, stop in zip(starts, stops, strict=True):
+        at = [random.uniform(1, side - 2) for side in shape]
+        values[start:stop] += gain * random.uniform(0.3, 1) * np.exp(-((y - at[0]) ** 2 + (x - at[1]) ** 2) / 3)
+    times = np.arange(len(values)) * 10_000
+    return Frames(values, times, unit="counts", array=Array(*shape)), {"contact": times[starts], "lift": times[stops]}
+
+
+def written(folder: Path, frames: Frames, labels: dict[str, np.ndarray], more: str = "") -> tuple[object, ...]:
+    """Write a recording and its labels, and return the arguments of a training."""
+    taxel.convert(frames, folder / "own.npz")
+    rows = [f"{label},{t}" for label, times in labels.items() for t in times]
+    (folder / "labels.csv").write_text("\n".join(["label,t_us", *rows]) + "\n" + more)
+    return ("train", folder / "own.npz", "--labels", folder / "labels.csv", "-o", folder / "readout.json")
+
+
+@pytest.mark.parametrize(
+    ("shape", "values"),
+    [
+        ((24, 32), {"gain": 1200.0, "noise": 6.0, "offset": 3000.0}),
+        ((16, 16), {"gain": 0.8, "noise": 0.006, "offset": 0.2}),
+        ((8, 8), {"gain": 200.0, "noise": 1.0, "offset": 10.0}),
+    ],
+)
+def test_a_plain_training_finds_the_touches_of_any_grid(
+    tmp_path: Path, capsys, shape: tuple[int, int], values: dict[str, float]
+) -> None:
+    code, out, error = call(capsys, *written(tmp_path, *touched(shape, 1, **values)))
+    assert code == 0, error
+    lines = out.splitlines()
+    assert lines[0] == "held out: 5 blocks of time (window 50 ms)"
+    for line, label in zip(lines[1:4:2], LABELS, strict=True):
+        found, missed, false = map(int, re.findall(r"(\d+) (?:of 12 found|missed|false)", line))
+        assert (line.startswith(f"{label}, neuron: "), found + missed, missed + false <= 1) == (True, 12, True), line
+    assert "recipe touch" in out
+    unseen, truth = touched(shape, 2, **values)
+    tare = Tare.take(unseen, stop_us=900_000)
+    again = score(run(taxel.Readout.load(tmp_path / "readout.json"), unseen, tare=tare), truth)
+    assert again.missed + again.false <= 1
+
+
+def test_the_floor_scales_with_the_unit_and_not_with_a_bad_taxel() -> None:
+    frames, labels = touched((6, 6), 3, gain=100.0, noise=1.0)
+    values = frames.values.astype(float)
+    values[:, 2, 3] *= 40
+
+    def floor(values: np.ndarray, unit: str = "counts") -> float | None:
+        frames_of = Frames(values, frames.t, unit=unit, array=frames.array)
+        return measured_floor([Example(frames_of, labels, Tare.take(frames_of, stop_us=900_000))])
+
+    alone = floor(frames.values)
+    assert alone == pytest.approx(6.0, rel=0.25)
+    assert floor(frames.values * 0.001) == pytest.approx(alone / 1000, rel=0.01)
+    assert floor(values) < 3 * alone
+    assert floor(frames.values, "ticks") is None, "a board's registers state it"
+    assert measured_floor([Example(frames, labels)]) is None
+
+
+@pytest.mark.parametrize(("floor", "above"), [(0.0, 0.5), (0.04, 0.06), (1.0, 1.5), (3.0, 3.5), (30.0, 30.5)])
+def test_half_a_tick_is_half_of_a_floor_below_a_tick(floor: float, above: float) -> None:
+    assert ContactArea(noise_floor=floor).above == pytest.approx(above)
+
+
+def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys) -> None:
+    plan = Recipe.load("touch", {"encoders.area.noise_floor": 30.0}, LABELS, 0.5)
+    parts = plan.encoder.parts
+    assert parts["area"] == ContactArea(noise_floor=30.0)
+    assert parts["load"] == LocalLoad(noise_floor=0.5, least_noise=0.05, local_ms=[50.0, 300.0], period_ms=0.5)
+    assert Recipe.load("gait_plate", None, None, 0.5).encoder == Recipe.load("gait_plate").encoder
+    arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
+    assert call(capsys, *arguments, "--set", "encoders.levels.noise_floor=9")[0] == 0
+    assert taxel.Readout.load(tmp_path / "readout.json").encoder.parts["levels"].noise_floor == 9.0
+
+
+@pytest.mark.parametrize(
+    ("labels", "unit", "shape", "recipe"),
+    [
+        (("contact", "lift"), "counts", (2, 2), "touch"),
+        (("Press", "release"), "N", (2, 2), "touch"),
+        (("contact",), "V", (2, 2), "touch"),
+        (("contact", "foot_off"), "counts", (2, 2), "gait_plate"),
+        (("contact", "Foot off"), "N", (2, 2), "gait_insole"),
+        (("slip",), "counts", (2, 2), "gait_plate"),
+        (("contact", "lift"), "V", (1, 4), "gait_channel"),
+        (("soft", "hard"), "V", (16, 16), "touch"),
+        (("soft", "hard"), "V", (3, 11), "touch"),
+        (("soft", "hard"), "V", (4, 8), "gait_channel"),
+        (("soft", "hard"), "V", (1, 64), "gait_channel"),
+        (("soft", "hard"), "counts", (16, 16), "gait_plate"),
+        (("contact", "foot_off"), "kPa", (16, 16), "gait_channel"),
+        ((), "counts", (2, 2), "gait_plate"),
+    ],
+)
+def test_labels_and_neighbours_choose_the_recipe(
+    labels: tuple[str, ...], unit: str, shape: tuple[int, int], recipe: str
+) -> None:
+    assert recipes.fitting(Frames(np.zeros((1, *shape)), [0], unit=unit, array=Array(*shape)), labels) == recipe
+
+
+def test_a_row_of_taxels_at_a_known_distance_is_no_channels() -> None:
+    row = Array(1, 4, pitch_mm=5.0)
+    assert recipes.fitting(Frames(np.zeros((1, 1, 4)), [0], unit="V", array=row), LABELS) == "touch"
+
+
+def test_a_recording_that_begins_with_a_touch_has_the_rest_of_its_quiet_stretch(tmp_path: Path, capsys) -> None:
+    frames, labels = touched((8, 8), 4, gain=200.0, noise=1.0, offset=10.0)
+    first = int(labels["contact"][0]) - 50_000
+    arguments = written(tmp_path, frames.between(first, int(frames.t[-1]) + 1), labels)
+    code, out, error = call(capsys, *arguments)
+    assert code == 0, error
+    assert "contact, neuron: 12 of 12 found, 0 missed, 0 false" in out
+
+
+def test_a_label_outside_the_recording_is_said_and_left_out(tmp_path: Path, capsys) -> None:
+    arguments = written(tmp_path, *touched((8, 8), 4, gain=200.0, noise=1.0, offset=10.0), more="slip,900000000\n")
+    code, out, error = call(capsys, *arguments)
+    assert (code, "contact, neuron: 12 of 12" in out) == (0, True)
+    labels, recording = tmp_path / "labels.csv", tmp_path / "own.npz"
+    assert f"1 of the 25 events of {labels} left out: outside {recording} (0.000 to 12.990 s)" in error
+
+
+def test_a_refused_training_leaves_no_folder_of_its_report(tmp_path: Path, capsys) -> None:
+    arguments = written(tmp_path, *touched((8, 8), 4, gain=200.0, noise=1.0))
+    code, _, _ = call(capsys, *arguments, "--recipe", "./none.toml", "--report", tmp_path / "a" / "b")
+    assert (code, (tmp_path / "a").exists()) == (2, False)
+    (tmp_path / "kept").mkdir()
+    assert call(capsys, *arguments, "--recipe", "./none.toml", "--report", tmp_path / "kept")[0] == 2
+    assert (tmp_path / "kept").is_dir()
+
+
+def test_a_training_that_is_ended_while_its_report_is_drawn_leaves_no_folder(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    def ended(*_: object, **__: object) -> str:
+        raise KeyboardInterrupt
+
+    arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
+    monkeypatch.setattr("taxel.report.listening.render", ended)
+    assert call(capsys, *arguments, "--report", tmp_path / "a" / "b")[0] != 0
+    assert not (tmp_path / "a").exists()
+
+
+def test_advice_names_the_rule_that_won_or_the_recipe_of_its_inputs() -> None:
+    frames, labels = touched((8, 8), 5, gain=200.0, noise=1.0)
+    example = Example(frames, labels, Tare.take(frames, stop_us=900_000))
+    every = np.sort(labels["contact"])
+
+    def scored(found: int) -> taxel.detect.Score:
+        times = every[:found]
+        return score(taxel.Detections(["contact"] * found, times, times), {"contact": every})
+
+    rule = PlainScore({"contact": PlainRule("area", 2)}, scored(12))
+    floor = measured_floor([example])
+    of_area = trained([example], Recipe.load("touch", None, LABELS, floor), None)
+    other = of_area._replace(recipe=Recipe(LevelCrossing([1.0])))
+    for made, helps in ((of_area, "the plain rule"), (other, "--recipe touch")):
+        advice = advised(made, [example], scored(6), scored(12), None, rule)["contact"]
+        assert (advice.helps, "leaves 0 missed and false on the same labels, the neuron 6" in advice.because) == (
+            helps,
+            True,
+        )
+    assert advised(other, [example], scored(6), scored(12), None)["contact"].helps == "more labels"
+    row = Example(Frames(np.zeros((2, 1, 4)), [0, 1], unit="V", array=Array(1, 4)), labels)
+    assert advised(other, [row], scored(6), scored(12), None)["contact"].helps == "--array"
+    learners = dict(zip(("contact", "foot_off"), of_area.learners.values(), strict=True))
+    gait = other._replace(readout=taxel.Readout(of_area.readout.encoder, learners))
+    assert advised(gait, [row], scored(6), scored(12), None)["contact"].helps == "more labels"
+    assert advised(gait, [example], scored(6), scored(12), None, rule)["contact"].helps == "the plain rule"
+
+
+def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    followed, said = [], []
+    monkeypatch.setattr(training, "follow", lambda *of: followed.append(of[1]) or follow(*of))
+    frames, labels = touched((8, 8), 6, gain=200.0, noise=1.0)
+    example = Example(frames, labels, Tare.take(frames, stop_us=900_000))
+    judge([example], Recipe.load("touch", None, LABELS, measured_floor([example])), 2, progress=said.append)
+    assert ([one for one in said if one.startswith("encoding")], followed) == (["encoding 1 of 1"] * 2, [])
+    # With a floor above every touch area and levels find nothing; two quantities are tried, and followed once.
+    floors = {
+        "encoders.area.noise_floor": 90.0,
+        "encoders.levels.noise_floor": 9e4,
+        "encoders.changes.noise_floor": 9e4,
+    }
+    blind = Recipe.load("touch", floors, LABELS, 3.0)
+    said.clear()
+    made = training.trained([example], blind, said.append)
+    assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 4
+    assert sorted(followed) == ["contact", "lift"]
+    assert {one.inputs for one in made.readout.neurons.values()} <= {("area",), ("load",), ()}
+
+
+def test_a_training_estimates_how_long_it_takes_by_the_folds_that_are_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr(_recordings, "perf_counter", lambda: now[0])
+    steps, said = _recordings._Steps(), []
+    for at, step in ((0, "reading"), (10, "fold 1 of 5"), (15, "learning"), (20, "fold 2 of 5"), (29, "learning")):
+        now[0] = float(at)
+        steps.update(step)
+        said.append(str(steps))
+    # Reading is no part of a fold; the training on all data and the plain rules count as two.
+    told = ["fold 2 of 5, after 20 s; about 80 s in all", "learning, after 29 s; about 80 s in all"]
+    assert said == ["reading, after 0 s", "fold 1 of 5, after 10 s", "learning, after 15 s", *told]
+    now[0] = 90.0
+    assert str(steps) == "learning, after 90 s"
+
+
+def test_without_a_terminal_lines_say_where_it_is_also_within_a_step(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(_recordings, "_SAY_S", (0.1, 0.2))
+    with _recordings.progress(quiet=False) as update:
+        update("reading a.npy")
+        time.sleep(1.0)
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) >= 2
+    assert all(re.fullmatch(r"taxel: reading a\.npy, after [01] s", line) for line in said)
+    with _recordings.progress(quiet=True) as update:
+        update("reading a.npy")
+        time.sleep(0.3)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_search_has_no_more_folds_than_recordings_of_two_feet_each() -> None:
+    recipe = Recipe(LevelCrossing([1.0]), {"tau": 2.0, "delay_ms": 1.0}, {"contact": {"search": [{"ub": 2.0}]}})
+    examples = [
+        Example(SpikeTrains.from_lists([[t]], stop=90.0), {"contact": [int(1000 * t)]}, group=walk)
+        for t, walk in ((10.0, "a"), (20.0, "a"), (30.0, "b"), (40.0, "b"))
+    ]
+    assert choose(examples, recipe).neurons.keys() == {"contact"}
+
+
+def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path: Path, capsys) -> None:
+    values = np.zeros((400, 3, 4), np.float32)
+    values[100:200, 1:, 1:] = values[250:300, 1:, 1:] = 20.0
+    np.save(tmp_path / "flat.npy", values.reshape(400, 12))
+    (tmp_path / "flat.layout.toml").write_text("rate_hz = 1000\n")
+    taxel.detect.PlainRule("area", 3).save(tmp_path / "rule.json")
+    detect = ("detect", tmp_path / "flat.npy", "--readout", tmp_path / "rule.json", "--tare", "0.05")
+    assert "1 x 12 channels without a pitch; give --array ROWSxCOLUMNS" in call(capsys, *detect)[2]
+    assert "--array: 4 x 4 taxels; " in call(capsys, *detect, "--array", "4x4")[2]
+    status, said, _ = call(capsys, *detect, "--array", "3x4", "--json")
+    assert status == 0
+    assert [one["t_us"] / 1000 for one in json.loads(said)["detections"]] == [100, 200, 250, 300]
+    grid = Frames(values, np.arange(400) * 1000)
+    recipe = Recipe(LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
+    example = Example(grid, {"contact": [100_000, 250_000]}, Tare.take(grid, stop_us=50_000))
+    taxel.detect.train([example], recipe).save(tmp_path / "readout.json")
+    said = call(capsys, "detect", tmp_path / "flat.npy", "--readout", tmp_path / "readout.json", "--tare", "0.05")[2]
+    assert "1 x 12 taxels: the readout was trained on 3 x 4; give --array 3x4, or rows and columns in a layout" in said
+
+
+def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_path: Path) -> None:
+    values = np.random.default_rng(4).integers(0, 3, (20_000, 24, 40)).astype(np.int16)
+    labels = ["label,t_us"]
+    for k in range(200, 19_000, 100):
+        values[k : k + 40, 5:9, 5:9] += 100
+        labels += [f"contact,{2000 * k}", f"lift,{2000 * (k + 40)}"]
+    np.save(tmp_path / "a.npy", values)
+    (tmp_path / "a.layout.toml").write_text("rate_hz = 500\n")
+    (tmp_path / "labels.csv").write_text("\n".join(labels) + "\n")
+    words = ["train", tmp_path / "a.npy", "--labels", tmp_path / "labels.csv", "-o", tmp_path / "readout.json"]
+    begun = [sys.executable, "-m", "taxel", *map(str, words)]
+    process = subprocess.Popen(begun, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    # The first line comes within a step; what follows is interrupted in the middle.
+    first = process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    before = time.perf_counter()
+    said, more = process.communicate(timeout=60)
+    assert first.startswith("taxel: "), (first, more)
+    assert (process.returncode, said) == (130, "")
+    assert "Traceback" not in more
+    assert time.perf_counter() - before < 10
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["a.layout.toml", "a.npy", "labels.csv"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["train", "a.npy", "-o", "r.json"], "names no event in a.npy; give --labels FILE, a table label,t_us"),
+        (["info", "a.npy", "--topic", "/a"], "a.npy: no ROS bag; topic, field, types and ros are of one"),
+        (["info", "b.npy", "--rate-hz", "-3"], "must be above 0"),
+        (["info", "a.npy", "--array", "0x5"], "--array 0x5: rows is 0: must be a whole number from 1 to 65535"),
+        (["info", "labels.csv"], "line 1: a table of labels (docs/command-line.md), no recording"),
+    ],
+)  # fmt: skip
+def test_wrong_input_says_what_would_be_right(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, layout in (("a", "rate_hz = 10"), ("b", 'unit = "counts"')):
+        np.save(f"{name}.npy", np.zeros((9, 2, 3)))
+        Path(f"{name}.layout.toml").write_text(layout)
+    Path("labels.csv").write_text("label,t_us\ncontact,3\n")
+    status, _, wrong = call(capsys, *words)
+    assert (status, wrong.count("\n")) == (2, 1)
+    assert said in wrong
+
+
+def test_info_takes_the_rate_of_numbered_pictures(tmp_path: Path, capsys) -> None:
+    np.save(tmp_path / "b.npy", np.zeros((9, 2, 3)))
+    (tmp_path / "b.layout.toml").write_text('unit = "counts"')
+    facts = json.loads(call(capsys, "info", tmp_path / "b.npy", "--rate-hz", "10", "--json")[1])
+    assert (facts["timed"], facts["to_us"]) == (True, 800_000)

@@ -1,0 +1,401 @@
+"""`check_gap` against the least objective that a cone solver finds: what it proves holds, whatever the multipliers."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import stated
+import test_cone_r
+from making import made
+
+from taxel import NotFittedError, ProblemError, SpikeTrains
+from taxel.learn import ConeR, ConeX, Multipliers, OnlineConeR, Row, check_gap, check_solution
+
+pytest.importorskip("clarabel")
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+#: How far, relative to the objective, the checked gap of a fit may be above its `gap_`.
+ROUNDING = 1e-8
+
+
+def drawn(seed):
+    """A fit with options, bounds, windows and examples of every kind, its examples and its windows."""
+    random = np.random.default_rng([77, seed])
+    one = lambda *values: values[random.integers(len(values))]  # noqa: E731
+    trains, kernel = int(random.integers(1, 15)), one("alpha", "alpha", "double_exponential", "exponential")
+    shape = (int(random.integers(1, 4)), int(random.integers(1, 4)))
+    patterns, targets = stated.examples(seed, trains, *shape, whole_ms=one(True, False), first=20.0)
+    kind = one("unsigned", "unsigned", "positive", "signs")
+    if kind != "unsigned":
+        signs = [1.0] if kind == "positive" else [-1.0, 1.0]
+        patterns = stated.graded(patterns, seed, lambda r, n: r.choice(signs, n) * 10 ** r.uniform(-1, 1, n))
+    empty = random.random(trains) < one(0.0, 0.3)
+    keep = [~np.repeat(empty, p.counts) for p in patterns]
+    counts = [np.where(empty, 0, p.counts) for p in patterns]
+    patterns = [
+        SpikeTrains(
+            p.times[k],
+            np.append(0, np.cumsum(c)),
+            p.start,
+            p.stop,
+            p.values if p.values is None else p.values[k],
+            kind=p.kind,
+        )
+        for p, k, c in zip(patterns, keep, counts, strict=True)
+    ]
+    # A pattern without spikes has no target.
+    targets = [t if len(p.times) else t[:0] for p, t in zip(patterns, targets, strict=True)]
+    targets[0] = targets[0][: int(random.integers(0, 4))]
+    options = {
+        "kernel": kernel,
+        "tau": float(random.uniform(5, 30)),
+        "after_spike": one("keep", "ignore", "reset"),
+        "first_threshold": one("theta_0", "printed"),
+        "refractory": one(1.0, 3.0, 6.5),
+        "theta_plus": one(0.0, 0.2, 2.0),
+        "tau_rec": one(None, 8.0, 100.0),
+        "step_ms": one(1.0, 1.0, 0.5, 0.3),
+        "margin": one(0.0, 0.0, 0.02),
+        "horizon": one(None, None, 180.0),
+        "kappa": float(random.uniform(0.8, 2.0)),
+        "delta_t_ms": one(None, 0.0, 4.0),
+        "lambdas": [*(one(0.0, 1.0, 10.0, 100.0) for _ in range(4)), one(1.0, 80.0, 800.0)],
+        "divide_b_by": one("B_max", "targets"),
+        "divide_c_by": one("C_max", "targets"),
+        "divide_d_by": one("D_max", "targets"),
+        "sides_b": one("both", "below"),
+        "sides_c": one("both", "below"),
+        "norm": one("norm", "square"),
+        "engine": one("native", "native", "cone solver"),
+        "tolerance": one(1e-6, 1e-6, 1e-3),
+    }
+    if kernel == "double_exponential" and one(True, False):
+        options["tau_s"] = 0.5 * options["tau"]
+    low, high = random.uniform(-1, 0.02, trains), random.uniform(0.05, 1, trains)
+    kinds = {"one": (-0.5, 0.3), "each": (low.tolist(), high.tolist()), "wide": (-300.0, 300.0), "up": (0.01, 0.6)}
+    options["lb"], options["ub"] = kinds[one(*kinds)]
+    silence = one(None, None, [one(None, [(15.0, 40.0), (40.0, 60.5)], []) for _ in patterns])
+    cone = made(ConeR, **options).fit(patterns, targets, silence=silence)
+    return cone, patterns, targets, silence
+
+
+def least_and_objective(cone, patterns, targets, silence, monkeypatch):
+    """The least objective, and the objective as a function of weights, both as `test_cone_r` states them."""
+    rows = test_cone_r.statement(cone, patterns, targets, silence)
+    sizes = rows
+    if patterns[0].kind == "graded":
+        positive = [SpikeTrains(p.times, p.offsets, p.start, p.stop, abs(p.values), kind="graded") for p in patterns]
+        sizes = (*map(np.abs, rows[:3]), test_cone_r.statement(cone, positive, targets, silence)[3], rows[4])
+    factors = test_cone_r.shares(cone, sizes)
+    with monkeypatch.context() as patched:
+        patched.setattr(test_cone_r, "shares", lambda *_: factors)
+        least = test_cone_r.least(cone, rows)
+    return least, lambda w: factors @ test_cone_r.terms(cone, rows, w)
+
+
+def with_others(cone, weights=None, **proof):
+    """The fit with other weights, or with a proof that differs."""
+    other = copy.copy(cone)
+    other.weights_ = cone.weights_ if weights is None else weights
+    other.multipliers_ = replace(cone.multipliers_, **proof)
+    return other
+
+
+def spoilt(random, proof):
+    """What may be wrong with a proof."""
+    rows, values, pull = proof.rows, proof.values, proof.pull
+    n = len(values)
+    yield {"values": random.uniform(0, 3) * values}
+    yield {"values": values + random.normal(0, 0.1, n) * np.abs(values).max(initial=0.0)}
+    yield {"values": -values}
+    yield {"values": random.permutation(values)}
+    yield {"values": 1e9 * random.normal(0, 1, n)}
+    yield {"rows": rows + rows, "values": np.append(values, values)}
+    yield {"pull": random.normal(0, 1, len(pull)) * np.linalg.norm(pull)}
+    yield {"pull": 3 * pull}
+    yield {"rows": [], "values": np.zeros(0), "pull": 0 * pull}
+    if n:
+        keep = np.arange(n) != random.integers(n)
+        yield {"rows": [row for row, kept in zip(rows, keep, strict=True) if kept], "values": values[keep]}
+
+
+@pytest.mark.parametrize("part", range(8))
+def test_what_is_proven_holds_whatever_the_multipliers_and_the_weights(part, monkeypatch):
+    closed = 0
+    for seed in range(12 * part, 12 * part + 12):
+        cone, patterns, targets, silence = drawn(seed)
+        random, trains = np.random.default_rng([78, seed]), len(patterns[0])
+        least, objective = least_and_objective(cone, patterns, targets, silence, monkeypatch)
+        least = min(least, cone.objective_)
+        # An objective this far below that of zero weights counts as 0.
+        least += 1e-10 * objective(np.clip(np.zeros(trains), cone.lb, cone.ub)) + 1e-12 * least
+
+        def proven(other, patterns=patterns, targets=targets, silence=silence, objective=objective):
+            gap = check_gap(other, patterns, targets, silence=silence)
+            return objective(other.weights_) * (1 - gap), gap
+
+        bound, gap = proven(cone)
+        assert gap <= cone.gap_ + ROUNDING, f"seed {seed}: {gap} of {cone.gap_}"
+        assert bound <= least, f"seed {seed}"
+        closed += gap <= cone.tolerance + ROUNDING
+        for number, wrong in enumerate(spoilt(random, cone.multipliers_)):
+            assert proven(with_others(cone, **wrong))[0] <= least, f"seed {seed}, proof {number}"
+        for scale in (0.0, 0.9, 1.0):
+            off = scale * cone.weights_ + 0.1 * scale * random.normal(0, np.abs(cone.weights_).max(), trains)
+            bound, gap = proven(with_others(cone, np.clip(off, cone.lb, cone.ub)))
+            assert bound <= least, f"seed {seed}, weights {scale}"
+    assert closed >= 9
+
+
+def small(**options):
+    """A fit with rows of all kinds, and its examples."""
+    examples = stated.examples(4, first=20.0, whole_ms=True)
+    cone = made(ConeR, tau=12.0, lambdas=(4, 2, 100, 100, 8), **options).fit(*examples)
+    assert cone.status_ == "solved"
+    return cone, examples
+
+
+def gap_unless_refused(*arguments, **silence):
+    """The checked gap; infinite where a multiplier belongs to a row that the problem does not have."""
+    try:
+        return check_gap(*arguments, **silence)
+    except ProblemError as error:
+        if "the problem has no such row" not in str(error):
+            raise
+        return np.inf
+
+
+@pytest.mark.parametrize("options", [{}, {"norm": "square"}, {"engine": "cone solver"}])
+def test_every_multiplier_is_needed(options):
+    cone, examples = small(**options)
+    proof, gap = cone.multipliers_, check_gap(cone, *examples)
+    assert gap <= cone.tolerance
+    assert {row.kind for row in proof.rows} == {"silence", "target", "behind"}
+    assert len(set(proof.rows)) == len(proof.rows)
+    for k, row in enumerate(proof.rows):
+        for wrong in (0.0, 0.9, -1.0):
+            values = proof.values.copy()
+            values[k] *= wrong
+            assert check_gap(with_others(cone, values=values), *examples) > gap, row
+    assert check_gap(with_others(cone, pull=0 * proof.pull), *examples) > gap + 1e-3
+    # A multiplier of another silent point or of the other target proves less.
+    gaps = []
+    for k, row in enumerate(proof.rows):
+        other = row._replace(at=row.at - 2 if row.kind == "silence" else 1 - row.at)
+        rows = [*proof.rows[:k], other, *proof.rows[k + 1 :]]
+        gaps.append(gap_unless_refused(with_others(cone, rows=rows), *examples))
+    assert min(gaps) > gap
+    assert np.isfinite(gaps).mean() > 0.8
+
+
+@pytest.mark.parametrize("lambdas", [(0, 0, 0, 0, 1), (0, 0, 0, 1, 0)])
+def test_multipliers_out_of_their_range_prove_no_more(lambdas):
+    """The least weight is too much already, for silence and at the target: all multipliers are at their limit."""
+    examples = [SpikeTrains.from_lists([[5.0]], stop=60.0)], [[12.0]]
+    cone = made(ConeR, tau=12.0, lambdas=lambdas, lb=2.0, ub=4.0).fit(*examples)
+    gap = check_gap(with_others(cone, np.array([4.0])), *examples)
+    assert 0.1 < gap < 0.9
+    more = with_others(cone, np.array([4.0]), values=1.2 * cone.multipliers_.values)
+    assert check_gap(more, *examples) == pytest.approx(gap, abs=1e-9)
+
+
+def test_other_weights_other_examples_and_other_parameters_have_a_larger_gap():
+    cone, (patterns, targets) = small()
+    gap = check_gap(cone, patterns, targets)
+    for train in np.flatnonzero(np.abs(cone.weights_) > 0.01):
+        weights = cone.weights_.copy()
+        weights[train] *= 0.9
+        assert check_gap(with_others(cone, weights), patterns, targets) > gap + 1e-6
+    assert check_gap(with_others(cone, cone.weights_ + 1), patterns, targets) == np.inf
+    assert check_gap(with_others(cone, np.full(20, np.nan)), patterns, targets) == np.inf
+    assert gap_unless_refused(cone, patterns, [t + 1 for t in targets]) > 1e-3
+    assert gap_unless_refused(cone, patterns[::-1], targets[::-1]) > 1e-3
+    shifted = [SpikeTrains(p.times + 1, p.offsets, p.start, p.stop + 1) for p in patterns]
+    assert check_gap(cone, shifted, targets) > 1e-3
+    assert check_gap(copy.copy(cone).set_params(kappa=1.3), patterns, targets) > 1e-4
+    assert gap_unless_refused(cone, patterns, targets, silence=[[(0.0, 1.0)], None]) > 1e-3
+    assert check_gap(cone, patterns, targets, silence=[[(0.0, 130.0)], None]) < gap + ROUNDING
+
+
+def test_a_fit_that_ended_early_is_checked_as_well():
+    cone, examples = small(tolerance=0.1)
+    gap = check_gap(cone, *examples)
+    assert 1e-5 < gap <= cone.gap_ + ROUNDING
+
+
+def test_a_window_of_online_cone_r_is_checked_from_its_oldest_pattern_on():
+    patterns, targets = stated.examples(6, trains=12, patterns=5, first=20.0)
+    online = OnlineConeR(window=3, lb=-1.0, ub=1.0)
+    for k in range(5):
+        silence = [(0.0, 60.0)] if k == 3 else None
+        online.partial_fit(patterns[k], targets[k], silence=silence)
+        window = slice(max(0, k - 2), k + 1)
+        asked = [[(0.0, 60.0)] if n == 3 else None for n in range(5)]
+        gap = check_gap(online, patterns[window], targets[window], silence=asked[window])
+        assert gap <= online.gap_ + ROUNDING, k
+
+
+def test_trains_without_spikes_and_bounds_a_train_count_in_the_normalisers():
+    patterns, targets = stated.examples(7, trains=30, first=20.0)
+    silent = np.arange(30) % 3 == 0
+    patterns = [
+        SpikeTrains.from_lists([[] if s else t for s, t in zip(silent, p, strict=True)], stop=p.stop) for p in patterns
+    ]
+    bounds = np.linspace(0.2, 0.8, 30)
+    cone = ConeR(lb=(-bounds).tolist(), ub=bounds.tolist()).fit(patterns, targets)
+    assert check_gap(cone, patterns, targets) <= cone.gap_ + ROUNDING
+    assert not cone.multipliers_.pull[silent].any()
+
+
+@pytest.mark.parametrize("start", [0.0, -1e4, 1e7, 2.0**33])
+def test_far_from_time_0_the_gap_is_the_same(start):
+    """Each test of a time has the rounding of the core: no row is missing, none is added."""
+    patterns, targets = stated.examples(8, first=20.0, whole_ms=True)
+    patterns = [SpikeTrains.from_lists([t + start for t in p], start=start, stop=start + p.stop) for p in patterns]
+    for options in ({"step_ms": 0.5}, {"step_ms": 0.3, "after_spike": "reset"}, {"after_spike": "ignore"}):
+        cone = made(ConeR, **options, horizon=start + 140.0).fit(patterns, [t + start for t in targets])
+        assert check_gap(cone, patterns, [t + start for t in targets]) <= cone.gap_ + ROUNDING, options
+
+
+def test_a_long_recording_is_checked_in_blocks():
+    patterns, targets = stated.examples(9, trains=40, targets=20, duration=3000.0, spikes=60, first=20.0)
+    cone = made(ConeR, after_spike="reset").fit(patterns, targets)
+    assert check_gap(cone, patterns, targets) <= cone.gap_ + ROUNDING
+
+
+def test_a_copy_of_a_fit_keeps_its_proof():
+    cone, examples = small()
+    again = pickle.loads(pickle.dumps(cone))
+    assert check_gap(again, *examples) == check_gap(cone, *examples)
+    assert repr(again.multipliers_) == f"<Multipliers of {len(cone.multipliers_.rows)} rows>"
+
+
+def test_what_cannot_be_checked_is_one_clear_error():
+    cone, (patterns, targets) = small()
+    with pytest.raises(NotFittedError, match="call fit first"):
+        check_gap(ConeR(), patterns, targets)
+    kept = pickle.loads((Path(__file__).parents[1] / "data/learners/fitted.pickle").read_bytes())
+    earlier = next(learner for learner, *_ in kept if isinstance(learner, ConeR))
+    with pytest.raises(NotFittedError, match="an earlier version fitted it"):
+        check_gap(earlier, [SpikeTrains.from_lists([[5.0], [12.0], [30.0], []], stop=60.0)], [[20.0]])
+    signed = SpikeTrains.from_lists([[5.0]] * 20, stop=60.0, values=[[-1.0]] * 20)
+    for given, said in (
+        ((patterns[:1], targets), "1 pattern, 2 lists of targets"),
+        ((patterns, targets[:1]), "2 patterns, 1 list of targets"),
+        (([p.select([0, 1]) for p in patterns], targets), "pattern 0: 2 trains, must be the 20 of the fit"),
+        (([signed, signed], [[50.0], []]), "pattern 0: spikes are signed, split them"),
+    ):
+        with pytest.raises(ProblemError, match=said):
+            check_gap(cone, *given)
+    at_target = targets[0][0]
+    for row in (
+        ("silence", 0, at_target),
+        ("silence", 9, 5.0),
+        ("silence", 0, 5.25),
+        ("slope", 0, 0),
+        ("target", 0, 7),
+    ):
+        wrong = with_others(cone, rows=[Row(*row)], values=np.ones(1))
+        with pytest.raises(ProblemError, match="the problem has no such row"):
+            check_gap(wrong, patterns, targets)
+
+
+def test_multipliers_name_their_rows():
+    cone, (patterns, targets) = small()
+    assert isinstance(cone.multipliers_, Multipliers)
+    for kind, pattern, at in cone.multipliers_.rows:
+        if kind == "silence":
+            t = np.array([at])
+            excess = cone.neuron_.potential(
+                cone.weights_, patterns[pattern], t, spikes=targets[pattern][targets[pattern] < at]
+            )
+            assert excess[0] >= cone.neuron_.theta_0 - 1e-3
+        else:
+            assert 0 <= at < len(targets[pattern])
+
+
+MIXES = [(0, 1, 0), (1, 0, 0), (2, 2, 200), (0, 0, 1), (0, 1, 100), (0, 0, 0)]
+
+
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+@pytest.mark.parametrize("norm", ["norm", "square"])
+@pytest.mark.parametrize("lambdas", MIXES, ids=str)
+def test_the_gap_of_a_cone_x_is_proven_too(lambdas, norm, time):
+    checked = 0
+    for seed in range(5):
+        patterns, targets = stated.examples(seed, trains=40, patterns=3, targets=1, whole_ms=time == "grid")
+        patterns = stated.graded(patterns, seed) if seed == 4 else patterns
+        options = {"after_spike": "reset"} if seed % 2 else {"kernel": "double_exponential", "divide_b_by": "targets"}
+        cone = made(ConeX, time=time, norm=norm, lambdas=lambdas, lb=-2.0, ub=2.0, **options).fit(patterns, targets)
+        if cone.status_ != "solved":
+            continue
+        checked += 1
+        gap = check_gap(cone, patterns, targets)
+        assert gap <= max(cone.gap_, cone.tolerance) + 1e-6, f"seed {seed}: {gap} for {cone.gap_}"
+        if sum(lambdas) == 0 or cone.objective_ < 1e-9:
+            continue
+        # No multipliers prove a smaller objective than there is: worse weights have a larger gap.
+        other = copy.copy(cone)
+        other.weights_ = 0.5 * cone.weights_ + 0.5 * np.clip(cone.weights_ * 1.5, -2, 2)
+        worse = check_gap(other, patterns, targets)
+        assert worse >= gap - 1e-9 or lambdas[2]
+        other.multipliers_ = replace(cone.multipliers_, values=0.5 * cone.multipliers_.values)
+        assert check_gap(other, patterns, targets) >= gap
+        other.multipliers_ = None
+        with pytest.raises(NotFittedError, match="its fit is solved"):
+            check_gap(other, patterns, targets)
+    assert checked > 1
+
+
+@pytest.mark.parametrize(("lambdas", "order"), [((1, 0, 0), 1), ((0, 1, 0), 2)])
+def test_what_is_proven_of_a_cone_x_is_no_more_than_the_least_objective(lambdas, order):
+    """Whatever the multipliers and the weights: the objective less the gap is not above the best one."""
+    for seed in range(3):
+        patterns, targets = stated.examples(seed, trains=40, patterns=3, targets=1)
+        cone = ConeX(lambdas=lambdas, lb=-2.0, ub=2.0).fit(patterns, targets)
+        assert cone.status_ == "solved"
+        random, proof = np.random.default_rng(seed), cone.multipliers_
+        others = [cone.weights_, ConeX(lambdas=(1, 1, 100), lb=-2.0, ub=2.0).fit(patterns, targets).weights_]
+        proven = []
+        for weights in others:
+            length = np.linalg.norm(weights, order) / np.linalg.norm(cone.weights_, order)
+            noise = [random.normal(0, 1, len(proof.values)) * np.abs(proof.values).max() for _ in range(4)]
+            values = [proof.values + scale * one for one in noise for scale in (0.0, 1e-6, 1e-2, 1.0, 1e3)]
+            for one in [*values, 0.5 * proof.values, -proof.values, 2 * proof.values]:
+                gap = check_gap(with_others(cone, weights, values=one), patterns, targets)
+                proven.append(length * (1 - gap))
+                assert proven[-1] <= 1 + 1e-9
+        assert max(proven) >= 1 - 1e-6
+        assert min(proven) < 0.5
+
+
+def test_of_a_fit_that_ended_early_the_gap_is_proven():
+    patterns, targets = stated.examples(6, trains=120, patterns=20, targets=2, duration=200.0)
+    cone = ConeX(lambdas=(1, 0, 0), lb=-1, ub=1, max_seconds=1e-9).fit(patterns, targets)
+    assert cone.status_ == "stopped"
+    assert check_gap(cone, patterns, targets) <= max(cone.gap_, 1e-6) * (1 + 1e-6)
+    with pytest.raises(ProblemError, match="ConeX requires it everywhere"):
+        check_gap(cone, patterns, targets, silence=[None] * 20)
+
+
+@pytest.mark.parametrize("kind", [ConeX, ConeR])
+def test_a_gap_bounds_how_much_smaller_the_least_objective_is_and_says_nothing_of_the_rows(kind):
+    """Stopped before anything is met: of `ConeX` with an objective below the least one and a gap of 0."""
+    patterns, targets = stated.examples(6, trains=120, patterns=2, targets=2, duration=200.0)
+    best = kind(lb=-1, ub=1).fit(patterns, targets)
+    early = kind(lb=-1, ub=1, max_seconds=1e-9).fit(patterns, targets)
+    assert (best.status_, early.status_) == ("solved", "stopped")
+    assert early.objective_ * (1 - early.gap_) <= best.objective_
+    assert not check_solution(early, patterns, targets)
+    if kind is ConeX:
+        assert early.gap_ == check_gap(early, patterns, targets) == 0
+        assert early.objective_ < best.objective_
+        assert early.violation_ > 0.1
+    else:
+        assert early.gap_ == 1
+        assert early.objective_ > best.objective_

@@ -1,0 +1,170 @@
+"""`check_solution` against the neuron itself: it holds where the neuron fires at the targets and nowhere else."""
+
+from __future__ import annotations
+
+import copy
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from making import made
+from stated import examples, graded
+from test_solved_is_true import KINDS
+
+from taxel import Neuron, NotFittedError, ProblemError, SpikeTrains
+from taxel.learn import ConeR, ConeX, check_solution
+
+
+def fitted(weights, neuron):
+    """A fit with other weights: the check reads its parameters and its weights."""
+    trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
+    cone = ConeX(neuron=Neuron(tau=10.0), lb=-1.0, ub=1.0).fit([trains], [[20.0]])
+    cone.set_params(neuron=neuron, lb=-1e9, ub=1e9)
+    cone.neuron_, cone.weights_ = neuron, weights
+    return cone
+
+
+@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
+@pytest.mark.parametrize("kernel", ["alpha", "double_exponential"])
+def test_any_weights_hold_with_the_spikes_of_the_neuron_and_with_no_others(kernel, after_spike):
+    fired_in_all = held = 0
+    for seed in range(12):
+        random = np.random.default_rng([31, seed])
+        neuron = Neuron(
+            tau=float(random.choice([3.0, 15.0])),
+            kernel=kernel,
+            after_spike=after_spike,
+            theta_plus=float(random.choice([0.0, 0.2, 1.0])),
+            first_threshold=str(random.choice(["theta_0", "printed"])),
+        )
+        (pattern,), _ = examples(seed, trains=12, patterns=1, targets=0, duration=150.0)
+        if seed % 2:
+            (pattern,) = graded([pattern], seed)
+        weights = random.normal(0.1, 0.4, 12)
+        cone = fitted(weights, neuron)
+        fired = neuron.run(weights, pattern)
+        fired_in_all += len(fired)
+        found = check_solution(cone, [pattern], [fired])
+        # Silence is required up to tau after the last target, where the neuron, run to the pattern's stop, may fire.
+        if len(neuron.run(weights, pattern.lasting(1e4))) == len(fired):
+            assert found, f"seed {seed}: {found.wrong}"
+            held += 1
+        for k in range(len(fired)):
+            wrong = check_solution(cone, [pattern], [np.delete(fired, k)])
+            assert not wrong
+            assert "reaches the threshold" in wrong.wrong
+        quiet = [t for t in np.linspace(1, 149, 20) if np.abs(fired - t).min(initial=99) > 4]
+        for t in quiet[:5]:
+            assert not check_solution(cone, [pattern], [np.sort(np.append(fired, t))])
+    assert fired_in_all > 12
+    assert held > 6
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_touch_between_two_inputs_is_seen_however_short_it_is(side):
+    neuron, pattern = Neuron(tau=15.0), SpikeTrains.from_lists([[10.0]], stop=4e5)
+    highest = neuron.theta_0 * np.e
+    for apart in (1e-3, 1e-6, 1e-9):
+        cone = fitted(np.array([highest * (1 + side * apart)]), neuron)
+        found = check_solution(cone, [pattern], [[]])
+        assert found.holds == (side < 0)
+        assert 0.79 * 0.3 * apart <= found.room_mv <= 0.3 * apart * (1 + 1e-6) or side > 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_room_and_slope_are_those_of_many_instants(kind):
+    held = 0
+    for seed in range(8):
+        cone, patterns, targets = KINDS[kind](seed)
+        cone.fit(patterns, targets)
+        if cone.status_ == "infeasible":
+            continue
+        found = check_solution(cone, patterns, targets)
+        assert found, found.wrong
+        held += 1
+        if kind == "far_from_0":
+            continue
+        room, slope, problem = np.inf, np.inf, cone.problem_
+        for p, (pattern, times) in enumerate(zip(patterns, targets, strict=True)):
+            edges = np.unique([pattern.start, *pattern.times, *times, *np.array(times) + cone.neuron_.refractory])
+            between = [np.linspace(a, b, 40) for a, b in pairwise(edges)]
+            t = np.unique(np.concatenate([*between, *(t - np.geomspace(1e-6, 1, 200) for t in times)]))
+            potential = cone.neuron_.potential(cone.weights_, pattern, t, spikes=times)
+            for at, u in zip(t, potential, strict=True):
+                try:
+                    _, limit = problem.silence(p, at, margin=False)
+                except ProblemError:
+                    continue
+                room = min(room, (limit - u) / min([1.0, *(x - at for x in times if x >= at)]))
+            for k in range(len(times)):
+                coefficients, limit = problem.slope(p, k, margin=False)
+                slope = min(slope, limit - coefficients @ cone.weights_)
+        assert 0.7 * room <= found.room_mv
+        assert found.room_mv <= room * (1 + 1e-6) + 1e-12
+        assert found.slope == pytest.approx(slope, rel=1e-9, abs=1e-12)
+    assert held
+
+
+def test_what_is_wrong_is_named():
+    patterns, targets = examples(3, trains=60, patterns=3, targets=2)
+    cone = ConeX(lb=-2, ub=2).fit(patterns, targets)
+    assert cone.status_ == "solved"
+    found = check_solution(cone, patterns, targets)
+    assert found.wrong is None
+    assert found.missed_mv <= 1e-12
+    assert found.room_mv > 0.4 * cone.margin_.mv
+    assert found.slope >= 0.999 * cone.margin_.slope
+    weak, out = copy.copy(cone), copy.copy(cone)
+    weak.weights_ = cone.weights_ * (1 - 1e-9)
+    assert "does not fire at target 0" in check_solution(weak, patterns, targets).wrong
+    out.weights_ = cone.weights_ + np.eye(60)[7] * 9
+    assert check_solution(out, patterns, targets).wrong.startswith("weight 7: ")
+
+
+def test_on_a_grid_a_margin_decides_and_a_target_is_a_point():
+    patterns, targets = examples(5, trains=60, patterns=3, targets=1, whole_ms=True)
+    cone = made(ConeX, time="grid", lb=-1, ub=1, margin=1e-6).fit(patterns, targets)
+    found = check_solution(cone, patterns, targets)
+    assert found, found.wrong
+    assert found.room_mv == pytest.approx(cone.margin_.mv, rel=1e-6)
+    assert all(np.allclose(cone.neuron_.run(cone.weights_, p), t) for p, t in zip(patterns, targets, strict=True))
+    held = set()
+    for seed in range(5, 15):
+        others, wanted = examples(seed, trains=60, patterns=3, targets=1, whole_ms=True)
+        touching = made(ConeX, time="grid", lb=-1, ub=1).fit(others, wanted)
+        fires = all(
+            np.array_equal(touching.neuron_.run(touching.weights_, p), t) for p, t in zip(others, wanted, strict=True)
+        )
+        assert check_solution(touching, others, wanted).holds == fires, f"seed {seed}"
+        held.add(fires)
+    assert held == {False, True}
+    between = [t + 0.5 for t in targets]
+    cone.fit(patterns, between)
+    assert "lies between grid points" in check_solution(cone, patterns, between).wrong
+
+
+def test_a_cone_r_holds_where_it_meets_every_target():
+    patterns, targets = examples(2, trains=80, patterns=1, targets=1, whole_ms=True)
+    held = set()
+    for factor in (1.0, 0.5):
+        cone = ConeR(neuron=Neuron(after_spike="reset"), lb=-1.0, ub=1.0).fit(patterns, targets)
+        cone.weights_ = factor * cone.weights_
+        found = check_solution(cone, patterns, targets)
+        fired = cone.neuron_.run(cone.weights_, patterns[0])
+        assert found.holds == np.array_equal(fired, targets[0]), found.wrong
+        held.add(found.holds)
+    assert False in held
+
+
+def test_what_cannot_be_checked_is_one_clear_error():
+    patterns, targets = examples(3, trains=12, patterns=8, targets=1)
+    with pytest.raises(NotFittedError, match="call fit first"):
+        check_solution(ConeX(), patterns, targets)
+    cone = ConeX(lb=-0.1, ub=0.1).fit(patterns, targets)
+    with pytest.raises(ProblemError, match="is infeasible and has no weights"):
+        check_solution(cone, patterns, targets)
+    with pytest.raises(ProblemError, match=r"must be a taxel\.learn\.ConeX"):
+        check_solution(Neuron(), patterns, targets)
+    cone = ConeX(lb=-9, ub=9).fit(patterns[:1], targets[:1])
+    with pytest.raises(ProblemError, match="2 patterns, 1 list of targets"):
+        check_solution(cone, patterns[:2], targets[:1])

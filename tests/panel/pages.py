@@ -1,0 +1,163 @@
+"""Steps that the tests of the page share: what opens it, waits for it, and reads from it; a board and a recording."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from loopback import free_port
+from tests.panel.browser import PATIENCE, running
+
+import taxel
+
+#: Pixels of a map, as a text that changes when the picture does.
+PIXELS = "name => document.getElementById(name).toDataURL()"
+
+#: The state of a board that is followed, whether or not anything arrives.
+FOLLOWS = "^(Live|Quiet|Nothing arrives)$"
+
+
+def until(true: Callable[[], Any], what: str) -> Any:
+    """Wait for something outside of the page."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if found := true():
+            return found
+        time.sleep(0.05)
+    raise AssertionError(f"not within {PATIENCE} s: {what}")
+
+
+def opened(browser: Any, url: str, **how: Any) -> Any:
+    """Open the panel in a context of its own; any error of the page is kept in `errors`."""
+    context = browser.new_context(**{"viewport": {"width": 1300, "height": 900}, **how})
+    context.set_default_timeout(PATIENCE * 1000)
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    page.goto(url)
+    page.errors = errors
+    return page
+
+
+def shows(page: Any, name: str, pattern: str) -> None:
+    """Wait until a part of the page has a text."""
+    from playwright.sync_api import expect
+
+    expect(page.locator(f"#{name}")).to_have_text(re.compile(pattern), timeout=PATIENCE * 1000)
+
+
+def clock(page: Any) -> float:
+    """Return the time that the page shows, s, once it shows one."""
+    shows(page, "clock", r"\d")
+    return float(page.locator("#clock").inner_text().split()[0])
+
+
+def still(page: Any) -> float:
+    """Return the time of a view at rest, s: it is written to the microsecond, and no request is under way."""
+    shows(page, "clock", r"\.\d{6} s")
+    while (at := clock(page)) != (page.wait_for_timeout(400), clock(page))[1]:
+        pass
+    return at
+
+
+def settled(page: Any, name: str) -> Any:
+    """Return the pixels of a map that is drawn to its end: a busy machine draws it in steps."""
+    while (seen := page.evaluate(PIXELS, name)) != (page.wait_for_timeout(400), page.evaluate(PIXELS, name))[1]:
+        pass
+    return seen
+
+
+def press(page: Any, *keys: str) -> None:
+    """Press keys with nothing in focus that would take them."""
+    page.evaluate("document.activeElement.blur()")
+    for key in keys:
+        page.keyboard.press(key)
+
+
+def span(page: Any) -> list[float]:
+    """Return the times at the edges of the lanes, s, from the numbers of the axis."""
+    ticks = page.locator("#axis span").evaluate_all("all => all.map(e => [e.style.left, e.textContent])")
+    (left, first), (right, last) = ([float(text.rstrip("% s")) for text in tick] for tick in (ticks[0], ticks[-1]))
+    per = (last - first) / (right - left)
+    return [first - left * per, first + (100 - left) * per]
+
+
+def pixel(page: Any, t_s: float) -> float:
+    """Return where a time is on the screen."""
+    box, (start, stop) = page.locator("#track").bounding_box(), span(page)
+    return box["x"] + (t_s - start) / (stop - start) * box["width"]
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
+    """An emulated board with a control line, and a panel that listens to it."""
+    pytest.importorskip("playwright", reason="no Playwright: pip install playwright")
+    folder = tmp_path_factory.mktemp("live")
+    port = str(free_port())
+    with running("emulate", "--port", port, "--seed", "1", "--control", "0", folder=folder) as board:
+        control = board.wait_for(r"commands are accepted at (\S+)")
+        panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
+        with running(*panel, "--folder", str(folder), folder=folder) as server:
+            url = server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
+            yield SimpleNamespace(url=url, folder=folder)
+
+
+@pytest.fixture
+def page(chromium: Any, live: SimpleNamespace) -> Iterator[Any]:
+    """The panel in a browser, following the board; it may not have complained in the end."""
+    page = opened(chromium, live.url)
+    shows(page, "state-word", "^Live$")
+    shows(page, "events", r"^[1-9]")
+    shows(page, "clock", r"\d s")
+    yield page
+    assert not page.errors
+    page.context.close()
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ten footfalls with silence between them, on an array of 16 x 24."""
+    folder = tmp_path_factory.mktemp("view")
+    rows, columns, t, x, y, p, intensity = 16, 24, [], [], [], [], []
+    for fall in range(10):
+        for step in range(40):
+            t += [1_000_000 * fall + 200_000 + 192 * step] * 3
+            x += [fall + 3, fall + 4, fall + 5]
+            # Three times over the rows: at rest, pressed, and at rest again, so that no taxel stays pressed.
+            y += [step % 13] * 3
+            p += [step < 26] * 3
+            intensity += [40 + 2 * max(0, min(step - 12, 26 - step))] * 3
+    events = taxel.Events(
+        np.array(t), np.array(x), np.array(y), np.array(p), intensity=intensity, array=taxel.Array(rows, columns)
+    )
+    taxel.convert(events, folder / "walk.mcap")
+    return folder / "walk.mcap"
+
+
+@pytest.fixture
+def replay(chromium: Any, recording: Path) -> Iterator[Any]:
+    """The recording in a browser, without a board."""
+    with running("view", str(recording), "--no-open", folder=recording.parent) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "state-word", "^Replay$")
+        shows(page, "clock", r"\d s")
+        yield page
+        assert not page.errors
+        page.context.close()
+
+
+def record_form(page: Any, **values: Any) -> None:
+    """Fill in the tab Record."""
+    press(page, "2")
+    for name, value in values.items():
+        if isinstance(value, bool):
+            page.locator(f"#record-{name}").set_checked(value)
+        else:
+            page.locator(f"#record-{name}").fill(str(value))

@@ -1,0 +1,299 @@
+"""What `taxel view` shows by its options: topics of ROS bags, layouts, rates, calibrations."""
+
+from __future__ import annotations
+
+import json
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from formats import bags
+from formats.bags import BEGIN_NS, PALM
+from formats.making import write_icub
+from panel.browser import running
+from panel.protocol import Client
+from panel.test_pictures import opened, values_at
+from shell import call
+
+import taxel
+from taxel import Array, Calibration, Frames
+from taxel.cli._opening import FileOptions
+from taxel.cli.view import _opening
+from taxel.live import Panel
+from taxel.recording.opening import recordings_in
+
+KINDS = ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")
+
+
+def palms(folder, name, count=40):
+    """Write a bag of a palm in which a touch moves over 24 x 32 taxels; return its path and its values."""
+    values = np.zeros((count, 24, 32), np.int16)
+    for k in range(count // 2, count):
+        values[k, 5:9, 3 + k % 8 : 6 + k % 8] = 400 + k
+    messages = [("/palm", PALM, 10.0 * k + 2, 10.0 * k, bags.palm(values[k])) for k in range(count)]
+    return bags.write(folder / name, messages), values
+
+
+@contextmanager
+def viewed(folder, *words):
+    """A client of the panel of `taxel view`."""
+    with running("view", *map(str, words), "--no-open", "--json", folder=folder) as server:
+        said = json.loads(server.wait_for(r"(\{.*\})"))
+        url = urlsplit(said["url"])
+        with Client(SimpleNamespace(address=(url.hostname, url.port), token=said["token"])) as page:
+            yield page
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_bag_is_walked_to_the_page_by_the_options_of_its_topic(name, tmp_path):
+    bag, values = palms(tmp_path, name)
+    with viewed(tmp_path, bag, "--topic", "/palm", "--array", "24x32") as page:
+        about = opened(page, name)
+        assert (about["pictures"]["count"], about["array"]["rows"], about["array"]["columns"]) == (40, 24, 32)
+        t = BEGIN_NS // 1000
+        assert (about["start_us"], about["stop_us"]) == (t, t + 390_000)
+        shown, _ = values_at(page, about, t + 300_000)
+        assert np.array_equal(shown, values[30])
+        assert page.ask("mark", label="touch", t_us=t + 200_000)["type"] == "done"
+    assert [note.t for note in taxel.open(bag, topic="/palm").notes] == [t + 200_000]
+
+
+def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
+    bag, _ = palms(tmp_path, "grasp.bag")
+    opened_as, joined = [], FileOptions.joined
+    monkeypatch.setattr(FileOptions, "joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
+    for shown in (bag, Path("grasp.bag")):
+        monkeypatch.chdir(tmp_path)
+        opened_as.clear()
+        opens = _opening(FileOptions(topic=["/palm"], array=["24x32"]), None, shown)
+        with Panel(shown, opens=opens) as panel, Client(panel) as page:
+            assert opened(page, "grasp.bag")["pictures"]["count"] == 40
+        assert len(opened_as) == 1
+
+
+def test_a_bag_without_a_topic_is_refused_at_the_command_line(capsys, tmp_path):
+    bag, _ = palms(tmp_path, "grasp.db3")
+    code, _, errors = call(capsys, "view", bag, "--no-open", "--seconds", 1)
+    assert code == 2
+    first, *table = errors.strip().splitlines()
+    assert first == f"taxel: {bag}: ROS bag; open a topic by --topic /palm --field taxels --array ROWSxCOLUMNS"
+    _, listing, _ = call(capsys, "info", bag)
+    assert table == listing.splitlines()[1:]
+    assert "/palm" in table[1]
+
+
+def test_a_refused_bag_is_named_once_on_the_page(tmp_path):
+    palms(tmp_path, "grasp.bag")
+    taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="N", array=Array(3, 2)), tmp_path / "mat.npz")
+    with viewed(tmp_path, "mat.npz") as page:
+        refused = page.ask("open", name="grasp.bag")
+        assert (refused["type"], refused["field"]) == ("refused", "name")
+        assert refused["reason"].startswith(f"{tmp_path / 'grasp.bag'}: a ROS bag; say what to open of it")
+
+
+def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_path):
+    (tmp_path / "bags").mkdir()
+    for name in KINDS:
+        palms(tmp_path / "bags", name)
+    folder = tmp_path / "bags"
+    assert [file.name for file in recordings_in(folder)] == sorted(KINDS)
+    with viewed(tmp_path, folder, "--topic", "/palm", "--array", "24x32") as page:
+        page.send(type="recordings")
+        files = {one["name"]: one["bytes"] for one in page.until("recordings")["files"]}
+        assert set(files) == set(KINDS)
+        inside = sum(file.stat().st_size for file in (folder / "grasp").iterdir())
+        assert files["grasp"] == inside
+        for name in KINDS:
+            assert opened(page, name)["pictures"]["count"] == 40
+    code, _, errors = call(capsys, "view", folder, "--no-open", "--seconds", 1)
+    assert code == 2
+    assert "ROS bag; open a topic by --topic /palm" in errors
+    code, _, errors = call(capsys, "view", folder, "--topic", "/none", "--no-open", "--seconds", 1)
+    assert (code, len(errors.strip().splitlines())) == (2, 1)
+    assert "has no topic /none" in errors
+
+
+def presses(folder, names, topics=("/palm",)):
+    """Write bags of palms that are pressed five times each, elsewhere in time; return when, us."""
+    folder.mkdir()
+    times = {}
+    for number, name in enumerate(names):
+        values = np.random.default_rng(number).normal(1000, 2, (300, 24, 32))
+        begins = 40 + 3 * number + 50 * np.arange(5)
+        for begin in begins:
+            values[begin : begin + 20, 5:9, 6:12] += 400
+        made = [bags.palm(np.rint(picture)) for picture in values]
+        bags.write(
+            folder / name, [(t, PALM, 10.0 * k + 2, 10.0 * k, one) for k, one in enumerate(made) for t in topics]
+        )
+        times[name] = (BEGIN_NS // 1000 + begins * 10_000).tolist()
+    return times
+
+
+def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
+    """On the page, where each is opened alone, in a training of the folder, and in one on the page."""
+    folder = tmp_path / "grasps"
+    times = presses(folder, ("a.bag", "b.bag"))
+    rows = [f"{name},contact,{t}" for name, every in times.items() for t in every]
+    (folder / "labels.csv").write_text("\n".join(["recording,label,t_us", *rows]))
+    how = ("--topic", "/palm", "--array", "24x32")
+    with viewed(tmp_path, folder, *how) as page:
+        for name, every in times.items():
+            assert [note["t_us"] for note in opened(page, name)["notes"]] == every
+        # One that is moved stands for that of the table.
+        assert page.ask("mark", label="contact", t_us=times["b.bag"][0] + 10_000, replaces_us=times["b.bag"][0])
+        answer = page.ask("train")
+        assert answer["type"] == "done", answer
+        assert "contact, neuron: 5 of 5 found" in page.since_asked("trained")["text"]
+    opened_as = {one.name: [note.t for note in one.notes] for one in taxel.open(folder, topic="/palm")}
+    assert opened_as == times | {"b.bag": [times["b.bag"][0] + 10_000, *times["b.bag"][1:]]}
+    for words in ((), ("--labels", folder / "labels.csv")):
+        out = ("--folds", 0, "-o", tmp_path / "r.json", "--overwrite")
+        code, said, _ = call(capsys, "train", folder, *words, *how, *out)
+        assert (code, "10 of 10 found" in said) == (0, True)
+    for head, row, reason in (
+        (
+            "label,t_us",
+            f"contact,{times['a.bag'][0]}",
+            "names no recording, and there are 2; must have the column recording",
+        ),
+        ("recording,label,t_us", f"c.bag,contact,{times['a.bag'][0]}", "c.bag is no recording of this folder"),
+        ("recording,label,t_us", "a.bag,contact,480000", "a.bag: has 1 note, none within"),
+    ):
+        (folder / "b.notes.csv").unlink(missing_ok=True)
+        (folder / "labels.csv").write_text(f"{head}\n{row}\n")
+        code, _, errors = call(capsys, "train", folder, *how, "-o", tmp_path / "r.json", "--overwrite")
+        assert code == 2
+        assert reason in errors
+
+
+def test_labels_of_a_folder_are_of_the_topic_that_they_name(tmp_path):
+    topics = ["/palm", "/wrist"]
+    times = presses(tmp_path / "two", ("a.bag", "b.bag"), topics)["a.bag"]
+    rows = [f"a.bag,,turn,{times[0]}", f"a.bag,/wrist,contact,{times[1]}"]
+    (tmp_path / "two" / "labels.csv").write_text("\n".join(["recording,source,label,t_us", *rows]))
+    folder = taxel.open(tmp_path / "two", topic=topics)
+    for one, expected in zip(
+        [*folder, taxel.open(tmp_path / "two" / "a.bag", topic=topics)], (True, False, True), strict=True
+    ):
+        said = {name: [note.text for note in source.notes] for name, source in one.sources.items()}
+        assert said == {"palm": ["turn"] * expected, "wrist": ["turn", "contact"] * expected}
+
+
+def test_of_a_folder_own_recordings_come_before_bags(tmp_path):
+    palms(tmp_path, "a.bag")
+    taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="N", array=Array(3, 2)), tmp_path / "mat.npz")
+    assert [file.name for file in recordings_in(tmp_path)] == ["mat.npz", "a.bag"]
+
+
+def test_a_layout_and_a_rate_are_those_of_the_page(tmp_path):
+    file = write_icub(tmp_path)
+    with viewed(tmp_path, file, "--rate-hz", 50) as page:
+        about = opened(page, file.name)
+        assert (about["pictures"]["picture_us"], about["stop_us"]) == (None, 40_000)
+
+
+def tables(folder):
+    """Write the same pictures as tables and arrays of other programs, and the layout that describes them."""
+    folder.mkdir()
+    values = np.random.default_rng(5).integers(0, 1000, (40, 6))
+    np.save(folder / "palm.npy", values)
+    np.savetxt(folder / "palm.txt", values, fmt="%d", delimiter=";")
+    np.savetxt(folder / "palm.txt.gz", values, fmt="%d", delimiter=";")
+    np.savetxt(folder / "palm.dat", values, fmt="%d", delimiter=";")
+    np.savetxt(folder / "palm.csv", values, fmt="%d", delimiter=";")
+    lines = ("rows = 2", "columns = 3", "rate_hz = 100", "[table]", 'separator = ";"')
+    return values.reshape(-1, 2, 3), "\n".join(lines)
+
+
+TABLES = ("palm.csv", "palm.dat", "palm.npy", "palm.txt", "palm.txt.gz")
+
+
+def shown_alike(page, names, values):
+    """Check that the page shows the same pictures of each file."""
+    for name in names:
+        about = opened(page, name)
+        assert (about["pictures"]["count"], about["stop_us"]) == (40, 390_000)
+        shown, _ = values_at(page, about, 200_000)
+        assert np.array_equal(shown, values[20])
+
+
+@pytest.mark.parametrize("beside", [True, False], ids=["beside", "given"])
+def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, capsys, tmp_path):
+    folder, layout = tmp_path / "tables", tmp_path / "said.toml"
+    values, text = tables(folder)
+    for words, reason in (
+        (folder, f"{folder}: holds no recording; name a file, or one of its folders"),
+        (folder / "palm.npy", "say in NAME.layout.toml what it holds"),
+    ):
+        code, _, errors = call(capsys, "view", words, "--no-open", "--seconds", 1)
+        assert (code, len(errors.splitlines())) == (2, 1)
+        assert reason in errors
+    (folder / "layout.toml" if beside else layout).write_text(text)
+    given = {} if beside else {"layout": layout}
+    for name in TABLES:
+        with Panel(folder / name, **given) as panel, Client(panel) as page:
+            shown_alike(page, [name], values)
+    assert [one.name for one in taxel.open(folder, **given)] == list(TABLES)
+    (folder / "labels.csv").write_text("recording,label,t_us\npalm,contact,100000\n")
+    (folder / "read me.txt.md").write_text("of the palm")
+    with viewed(tmp_path, folder, *([] if beside else ["--layout", layout])) as page:
+        page.send(type="recordings")
+        assert {one["name"] for one in page.until("recordings")["files"]} == set(TABLES)
+        shown_alike(page, TABLES, values)
+
+
+def test_pictures_are_in_the_unit_of_a_calibration(capsys, tmp_path):
+    frames = Frames(np.arange(12.0).reshape(3, 2, 2) * 10, [0, 10_000, 20_000], unit="counts", array=Array(2, 2))
+    taxel.convert(frames, tmp_path / "press.npz")
+    calibration = Calibration.table(Array(2, 2), [100], [5], unit="N", date="2026-11-23")
+    calibration.save(tmp_path / "of another name.json")
+    with viewed(tmp_path, "press.npz", "--calibration", "of another name.json") as page:
+        about = opened(page, "press.npz")
+        assert about["pictures"]["unit"] == "N"
+        shown, _ = values_at(page, about, 20_000)
+        assert np.allclose(shown, calibration.apply(frames).values[2], atol=about["pictures"]["step"])
+        assert [one["rest"] for one in about["pictures"]["sources"]] == ["given"]
+    taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="counts", array=Array(3, 2)), tmp_path / "other.npz")
+    words = (tmp_path / "other.npz", "--calibration", tmp_path / "of another name.json", "--seconds", 1)
+    code, _, errors = call(capsys, "view", *words)
+    assert code == 2
+    assert "another array" in errors
+
+
+def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(capsys, tmp_path):
+    rng = np.random.default_rng(4)
+    trials = {}
+    for number in range(1, 5):
+        raw = np.full((120, 60), 240) + rng.integers(-1, 2, (120, 60))
+        for begin in range(10, 110, 20):
+            raw[begin : begin + 8, 20:40] -= 90
+        trials[number] = np.clip(raw, 0, 255)
+    file = write_icub(tmp_path, trials=trials)
+    with viewed(tmp_path, file, "--rate-hz", 100) as page:
+        for trial in ("ball/1", "ball/3"):
+            opened(page, file.name, trial=trial)
+            for begin in range(10, 110, 20):
+                assert page.ask("mark", label="touch", t_us=begin * 10_000)["type"] == "done"
+        opened(page, file.name, trial="ball/3")
+        labels = page.since_asked("labels")["labels"]
+        assert [label["trial"] for label in labels].count("ball/1") == 5
+        answer = page.ask("train")
+        assert answer["type"] == "done", answer
+        assert "touch, neuron: " in page.since_asked("trained")["text"]
+        assert page.ask("read_out", readout="ball.csv.readout.json")["type"] == "done"
+        found = page.since_asked("detections")["detections"]
+        assert len(found) >= 4
+    table = (tmp_path / "ball.csv.notes.csv").read_text().splitlines()
+    assert table[0] == "label,t_us,recording"
+    assert len(table) == 11
+    notes = [len(one.notes) for one in taxel.open(file)]
+    assert notes == [5, 0, 5, 0]
+    code, said, errors = call(
+        capsys, "train", file, "--labels", "notes", "--rate-hz", 100, "-o", tmp_path / "again.json", "--json"
+    )
+    assert (code, len(json.loads(said)["recordings"])) == (0, 2)
+    assert "left out 2 of its 4 trials" in errors

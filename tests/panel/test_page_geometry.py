@@ -1,0 +1,105 @@
+"""What the page draws of a sensor: a grid in its proportion, places with their outline, channels as bars."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.panel.browser import running
+from tests.panel.pages import opened, shows, until
+
+import taxel
+from taxel import Array, Frames, Places
+
+FEET = Places([-500.0, -700.0, -300.0, 300.0, 500.0], [-800.0, 0.0, 0.0, 0.0, 900.0])
+SENSORS = {
+    "plate": Array(4, 5, pitch_mm=(7.62, 5.08)),
+    "grid": Array(4, 5),
+    "insole": Array(1, 5, places=FEET),
+    "cells": Array(1, 5, places=Places(FEET.x, FEET.y, [9e3] * 5, "mm")),
+    "uneven": Array(1, 5, places=Places(FEET.x, FEET.y, [9e3, 4e3, 9e3, 9e3, 2e3], "mm")),
+    "channels": Array(1, 5),
+}
+
+
+#: How high each of so many curves is at three quarters of the time, as a share of its room.
+HEIGHTS = """count => {
+    const canvas = document.getElementById("channels");
+    const [x, high] = [Math.round(canvas.width * 0.75), canvas.height / count];
+    const pixels = canvas.getContext("2d").getImageData(x, 0, 1, canvas.height).data;
+    const drawn = y => pixels[4 * y + 3] > 40;
+    return Array.from({ length: count }, (_, k) => {
+        let top = Math.floor((k + 1) * high) - 3;
+        while (top > k * high && drawn(top)) top -= 1;
+        return ((k + 1) * high - 3 - top) / (high - 3);
+    });
+}"""
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_sensor_is_drawn_as_its_geometry_is_known(name: str, chromium: Any, tmp_path: Path) -> None:
+    array = SENSORS[name]
+    values = np.zeros((60, *array.shape))
+    values[20:, 0, 1], values[20:, 0, 4] = 10, 30
+    taxel.convert(Frames(values, np.arange(60) * 20_000, unit="kPa", array=array), tmp_path / f"{name}.npz")
+    with running("view", f"{name}.npz", "--no-open", folder=tmp_path) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "state-word", "^Replay$")
+        # A pressure is a force where the area of each taxel is known.
+        force = {"plate": r"^1\.55 N$", "cells": "^360 N$", "uneven": "^100 N$"}.get(name)
+        shows(page, "force-sum", force or "^40 kPa$")
+        shows(page, "force-title", "^Force$" if force else "^Sum$")
+        shows(page, "rest-from", "^above 0$")
+        kind = {"plate": "grid", "grid": "grid", "channels": "channels"}.get(name, "places")
+        frame = page.locator("#pressure-frame")
+        assert frame.get_attribute("data-kind") == kind
+        channels = name == "channels"
+        shows(page, "pressure-title", "^Channels$" if channels else "^Pressure$")
+        assert page.locator("#centre-block").is_visible() is not channels
+        assert page.locator("#area-legend").is_visible() is not channels
+        assert page.locator("#channels-block").is_visible() is channels
+        if channels:
+            shows(page, "channels-scale", "^each up to 30 kPa$")
+            # The second and the fifth have a load, of a third and all of the height.
+            heights = page.evaluate(HEIGHTS, 5)
+            assert heights == pytest.approx([0, 1 / 3, 0, 0, 1], abs=0.15)
+            assert page.locator("#channel-names").all_inner_texts() == ["0\n4"]
+        centre = {
+            "plate": r"^3\.3, 0\.0 \(16\.5, 0 mm\)$",
+            "grid": r"^3\.3, 0\.0$",
+            "insole": r"^200, 675 in the places' own unit$",
+            "cells": r"^200, 675 mm$",
+            "uneven": r"^200, 675 mm$",
+        }
+        area = {"plate": r"^2 taxels \(77\.4 mm²\)$", "cells": r"^2 taxels \(18,000 mm²\)$"}.get(name, "^2 taxels$")
+        if not channels:
+            shows(page, "centre-now", centre[name])
+            shows(page, "force-area", area)
+        box = frame.bounding_box()
+        if name in ("plate", "grid"):
+            ratio = 5 * 5.08 / (4 * 7.62) if name == "plate" else 5 / 4
+            assert box["width"] / box["height"] == pytest.approx(ratio, rel=0.02)
+        # The taxel that is pointed at is the one whose mark stands there, also with the map flipped.
+        for _ in range(2):
+            frame.focus()
+            page.keyboard.press("Escape")
+            for _ in range(6):
+                page.keyboard.press("ArrowRight")
+            # Text is written eight times a second.
+            page.wait_for_timeout(500)
+            named = page.locator("#taxel-name").inner_text()
+            at = page.locator("#pressure-cross").evaluate(
+                "e => [e.style.getPropertyValue('--x'), e.style.getPropertyValue('--y')]"
+            )
+            x, y = (float(share.rstrip("%")) / 100 for share in at)
+            page.keyboard.press("Escape")
+            page.wait_for_timeout(500)
+            inner = page.locator("#pressure-map").bounding_box()
+            page.mouse.click(inner["x"] + x * inner["width"], inner["y"] + y * inner["height"])
+            until(lambda named=named: page.locator("#taxel-name").inner_text() == named, named)
+            page.locator("#tab-view").click()
+            page.locator("#flip-x").check()
+        assert not page.errors
+        page.context.close()

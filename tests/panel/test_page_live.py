@@ -1,0 +1,339 @@
+"""The page of a live board: registers, recordings, readouts, silence; a real browser and an emulated board."""
+
+from __future__ import annotations
+
+import csv
+import re
+import socket
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from loopback import free_port
+from tests.detect.test_readout import recipe, tare, touches
+from tests.panel.browser import PATIENCE, running
+from tests.panel.pages import (
+    FOLLOWS,
+    PIXELS,
+    clock,
+    live,
+    opened,
+    page,
+    press,
+    record_form,
+    recording,
+    replay,
+    shows,
+    still,
+    until,
+)
+from tests.panel.protocol import word
+
+import taxel
+import taxel.device
+from taxel.detect import Example, train
+
+__all__ = ["live", "page", "recording", "replay"]
+
+pytestmark = pytest.mark.timeout(600)
+
+
+def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
+    """Set a register, see the map move, record, label, stop, replay, and look into the file."""
+    before = page.evaluate(PIXELS, "pressure-map")
+    press(page, "1")
+    floor = page.get_by_label("Noise floor", exact=True)
+    floor.fill(str(floor_ticks))
+    floor.press("Tab")
+    # The page must show the value that the board reports, not the one that was typed.
+    page.locator("#read-back").click()
+    shows(page, "registers-why", "^$")
+    until(lambda: floor.input_value() == str(floor_ticks), "the board holds the floor")
+    until(lambda: page.evaluate(PIXELS, "pressure-map") != before, "the map moves")
+    record_form(page, name=name, index="7", label="heel", length="", countdown="0")
+    press(page, "r")
+    shows(page, "state-word", rf"Recording {name}7\.mcap")
+    page.locator("#label-name").evaluate(
+        "input => { input.value = 'contact'; input.dispatchEvent(new Event('input')) }"
+    )
+    press(page, "m")
+    shows(page, "label-count", "^1 label")
+    until(lambda: float((page.locator("#record-state").inner_text().split() or ["0"])[0]) >= 2, "two seconds of it")
+    press(page, "r")
+    shows(page, "record-last-file", rf"^{name}7\.mcap$")
+    page.locator("#files").select_option(f"{name}7.mcap")
+    shows(page, "state-word", "^Replay$")
+    shows(page, "label-count", "^1 label")
+    press(page, "Home")
+    start = still(page)
+    press(page, "Space")
+    # Datagrams arrived for only part of the two seconds, so the recording may be that short.
+    until(lambda: clock(page) > start + 0.2, "it plays")
+    file = taxel.open(folder / f"{name}7.mcap")
+    assert len(file.events.t) > 0
+    assert file.registers is not None
+    assert file.registers.noise_floor == floor_ticks
+    rows = list(csv.DictReader((folder / f"{name}7.notes.csv").open()))
+    assert [row["label"] for row in rows] == ["contact"]
+    # The trial's label is no event: it has no time. The recording may begin in silence.
+    said = {note.text: note.t for note in file.notes}
+    assert said == {"heel": None, "contact": int(rows[0]["t_us"])}
+    assert file.events.t[0] - 2_500_000 <= said["contact"] <= file.events.t[-1] + 2_500_000
+
+
+def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live: SimpleNamespace) -> None:
+    story(page, live.folder, "walk", 5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", range(20))
+def test_the_story_holds_every_time(page: Any, live: SimpleNamespace, turn: int) -> None:
+    story(page, live.folder, f"again{turn:02}-", 3 + turn % 5)
+
+
+def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Path) -> None:
+    port = str(free_port())
+    with (
+        running("emulate", "--port", port, "--control", "0", folder=tmp_path) as board,
+        running("live", "--panel", "--port", port, "--host", "127.0.0.1", folder=tmp_path) as server,
+    ):
+        control = board.wait_for(r"commands are accepted at (\S+)")
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "where-info", "no control line")
+        assert not page.get_by_label("Noise floor", exact=True).is_enabled()
+        # The machine's ports and addresses stand in the lists.
+        until(lambda: page.locator("#udp-choice option[value^='127.0.0.1:']").count() == 1, "loopback is offered")
+        listed = page.locator("#control-choice optgroup[label='Serial ports'] option").evaluate_all(
+            "all => all.map(e => e.value)"
+        )
+        assert listed == [port.place for port in taxel.device.ports()]
+        page.locator("#control").fill("127.0.0.1:1")
+        page.locator("#control-connect").click()
+        shows(page, "control-why", "refused")
+        page.locator("#control").fill(control)
+        page.locator("#control-connect").click()
+        shows(page, "where-info", re.escape(control))
+        until(lambda: page.get_by_label("Noise floor", exact=True).is_enabled(), "registers can be written")
+        shows(page, "board-lines", "REG")
+        page.locator("#control-drop").click()
+        shows(page, "where-info", "no control line")
+        page.locator("#control-choice").select_option(control)
+        assert page.locator("#control").input_value() == control
+        page.locator("#delta-intensity").check()
+        until(
+            lambda: page.locator("#delta-intensity").is_checked() and page.locator("#notice").is_hidden(), "it is taken"
+        )
+        assert not page.errors
+        page.context.close()
+
+
+def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> None:
+    period = page.get_by_label("Step period", exact=True)
+    period.fill("4")
+    period.press("Enter")
+    shows(page, "register-step_period-reason", r"4 x step_period 4\.00 us is longer than line_read 3\.00 us \(rule 2\)")
+    assert period.input_value() == "4"
+    assert period.get_attribute("aria-invalid") == "true"
+    # A slower line period makes the value valid: both are written together.
+    for name, value in (("Line period", "20"), ("Line read", "20")):
+        page.get_by_label(name, exact=True).fill(value)
+        page.get_by_label(name, exact=True).press("Enter")
+    until(lambda: period.get_attribute("aria-invalid") == "false" and period.input_value() == "4.00", "all are written")
+    period.fill("nonsense")
+    period.press("Enter")
+    shows(page, "register-step_period-reason", "nonsense is no number")
+    period.press("Escape")
+    assert period.input_value() == "4.00"
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: period.input_value() == "0.75", "the preset is back")
+
+
+def test_presets_of_ones_own_are_kept_applied_and_deleted(page: Any) -> None:
+    page.locator("#preset-path").click()
+    floor = page.get_by_label("Noise floor", exact=True)
+    floor.fill("9")
+    floor.press("Enter")
+    until(lambda: page.locator("#preset").input_value() == "", "no preset is this")
+    page.locator("#preset-name").fill("quiet")
+    page.locator("#preset-name").press("Enter")
+    until(lambda: page.locator("#preset").input_value() == "quiet", "it is kept")
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: floor.input_value() == "3", "another is applied")
+    page.locator("#preset").select_option("quiet")
+    until(lambda: floor.input_value() == "9", "and ours again")
+    page.locator("#preset-delete").click()
+    until(lambda: page.locator("#preset option[value=quiet]").count() == 0, "it is gone")
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: floor.input_value() == "3", "the preset is back")
+
+
+def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: Any, live: SimpleNamespace) -> None:
+    record_form(page, name="auto", index="1", countdown="1", length="1", advance=True)
+    press(page, "r")
+    shows(page, "record-word", "^Cancel$")
+    shows(page, "record-word", "^Stop$")
+    until((live.folder / "auto2.mcap").exists, "the second begins by itself")
+    press(page, "r")
+    shows(page, "record-word", "^Record$")
+    before = (live.folder / "auto1.mcap").read_bytes()
+    record_form(page, name="auto", index="1", countdown="0", length="1", advance=False)
+    press(page, "r")
+    shows(page, "record-reason", r"auto1\.mcap.*exists")
+    for name in ("../away", ".hidden", ""):
+        record_form(page, name=name, index="")
+        press(page, "r")
+        until(lambda: page.locator("#record-reason").is_visible(), f"{name!r} is refused")
+    assert (live.folder / "auto1.mcap").read_bytes() == before
+    record_form(page, name="auto", index="one")
+    press(page, "r")
+    shows(page, "record-reason", "index: one is no number")
+
+
+def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, tmp_path: Path) -> None:
+    readout = train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
+    readout.save(tmp_path / "touch.json")
+    tare().save(tmp_path / "tare.json")
+    events, truth = touches(11)
+    taxel.convert(events, tmp_path / "played.mcap")
+    port = str(free_port())
+    given = ("--readout", "touch.json", "--tare", "tare.json", "--array", "8x8")
+    with running("live", "--panel", "--port", port, "--host", "127.0.0.1", *given, folder=tmp_path) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "state-word", FOLLOWS)
+        shows(page, "detections-none", "^None yet")
+        with running("emulate", "--replay", "played.mcap", "--port", port, folder=tmp_path) as board:
+            board.process.wait(PATIENCE)
+
+        def printed() -> list[tuple[str, str]]:
+            return re.findall(r"^ +([\d.]+) s +(contact|lift) ", server.heard(), re.MULTILINE)
+
+        until(lambda: server.heard().count(" lift ") >= 1, "the board has been heard")
+        page.wait_for_timeout(1000)
+        shows(page, "detection-count", f"^{len(printed())}$")
+        # The page lists the detections of the terminal, the latest first, with the time and the latency of each.
+        rows = page.locator("#detection-list li").all_inner_texts()
+        assert all(re.search(r"\d+\.\d{3} s\s+-?\d[\d.]* (µs|ms|s)$", row) for row in rows), rows
+        names = [re.match(r"\w+", row.strip()).group() for row in rows]  # type: ignore[union-attr]
+        at = np.array([float(re.findall(r"([\d.]+) s", row)[0]) for row in rows])
+        assert names[::-1] == [name for _, name in printed()]
+        assert np.diff(at[::-1]) == pytest.approx(np.diff([float(time) for time, _ in printed()]), abs=0.0021)
+        assert page.locator("#detection-marks span").count() > 0
+        until(lambda: page.locator("#latency").inner_text() != "–", "latency is counted")
+        page.locator("#detection-list button").last.click()
+        shows(page, "state-word", "^Held$")
+        assert not page.errors
+        page.context.close()
+    # If the machine delays the emulated board, detections that were output too early are in the list too, and counted
+    # there.
+    if " late" not in server.heard():
+        assert names == ["lift", "contact"] * 6
+        wanted = sorted(truth["contact"] + truth["lift"])
+        assert np.diff(at[::-1]) * 1e6 == pytest.approx(np.diff(wanted), abs=4000)
+
+
+def test_what_does_not_arrive_is_said(chromium: Any, tmp_path: Path) -> None:
+    port = str(free_port())
+    how = ("--panel", "--port", port, "--host", "127.0.0.1", "--array", "4x4", "--rate-hz", "500", "--bits", "12")
+    with running("live", *how, folder=tmp_path) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "silence", rf"^Nothing has arrived at UDP 127\.0\.0\.1:{port} so far")
+        shows(page, "state-word", "^Nothing arrives$")
+        shows(page, "frames", "^–$")
+        # Version 1 has no heartbeats: quiet.
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+            board.sendto(word(1_000_000, 1, 1, 50), ("127.0.0.1", int(port)))
+        shows(page, "silence", r"^Quiet: nothing since 1\.000 s of the board, for ")
+        shows(page, "state-word", "^Quiet$")
+        # Version 2 sends them: lost.
+        source = taxel.live.Source(taxel.Array(4, 4), 500.0, bits=12, to=f"127.0.0.1:{port}")
+        for k in range(200):
+            source.push(np.full((4, 4), 100 if k < 20 else 300))
+            time.sleep(0.002)
+
+        def shown() -> bool:
+            source.push(np.full((4, 4), 300))
+            return bool(page.locator("#frames").inner_text() == "500")
+
+        until(shown, "the frames of a board that sends")
+        shows(page, "silence", "^The board is lost: nothing since .* heartbeat every .* or sooner")
+        shows(page, "state-word", "^Lost$")
+        shows(page, "frames", "^–$")
+        assert not page.errors
+        page.context.close()
+
+
+def test_the_page_is_there_while_a_tare_waits(chromium: Any, tmp_path: Path) -> None:
+    train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe()).save(tmp_path / "touch.json")
+    port = str(free_port())
+    with running("emulate", "--port", port, "--control", "0", "--heartbeat", "10", folder=tmp_path) as board:
+        control = board.wait_for(r"commands are accepted at (\S+)")
+        other = str(free_port())
+        how = ("--port", other, "--host", "127.0.0.1", "--control", control, "--readout", "touch.json", "--tare", "0.2")
+        with running("live", "--panel", *how, folder=tmp_path) as server:
+            server.wait_for(r"(the readout assumes frames of 24 us)")
+            page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+            shows(page, "silence", "^Nothing has arrived")
+            shows(page, "assumed", r"assumes frames of 24 µs")
+            shows(page, "where-info", "no control line")
+            rest = np.full((8, 8), 50)
+            source = taxel.live.Source(taxel.Array(8, 8), 100.0, to=f"127.0.0.1:{other}")
+            source.push(rest)
+            shows(page, "silence", "^Taking a tare|^The board is lost")
+            for _ in range(40):
+                source.push(rest)
+                time.sleep(0.01)
+            # The serial line has had its first user, the tare.
+            shows(page, "where-info", re.escape(control))
+            assert not page.errors
+            page.context.close()
+
+
+def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> None:
+    until(lambda: clock(page) > 2, "there is something to look back at")
+    press(page, "Space")
+    shows(page, "state-word", "^Held$")
+    held = still(page)
+    press(page, "ArrowLeft")
+    until(lambda: clock(page) == pytest.approx(held - 0.1, abs=0.002), "a tenth of a second back")
+    back = still(page)
+    press(page, ".")
+    until(lambda: clock(page) > back, "a step on")
+    on = still(page)
+    press(page, ",", ",")
+    until(lambda: clock(page) < on, "two steps back")
+    events = page.locator("#events").inner_text()
+    until(lambda: page.locator("#events").inner_text() != events, "the board goes on")
+    press(page, "l")
+    shows(page, "state-word", "^Live$")
+    until(lambda: clock(page) > held + 0.1, "it follows again")
+
+
+def test_the_crosshair_goes_by_keys_and_names_its_taxel(page: Any) -> None:
+    press(page, "c")
+    page.keyboard.press("Escape")
+    shows(page, "taxel-name", "^none")
+    for key in ("ArrowUp", "ArrowLeft", "Shift+ArrowUp"):
+        page.keyboard.press(key)
+    shows(page, "taxel-name", r"row 24, column 31 · sense line 24, driven line 31")
+    page.locator("#tab-view").click()
+    page.locator("#flip-x").check()
+    box = page.locator("#pressure-frame").bounding_box()
+    page.mouse.click(box["x"] + 3, box["y"] + 3)
+    shows(page, "taxel-name", "row 0, column 63")
+    page.locator("#flip-x").uncheck()
+
+
+def test_a_taxel_is_zeroed_by_a_button_and_marked(page: Any) -> None:
+    shows(page, "state-word", "^Live$")
+    button = page.get_by_role("button", name="Zero", exact=True)
+    page.locator("#pressure-frame").click()
+    until(lambda: "ticks" in page.locator("#taxel-value").inner_text(), "the taxel was heard of")
+    button.click()
+    shows(page, "taxel-value", "zeroed")
+    until(lambda: page.locator("#pressure-marks .unwell.zeroed").count() == 1, "it is marked")
+    press(page, "Space")
+    shows(page, "state-word", "^Held$")
+    assert button.is_hidden(), "what it holds now is not what is shown"

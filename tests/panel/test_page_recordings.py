@@ -1,0 +1,237 @@
+"""The page of a recording: its time axis, spikes, labels and cuts, in a real browser."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.panel.pages import (
+    PIXELS,
+    clock,
+    pixel,
+    press,
+    recording,
+    replay,
+    settled,
+    shows,
+    span,
+    still,
+    until,
+)
+
+import taxel
+import taxel.device
+
+__all__ = ["recording", "replay"]
+
+pytestmark = pytest.mark.timeout(600)
+
+
+def test_steps_leap_over_silence_both_ways(replay: Any) -> None:
+    press(replay, "End")
+    until(lambda: clock(replay) > 9, "the end")
+    press(replay, "Home")
+    until(lambda: clock(replay) < 0.3, "the beginning")
+    replay.locator("#strip").focus()
+    for _ in range(3):
+        at = clock(replay)
+        replay.keyboard.press("Shift+ArrowRight")
+        until(lambda at=at: clock(replay) > at + 0.9, "a second on")
+    # Between two footfalls a step moves to the last stamp of one, or to the first of the next.
+    replay.keyboard.press("ArrowRight")
+    at = still(replay)
+    press(replay, ",")
+    until(lambda: clock(replay) < at - 0.05, "back over the silence")
+    at = still(replay)
+    press(replay, ".")
+    until(lambda: clock(replay) > at, "on over the silence")
+
+
+def test_a_recording_opens_on_all_of_its_time_and_its_first_touch(replay: Any) -> None:
+    until(lambda: 0.2 < clock(replay) < 0.212, "the first touch, where its force is greatest")
+    start, stop = span(replay)
+    assert (start, stop) == (pytest.approx(0.1, abs=0.15), pytest.approx(9.3, abs=0.15))
+    drawn = "document.getElementById('pressure-map').getContext('2d').getImageData(0, 0, 24, 16).data.buffer"
+    assert replay.evaluate(f"new Set(new Uint32Array({drawn})).size") > 2, "the touch is in the map"
+    # No crosshair is placed, and the lane of a watched taxel takes no room.
+    assert replay.locator("#pressure-cross").is_hidden()
+    assert replay.locator("#taxel-block").is_hidden()
+    force = replay.locator("#force-lane").bounding_box()
+    title = replay.locator("#force-block h2").bounding_box()
+    assert title["y"] + title["height"] <= force["y"] + 1, "titles cover no curve"
+    assert replay.locator("#tab-labels").get_attribute("aria-selected") == "true"
+
+
+def test_the_lanes_zoom_and_scroll_as_a_time_axis(replay: Any) -> None:
+    still(replay)
+    box = replay.locator("#raster").bounding_box()
+    replay.mouse.move(pixel(replay, 5.2), box["y"] + 5)
+    for _ in range(8):
+        before = span(replay)
+        replay.mouse.wheel(0, -200)
+        until(lambda before=before: span(replay) != before, "it zooms")
+    start, stop = span(replay)
+    assert stop - start < 1
+    # The time under the pointer stays there, and the columns are narrower now: the fall is 7.5 ms long.
+    pointed = float(replay.locator("#cursor-time").inner_text()[:-2])
+    assert pixel(replay, 5.2) == pytest.approx(pixel(replay, pointed), abs=3)
+    replay.mouse.click(pixel(replay, 5.2), box["y"] + 5)
+    until(lambda: clock(replay) == pytest.approx(5.2, abs=0.003), "a click shows the map at that time")
+    middle = box["x"] + box["width"] / 2
+    replay.mouse.move(middle, box["y"] + 5)
+    replay.mouse.down()
+    replay.mouse.move(middle + box["width"] / 4, box["y"] + 6, steps=4)
+    replay.mouse.up()
+    until(lambda: span(replay)[0] == pytest.approx(start - (stop - start) / 4, abs=0.01), "a drag scrolls")
+    assert clock(replay) == pytest.approx(5.2, abs=0.003), "and shows no other time"
+    press(replay, "Home")
+    until(lambda: span(replay)[0] < 0.2 < span(replay)[1], "the window follows the time")
+    replay.locator("#zoom-all").click()
+    until(lambda: span(replay)[1] > 9.2, "all of it")
+    press(replay, "z")
+    shows(replay, "span", r"^4\.\d s$")
+    press(replay, "x", "x", "x")
+    until(lambda: span(replay)[1] - span(replay)[0] < 10, "no longer than the recording")
+
+
+def test_a_replay_that_leaves_the_window_takes_it_along(replay: Any) -> None:
+    still(replay)
+    replay.mouse.move(pixel(replay, 0.2), replay.locator("#raster").bounding_box()["y"] + 5)
+    for _ in range(6):
+        press(replay, "z")
+    until(lambda: span(replay)[1] < 1, "a short stretch")
+    press(replay, "Space")
+    until(lambda: clock(replay) > 2, "it plays")
+    press(replay, "Space")
+    at = still(replay)
+    start, stop = span(replay)
+    assert start < at <= stop + 0.01
+    # The lanes have what was played: the force of the last fall that the window shows.
+    assert replay.evaluate(PIXELS, "raster")
+
+
+def test_spikes_of_an_encoder_are_shown_in_a_recording(replay: Any) -> None:
+    press(replay, "End", "4")
+    until(lambda: clock(replay) > 9, "the end")
+    still(replay)
+    changes = settled(replay, "raster")
+    replay.locator("#encoder").select_option("change_events")
+    shows(replay, "spikes-info", "change events, latency")
+    until(lambda: replay.evaluate(PIXELS, "raster") != changes, "the raster is of spikes")
+    replay.locator("#encoder").select_option("")
+    until(lambda: replay.evaluate(PIXELS, "raster") == changes, "and of changes again")
+
+
+def test_ten_footfalls_are_labelled_moved_named_and_deleted(replay: Any, recording: Path) -> None:
+    table = recording.with_suffix("").with_suffix(".notes.csv")
+    press(replay, "3")
+    replay.locator("#label-name").fill("contact")
+    for fall in range(10):
+        t_us = 1_000_000 * fall + 200_000
+        replay.evaluate("document.activeElement.blur()")
+        replay.locator("#strip").focus()
+        replay.keyboard.press("Home")
+        for _ in range(fall):
+            replay.keyboard.press("Shift+ArrowRight")
+        until(lambda t_us=t_us: abs(clock(replay) * 1e6 - t_us) < 20_000, f"fall {fall}")
+        press(replay, "m")
+        shows(replay, "label-count", f"^{fall + 1} label")
+    first = replay.locator("#label-list li").first
+    first.locator("input").first.fill("heel")
+    first.locator("input").first.press("Enter")
+    until(lambda: "heel" in table.read_text(), "the name is kept")
+    press(replay, "End", "p")
+    flag = replay.locator(".flag.chosen")
+    flag.focus()
+    before = [int(row["t_us"]) for row in csv.DictReader(table.open())]
+    flag.press("Shift+ArrowLeft")
+    until(lambda: sum(int(row["t_us"]) for row in csv.DictReader(table.open())) == sum(before) - 100_000, "moved")
+    replay.locator(".flag.chosen").focus()
+    replay.keyboard.press("Delete")
+    shows(replay, "label-count", "^9 label")
+    rows = list(csv.DictReader(table.open()))
+    assert sorted(row["label"] for row in rows) == ["contact"] * 8 + ["heel"]
+    assert sorted(note.text for note in taxel.open(recording).notes) == ["contact"] * 8 + ["heel"]
+
+
+def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay: Any, recording: Path) -> None:
+    table = recording.with_suffix("").with_suffix(".notes.csv")
+    table.unlink(missing_ok=True)
+    replay.reload()
+    shows(replay, "label-count", "^0 labels")
+    still(replay)
+    replay.locator("#label-name").fill("a name of a label that is long")
+    lane = replay.locator("#label-lane").bounding_box()
+    low = lane["y"] + lane["height"] - 4
+    # One click for each: the names of the others are not in its way.
+    for count, t_s in enumerate((2.0, 2.3, 2.6, 2.9, 8.0), start=1):
+        replay.mouse.click(pixel(replay, t_s), low)
+        shows(replay, "label-count", f"^{count} label")
+    marked = [int(row["t_us"]) / 1e6 for row in csv.DictReader(table.open())]
+    assert marked == pytest.approx([2.0, 2.3, 2.6, 2.9, 8.0], abs=0.01)
+    # One count everywhere.
+    assert "5 labels" in replay.locator("#files option:checked").inner_text()
+    assert replay.locator("#label-list li").count() == replay.locator(".flag").count() == 5
+    # Without a name nothing is lost: the label is set where the click was, once there is one.
+    replay.locator("#label-name").fill("")
+    replay.mouse.click(pixel(replay, 6.0), low)
+    replay.keyboard.type("toe")
+    replay.keyboard.press("Enter")
+    shows(replay, "label-count", "^6 label")
+    flag = replay.locator(".flag", has_text="toe")
+    said = flag.get_attribute("aria-label")
+    handle = flag.locator("i").bounding_box()
+    at = (handle["x"] + 4, handle["y"] + 4)
+    replay.mouse.click(*at)
+    shows(replay, "label-count", "^6 label")
+    assert "chosen" in flag.get_attribute("class")
+    replay.mouse.move(*at)
+    replay.mouse.down()
+    replay.mouse.move(at[0] + 40, at[1], steps=4)
+    replay.keyboard.press("Escape")
+    replay.mouse.up()
+    assert flag.get_attribute("aria-label") == said, "Escape gives up a drag"
+    replay.mouse.move(*at)
+    replay.mouse.down()
+    replay.mouse.move(at[0] + lane["width"] / 10, at[1], steps=4)
+    replay.mouse.up()
+    until(lambda: flag.get_attribute("aria-label") != said, "it moves")
+    seconds = [float(re.findall(r"at ([\d.]+) s", text)[0]) for text in (said, flag.get_attribute("aria-label"))]
+    start, stop = span(replay)
+    assert seconds[1] - seconds[0] == pytest.approx((stop - start) / 10, abs=0.03)
+    # A label that was deleted by a click comes back by one.
+    replay.locator("#label-list li").last.get_by_text("×").click()
+    shows(replay, "label-count", "^5 label")
+    replay.locator("#notice-offer").click()
+    shows(replay, "label-count", "^6 label")
+
+
+def test_flags_stack_and_shrink_to_lines(replay: Any, recording: Path) -> None:
+    table = recording.with_suffix("").with_suffix(".notes.csv")
+    table.write_text("label,t_us\n" + "".join(f"contact,{5_000_000 + 1000 * k}\n" for k in range(9)))
+    replay.reload()
+    shows(replay, "label-count", "^9 labels")
+    until(lambda: replay.locator(".flag").count() == 9, "a flag each")
+    levels = replay.locator(".flag").evaluate_all("all => all.map(e => e.dataset.level)")
+    assert levels == ["0", "1", "2"] + ["-1"] * 6
+    assert replay.locator(".flag i:visible").count() == 3
+    table.unlink()
+
+
+def test_a_stretch_is_cut_out_and_the_picture_saved(replay: Any, recording: Path, tmp_path: Path) -> None:
+    press(replay, "Home", "4", "[")
+    press(replay, "Shift+ArrowRight")
+    until(lambda: clock(replay) > 1.1, "a second on")
+    press(replay, "]")
+    replay.locator("#cut-name").fill("piece.mcap")
+    replay.locator("#cut-write").click()
+    shows(replay, "notice-text", r"wrote piece\.mcap")
+    whole, piece = taxel.open(recording).events, taxel.open(recording.parent / "piece.mcap").events
+    assert 0 < len(piece.t) < len(whole.t)
+    with replay.expect_download() as download:
+        press(replay, "s")
+    download.value.save_as(tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")

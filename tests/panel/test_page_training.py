@@ -1,0 +1,125 @@
+"""Play, label, train on the labels, watch the new readout: in a real browser, on events and on pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.detect.test_readout import touches
+from tests.formats import bags
+from tests.formats.bags import PALM
+from tests.panel.browser import running
+from tests.panel.pages import (
+    clock,
+    live,
+    opened,
+    page,
+    pixel,
+    press,
+    recording,
+    shows,
+    span,
+    still,
+    until,
+)
+
+import taxel
+import taxel.device
+
+__all__ = ["live", "page", "recording"]
+
+pytestmark = pytest.mark.timeout(600)
+
+
+def pictures() -> tuple[taxel.Frames, dict[str, list[int]]]:
+    """Return pictures of a mat in counts, on which something is pressed eight times, and when."""
+    rng, t = np.random.default_rng(3), np.arange(900) * 5000
+    values = 40 + rng.normal(0, 0.5, (900, 8, 8))
+    begins = [150 + 90 * k for k in range(8)]
+    for k, begin in enumerate(begins):
+        values[begin : begin + 40, 2:5, 1 + k % 4 : 4 + k % 4] += 60
+    truth = {"contact": [5000 * k for k in begins], "lift": [5000 * (k + 40) for k in begins]}
+    return taxel.Frames(np.round(values), t, unit="counts", array=taxel.Array(8, 8, name="mat")), truth
+
+
+def board(folder: Path) -> dict[str, list[int]]:
+    """Write events of a board, and return their labels."""
+    events, truth = touches(11)
+    taxel.convert(events, folder / "played.mcap")
+    return {label: list(map(int, times)) for label, times in truth.items()}
+
+
+def mat(folder: Path) -> dict[str, list[int]]:
+    """Write pictures of a mat, and return their labels."""
+    frames, truth = pictures()
+    taxel.convert(frames, folder / "played.npz")
+    return truth
+
+
+def palm(folder: Path) -> dict[str, list[int]]:
+    """Write a ROS bag of a palm where less means more pressure, with noise and an offset, and return its labels."""
+    rng = np.random.default_rng(5)
+    values = rng.normal(900, 40, (24, 32)) + rng.normal(0, 4, (900, 24, 32))
+    begins = [100 + 95 * k for k in range(8)]
+    for k, begin in enumerate(begins):
+        values[begin : begin + 45, 4 + k : 9 + k, 8 + 2 * k : 13 + 2 * k] -= 350
+    messages = [("/hand/palm", PALM, 10.0 * k, 10.0 * k, bags.palm(np.round(one))) for k, one in enumerate(values)]
+    bags.write(folder / "played.bag", messages)
+    (folder / "palm.toml").write_text("falls = true\n")
+    return {"contact": [10_000 * k for k in begins], "lift": [10_000 * (k + 45) for k in begins]}
+
+
+OPTIONS = ("--topic", "/hand/palm", "--field", "taxels", "--array", "24x32", "--layout", "palm.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "written", "options", "extra"),
+    # Labels by click are a pixel late or early, for which a picture more may count.
+    [("played.mcap", board, (), 0), ("played.npz", mat, (), 1), ("played.bag", palm, OPTIONS, 1)],
+)
+def test_play_label_train_and_watch_the_new_readout(
+    name: str, written: Any, options: tuple[str, ...], extra: int, chromium: Any, tmp_path: Path
+) -> None:
+    truth = written(tmp_path)
+    with running("view", name, *options, "--no-open", folder=tmp_path) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "state-word", "^Replay$")
+        shows(page, "detections-none", "None in this recording")
+        press(page, "Space")
+        at = clock(page)
+        until(lambda: clock(page) > at + 0.05, "it plays")
+        press(page, "Space")
+        still(page)
+        lane = page.locator("#label-lane").bounding_box()
+        count, (first, last) = 0, span(page)
+        for label, times in truth.items():
+            page.locator("#label-name").fill(label)
+            for t_us in times:
+                # Close up, so that neither handle nor pixel is in the way.
+                page.locator("#zoom-all").click()
+                until(lambda: span(page) == pytest.approx([first, last]), "all of it")
+                x = pixel(page, t_us / 1e6)
+                page.mouse.move(x, lane["y"] + lane["height"] + 30)
+                for _ in range(4):
+                    press(page, "z")
+                page.mouse.click(x, lane["y"] + lane["height"] - 3)
+                count += 1
+                shows(page, "label-count", f"^{count} label")
+        page.locator("#train").click()
+        shows(page, "train", r"^Stop the training")
+        shows(page, "train-text", "contact, neuron: ")
+        until(lambda: page.locator("#readout").input_value() == "played.readout.json", "it reads the recording")
+        until(lambda: page.locator("#detection-list li").count() > 0, "its detections are listed")
+        assert page.locator("#detection-marks span").count() > 0
+        found = [row.split() for row in page.locator("#detection-list li").all_inner_texts()]
+        wanted = sorted((t_us / 1e6, label) for label, times in truth.items() for t_us in times)
+        heard = [(float(t), label) for label, t, *_ in found]
+        missed = [(t, label) for t, label in wanted if not any(abs(t - s) < 0.05 and label == of for s, of in heard)]
+        assert (missed, len(heard) - len(wanted)) in (([], 0), ([], extra))
+        low = page.locator("#detection-list").bounding_box()
+        assert low["y"] + 40 < 900, "detections are in sight"
+        assert not page.errors
+        page.context.close()
+    assert taxel.Readout.load(tmp_path / "played.readout.json").labels == ("contact", "lift")

@@ -1,0 +1,241 @@
+"""A recording of another maker from the command line to the page: times, sums, notes, headings, in a real browser."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.formats import bags
+from tests.formats.bags import BEGIN_NS, PALM
+from tests.formats.making import write_gaitpdb
+from tests.panel.browser import running
+from tests.panel.pages import clock, opened, shows, span, until
+
+import taxel
+from taxel import Array, Frames
+from taxel.recording.pressure import force_n
+
+pytestmark = pytest.mark.timeout(600)
+
+SIZES = [(1400, 900), (390, 844)]
+LOW = "e => e.getBoundingClientRect().bottom"
+
+
+@contextmanager
+def shown(chromium: Any, folder: Path, *words: str, size: tuple[int, int] = SIZES[0]) -> Iterator[Any]:
+    """Show a recording in a browser."""
+    with running("view", *words, "--no-open", folder=folder) as server:
+        url = server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
+        page = opened(chromium, url, viewport=dict(zip(("width", "height"), size, strict=True)))
+        shows(page, "state-word", "^Replay$")
+        shows(page, "clock", r"\d s")
+        yield page
+        assert not page.errors
+        page.context.close()
+
+
+def skin(folder: Path, name: str = "skin.bag") -> Path:
+    """Write a bag of a skin at some 200 counts, with noise, that is pressed twice."""
+    random = np.random.default_rng(1)
+    values = random.normal(200, 20, (24, 32)) + random.normal(0, 3, (300, 24, 32))
+    for begin in (100, 200):
+        values[begin : begin + 50, 6:11, 10:16] += 300
+    messages = [("/palm", PALM, 10.0 * k, 10.0 * k, bags.palm(np.round(one))) for k, one in enumerate(values)]
+    return bags.write(folder / name, messages)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_times_since_1970_count_from_the_begin_of_the_recording_which_the_page_states(
+    size: tuple[int, int], chromium: Any, tmp_path: Path
+) -> None:
+    skin(tmp_path)
+    with shown(chromium, tmp_path, "skin.bag", "--topic", "/palm", "--array", "24x32", size=size) as page:
+        assert clock(page) < 3
+        start, stop = span(page)
+        assert (start, stop) == (pytest.approx(0, abs=0.05), pytest.approx(2.99, abs=0.05))
+        shows(page, "begun", r"^0 s: 2026-11-18 11:06:40\.000 UTC$")
+        # Nothing is pressed between the presses: the rest of some 200 counts is subtracted.
+        shows(page, "rest-from", "^above the rest of a quiet stretch$")
+        area = int(page.locator("#force-area").inner_text().split()[0])
+        assert 25 <= area <= 40
+        shows(page, "force-title", "^Sum$")
+        page.locator("#label-name").fill("touch")
+        page.locator("#mark").click()
+        shows(page, "label-count", "^1 label$")
+        table = tmp_path / "skin.notes.csv"
+        at = [int(row["t_us"]) for row in csv.DictReader(table.open())]
+        assert at == [pytest.approx(BEGIN_NS / 1000 + clock(page) * 1e6, abs=2)]
+        time = page.locator("#label-list li input").nth(1)
+        assert float(time.input_value()) == pytest.approx(clock(page), abs=1e-5)
+        time.fill("2.123456")
+        time.press("Enter")
+        moved = BEGIN_NS // 1000 + 2_123_456
+        until(lambda: [int(row["t_us"]) for row in csv.DictReader(table.open())] == [moved], "its own time is saved")
+        assert time.evaluate("e => e.scrollWidth <= e.clientWidth"), "all of the number is in sight"
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_of_a_long_sensor_of_known_area_the_force_is_in_newtons_and_the_buttons_are_in_sight(
+    size: tuple[int, int], chromium: Any, tmp_path: Path
+) -> None:
+    values = np.zeros((60, 60, 21))
+    values[20:40, 10:20, 5:10] = 100.0
+    frames = Frames(values, np.arange(60) * 20_000, unit="kPa", array=Array(60, 21, pitch_mm=5.08))
+    taxel.convert(frames, tmp_path / "walk.npz")
+    newtons = force_n(frames).max()
+    with shown(chromium, tmp_path, "walk.npz", size=size) as page:
+        shows(page, "force-title", "^Force$")
+        shows(page, "force-sum", rf"^{newtons:.0f} N$")
+        foot = page.locator("footer").evaluate("e => e.getBoundingClientRect().top")
+        for name in ("zoom-all", "zoom-out", "zoom-in", "health"):
+            button = page.locator(f"#{name}")
+            assert button.is_visible()
+            if size == SIZES[0]:
+                assert button.evaluate(LOW) <= foot, name
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_neither_marks_nor_lines_cover_the_headings_of_the_lanes(
+    size: tuple[int, int], chromium: Any, tmp_path: Path
+) -> None:
+    values = np.zeros((200, 8, 8))
+    values[50:, 2:5, 2:5] = 40
+    taxel.convert(Frames(values, np.arange(200) * 10_000, unit="N", array=Array(8, 8)), tmp_path / "mat.npz")
+    with shown(chromium, tmp_path, "mat.npz", size=size) as page:
+        assert page.locator("#detection-marks").is_hidden(), "no row for marks where there are none"
+        # In one go: the page draws its marks anew whenever the recording's own come.
+        mark, lane, head = page.evaluate(
+            """() => {
+                const box = name => document.querySelector(name).getBoundingClientRect().toJSON();
+                const marks = document.getElementById("detection-marks"), one = document.createElement("span");
+                const without = marks.hidden;
+                [marks.hidden, one.className, one.style.left] = [false, "shape", "20%"];
+                marks.append(one);
+                const boxes = ["#detection-marks span", "#label-lane", "#force-block h2"].map(box);
+                one.remove();
+                marks.hidden = without;
+                return boxes;
+            }"""
+        )
+        assert lane["bottom"] <= mark["y"]
+        assert mark["bottom"] <= head["y"]
+        # The line at the picture's time and the cursor's stand over the lanes; their headings stand over the lines.
+        order = """() => { const z = name => Number(getComputedStyle(document.querySelector(name)).zIndex);
+            return [z("#force-block h2"), z("#track")]; }"""
+        above, below = page.evaluate(order)
+        assert above > below
+        assert (
+            page.locator("#force-block h2").evaluate("e => getComputedStyle(e).backgroundColor") != "rgba(0, 0, 0, 0)"
+        )
+        assert head["width"] < lane["width"] * 0.95, "beside a heading the lines are seen"
+
+
+def test_notes_of_both_feet_are_used_as_labels_of_each(chromium: Any, tmp_path: Path) -> None:
+    file = write_gaitpdb(tmp_path)
+    noted = {one.label: [(note.text, note.t) for note in one.notes] for one in taxel.open(file)}
+    count = sum(map(len, noted.values()))
+    assert count > 0
+    with shown(chromium, tmp_path, file.name) as page:
+        shows(page, "label-count", "^0 labels$")
+        assert page.locator("#train").is_hidden()
+        shows(page, "notes-as-labels", rf"^Use as labels \({count}\)$")
+        page.locator("#notes-as-labels").click()
+        shows(page, "label-count", rf"^{count} label")
+        until(page.locator("#notes-as-labels").is_hidden, "none is left to use")
+        assert page.locator("#train").is_visible()
+        units = set(page.locator("#label-list .unit").all_inner_texts())
+        assert units == {f"s, {foot}" for foot in noted}
+    table = list(csv.DictReader((tmp_path / f"{file.stem}.notes.csv").open()))
+    for foot, own in noted.items():
+        assert sorted((row["label"], int(row["t_us"])) for row in table if row["source"] == foot) == sorted(own)
+    # A note that is a label too is one event.
+    again = {one.label: [(note.text, note.t) for note in one.notes] for one in taxel.open(file)}
+    assert {foot: sorted(own) for foot, own in again.items()} == {foot: sorted(own) for foot, own in noted.items()}
+
+
+def test_the_notes_of_one_sensor_are_labels_of_all_of_it(chromium: Any, tmp_path: Path) -> None:
+    frames = Frames(np.zeros((100, 4, 4)), np.arange(100) * 10_000, unit="N", array=Array(4, 4))
+    (tmp_path / "noted").mkdir()
+    taxel.convert(frames, tmp_path / "noted" / "mat.npz")
+    (tmp_path / "noted" / "mat.notes.csv").write_text("label,t_us\nheel,300000\n")
+    taxel.convert(taxel.open(tmp_path / "noted" / "mat.npz"), tmp_path / "mat.mcap")
+    with shown(chromium, tmp_path, "mat.mcap") as page:
+        shows(page, "notes-as-labels", r"^Use as labels \(1\)$")
+        page.locator("#notes-as-labels").click()
+        shows(page, "label-count", "^1 label$")
+        table = tmp_path / "mat.notes.csv"
+        assert table.read_text() == "label,t_us,replaces_us\nheel,300000,300000\n"
+        assert [(note.text, note.t) for note in taxel.open(tmp_path / "mat.mcap").notes] == [("heel", 300_000)]
+        # Moved, it is still one event; deleted none, until it is used again.
+        time = page.locator("#label-list li input").nth(1)
+        time.fill("0.25")
+        time.press("Enter")
+        until(lambda: table.read_text().endswith("heel,250000,300000\n"), "the new time is saved")
+        assert page.locator("#notes-as-labels").is_hidden()
+        assert [(note.text, note.t) for note in taxel.open(tmp_path / "mat.mcap").notes] == [("heel", 250_000)]
+        page.locator("#label-list li button").nth(1).click()
+        shows(page, "label-count", "^0 labels$")
+        assert not taxel.open(tmp_path / "mat.mcap").notes
+        shows(page, "notes-as-labels", r"^Use as labels \(1\)$")
+        page.locator("#notice-offer").click()
+        shows(page, "label-count", "^1 label$")
+        assert [(note.text, note.t) for note in taxel.open(tmp_path / "mat.mcap").notes] == [("heel", 250_000)]
+
+
+def test_what_is_being_read_is_named(chromium: Any, tmp_path: Path) -> None:
+    frames = Frames(np.zeros((50, 4, 4)), np.arange(50) * 10_000, unit="N", array=Array(4, 4))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    with running("view", "mat.npz", "--no-open", folder=tmp_path) as server:
+        url = server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
+        page = opened(chromium, url)
+        shows(page, "state-word", "^Replay$")
+        # What the server sends is held back, as by a file that takes long to read.
+        page.context.close()
+        page = chromium.new_context().new_page()
+        held: list[Any] = []
+
+        def hold(socket: Any) -> None:
+            to = socket.connect_to_server()
+            socket.on_message(to.send)
+
+            def pass_on(message: Any) -> None:
+                answers = isinstance(message, str) and json.loads(message)["type"] in ("opened", "done")
+                held.append(message) if answers else socket.send(message)
+
+            to.on_message(pass_on)
+
+        page.route_web_socket("**/socket", hold)
+        page.goto(url)
+        shows(page, "state-word", "^Opening$")
+        shows(page, "source", r"^reading mat\.npz …")
+        page.context.close()
+
+
+def test_a_label_of_numbered_pictures_is_at_a_picture_and_not_at_a_second(chromium: Any, tmp_path: Path) -> None:
+    values = np.zeros((60, 4, 5))
+    values[20:30, 1:3, 2:4] = 9.0
+    np.savetxt(tmp_path / "mat.csv", values.reshape(60, -1), fmt="%g", delimiter=",")
+    (tmp_path / "mat.layout.toml").write_text("rows = 4\ncolumns = 5\n")
+    with running("view", "mat.csv", "--no-open", folder=tmp_path) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "clock", r"^picture \d+$")
+        page.locator("#label-name").fill("touch")
+        page.locator("#mark").click()
+        shows(page, "label-count", "^1 label$")
+        time = page.locator("#label-list li input").nth(1)
+        assert f"picture {time.input_value()}" == page.locator("#clock").inner_text()
+        assert time.get_attribute("aria-label") == "time of touch, pictures"
+        time.fill("25")
+        time.press("Enter")
+        table = tmp_path / "mat.notes.csv"
+        until(lambda: [row["t_us"] for row in csv.DictReader(table.open())] == ["25"], "its number is saved")
+        until(lambda: page.locator("#label-list li input").nth(1).input_value() == "25", "and shown")
+        assert not page.errors
+        page.context.close()

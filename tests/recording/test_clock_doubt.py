@@ -1,0 +1,101 @@
+"""A drift or a delay that cannot be is said to be wrong, with its likely cause; what can be is not."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+import taxel
+from taxel import _core
+from taxel.cli import app
+from taxel.cli._board import counters_table, doubted
+from taxel.clock import doubt
+from taxel.live import Live
+
+from .making import HEADER
+
+CAUSE = "cannot be: the sender did not keep pace with its own clock"
+
+
+def recorded(path: Path, drift_ppm: float, delay_s: float) -> Path:
+    """Write 20 s of a board than whose clock the host's runs so much faster, and which pauses three times."""
+    own = np.arange(0, 20_000_000, 5_000)
+    host_us = own * (1 + drift_ppm * 1e-6) + np.random.default_rng(2).exponential(50.0, len(own))
+    for pause in (400, 2000, 3600) if delay_s else ():
+        host_us[pause] += 1e6 * delay_s
+    # What was sent behind a late datagram comes when that has come.
+    at_ns = 1_700_000_000_000_000_000 + np.rint(np.maximum.accumulate(host_us) * 1000).astype(np.int64)
+    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
+    for k, at in enumerate(at_ns.tolist()):
+        one = taxel.Events([own[k]], [3], [4], [k % 2 > 0], array=taxel.Array.thesis(), intensity=[60 + k % 2])
+        writer.datagram(at, k, taxel.wire.encode(one))
+    writer.finish(json.dumps({"received": len(own)}))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("drift_ppm", "delay_s", "said"),
+    [
+        (9_900.0, 0.0, None),
+        (-9_900.0, 0.0, None),
+        (10_100.0, 0.0, "a drift of "),
+        (-10_100.0, 0.0, "a drift of "),
+        # No fit takes such drifts, so the delays say it.
+        (-318_601.0, 0.0, "a delay of 6.3 s "),
+        (30_000.0, 0.0, "a median delay of -0.2 s "),
+        (500_000.0, 0.0, "a median delay of -4.1 s "),
+        (0.0, 0.9, None),
+        (0.0, 1.2, "a delay of 1.1 s "),
+        # A pause of more than half a turn of version 1's stamps counts as another turn.
+        (0.0, 7.0, "a delay of "),
+    ],
+)
+def test_info_says_which_clocks_cannot_be(tmp_path: Path, drift_ppm: float, delay_s: float, said: str | None) -> None:
+    file = recorded(tmp_path / "board.mcap", drift_ppm, delay_s)
+    facts = json.loads(CliRunner().invoke(app, ["info", str(file), "--json"]).stdout)
+    page = CliRunner().invoke(app, ["info", str(file)]).stdout
+    if abs(drift_ppm) < 20_000 and not delay_s:
+        assert facts["drift_ppm"] == pytest.approx(drift_ppm, abs=5)
+    if said is None:
+        assert (facts["clock_doubt"], CAUSE in page) == (None, False)
+    else:
+        assert said in facts["clock_doubt"]
+        assert facts["clock_doubt"] in page
+        assert CAUSE in page
+
+
+def test_the_border_is_between_the_worst_oscillators_and_what_cannot_be() -> None:
+    assert doubt(10_000.0, 1e6) is None
+    assert doubt(-10_000.0, 1e6) is None
+    assert doubt(0.0, 0.0, -100_000.0) is None
+    soon = doubt(0.0, 0.0, -100_001.0)
+    assert soon is not None
+    assert soon.startswith("a median delay of -0.1 s cannot be")
+    both = doubt(-10_001.0, 1_000_001.0)
+    assert both is not None
+    assert both.startswith("a drift of -10001 ppm (clocks differ by less than 10000) and a delay of 1.0 s cannot be")
+
+
+@pytest.mark.parametrize(("drift_ppm", "wrong"), [(9_999.0, False), (-10_001.0, True), (-318_601.0, True)])
+def test_live_says_it_too(drift_ppm: float, wrong: bool) -> None:
+    with Live(0, host="127.0.0.1") as live:
+        before = live.counters
+    assert before["pace"] is None
+    delay = {"count": 9, "p50_us": 41.0, "p99_us": 620.0, "max_us": 700.0}
+    pace = {"drift_ppm": drift_ppm, "delay": delay, "doubt": doubt(drift_ppm, 620.0)}
+    now = {**before, "seconds": before["seconds"] + 1, "pace": pace}
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(counters_table(before, now))
+    shown = console.export_text()
+    assert f"drift {drift_ppm:+.1f} ppm, delays p50 41 us, p99 620 us" in shown
+    assert ("wrong: the sender does not keep pace with its clock" in shown) == wrong
+    assert list(doubted(now)) == ([pace["doubt"]] if wrong else [])
+    assert list(doubted({**before, "sources": {"foot": now, "imu": {"lines": 3}}})) == (
+        [f"foot: {pace['doubt']}"] if wrong else []
+    )

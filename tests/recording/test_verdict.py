@@ -1,0 +1,128 @@
+"""A verdict tells what was lost, in the wordings that docs/outputs.md lists; all else are remarks."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import _core
+from taxel.recording.contents import Contents
+
+from .making import record, some_events
+
+PAGE = Path(__file__).parents[2] / "docs/outputs.md"
+#: What comes before the verdict of a part of what was recorded.
+BEFORE = re.compile(r"(while recording|until then|[\w.]+): (?!what came last)")
+
+
+def wordings() -> list[re.Pattern[str]]:
+    """The wordings of the page's table: N stands for a number, WHAT for anything."""
+    table = PAGE.read_text().partition("A verdict, here, of")[2].partition("Of several sources")[0]
+    rows = re.findall(r"^\| `(.+?)` \|", table, re.MULTILINE)
+    assert len(rows) > 8
+    known = [re.escape(row).replace("WHAT", ".+").replace(r"N\ ", r"\d+ ") for row in rows]
+    return [re.compile(row) for row in [*known, "no counts were saved yet"]]
+
+
+def assert_listed(verdict: str) -> None:
+    __tracebackhide__ = True
+    for piece in verdict.split("; "):
+        bare = BEFORE.sub("", piece) if not piece.startswith(("LOST", "in the bytes", "not finished")) else piece
+        assert any(one.fullmatch(bare) for one in wordings()), f"{piece!r} of {verdict!r} is not in {PAGE.name}"
+
+
+def test_verdicts_of_all_kinds_of_files_are_on_the_page(tmp_path: Path) -> None:
+    whole = tmp_path / "whole.mcap"
+    record(whole, some_events(3000))
+    data = whole.read_bytes()
+    for share in (0.5, 0.7, 0.9, 0.99):
+        (tmp_path / f"cut{share}.mcap").write_bytes(data[: int(len(data) * share)])
+    spoilt = bytearray(data)
+    spoilt[len(data) // 2 : len(data) // 2 + 40] = bytes(40)
+    (tmp_path / "spoilt.mcap").write_bytes(spoilt)
+    for ending in (".lsa", ".npz", ".csv", ".h5"):
+        taxel.convert(whole, tmp_path / f"of{ending}")
+    taxel.convert(tmp_path / "of.lsa", tmp_path / "back.mcap")
+    (tmp_path / "noise.lsa").write_bytes(np.random.default_rng(3).integers(0, 256, 999, np.uint8).tobytes())
+    verdicts = {path.name: taxel.open(path).verdict for path in sorted(tmp_path.glob("*.*")) if path.suffix != ".lss"}
+    for verdict in verdicts.values():
+        assert_listed(verdict)
+    assert "in the bytes that came" in verdicts["noise.lsa"]
+    assert verdicts["noise.lsa"].startswith("not finished, as noise.lss is not there")
+    assert verdicts["back.mcap"] == "the .lsa does not say what was lost"
+    assert verdicts["cut0.5.mcap"].startswith("not finished: what came last is missing")
+    assert "LOST in the file" in verdicts["spoilt.mcap"]
+    assert_listed(taxel.merge([taxel.open(whole), taxel.open(tmp_path / "of.npz")], gap_us=5).verdict)
+    assert_listed(taxel.merge([taxel.open(whole), taxel.open(tmp_path / "of.lsa")], gap_us=5).verdict)
+    with pytest.raises(AssertionError, match="is not in"):
+        assert_listed("nothing lost; at the bag's times")
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_verdicts_of_all_counts_are_on_the_page(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    few = lambda: int(draw.integers(0, 4))  # noqa: E731
+    counts = {name: few() for name in ("dropped_by_kernel", "dropped_by_queue", "missing")}
+    board = ("times_that_the_board_dropped_events", "resets", "events_repaired")
+    counts["decoder"] = {name: few() for name in ("bytes_skipped", "outside_the_array", *board)}
+    names = ("missing", "dropped", "dropped_by_kernel", "silences", "restarts")
+    counts["bridged"] = {name: few() for name in names}
+    unrecorded = few()
+    counts["recorded"] = 5
+    counts["received"] = 5 + counts["dropped_by_queue"] + unrecorded
+    # Each alone, else "nothing lost" would hardly ever be drawn.
+    if seed % 2:
+        (only,) = draw.choice(["dropped_by_kernel", "missing", "board", "none"], 1)
+        counts |= {name: 3 * (only == name) for name in ("dropped_by_kernel", "dropped_by_queue", "missing")}
+        counts["decoder"][board[0]] = 3 * (only == "board")
+        counts |= {"received": 5, "bridged": {"silences": few()}}
+        unrecorded = 0
+    lost = unrecorded + sum(counts[name] for name in ("dropped_by_kernel", "dropped_by_queue", "missing"))
+    lost += counts["decoder"][board[0]] + sum(n for name, n in counts["bridged"].items() if name not in names[3:])
+    assert _core.recording_verdict(json.dumps(counts)).startswith("LOST: " if lost else "nothing lost")
+    assert ("dropped events" in _core.recording_verdict(json.dumps(counts))) == (counts["decoder"][board[0]] > 0)
+    if draw.random() < 0.3:
+        del counts["missing"]
+    assert_listed(_core.recording_verdict(json.dumps(counts)))
+    counts["converted"] = "the .npz does not say what was lost"
+    assert _core.recording_verdict(json.dumps(counts)) == counts["converted"]
+
+
+@pytest.mark.parametrize("kind", [".mcap", ".npz", ".h5"])
+def test_remarks_go_to_files_and_back_beside_the_verdict(tmp_path: Path, kind: str) -> None:
+    frames = taxel.Frames([[[1.0, 2.0]], [[3.0, 4.0]]], [0, 10_000])
+    said = ("at the bag's times", "2 messages of another length left out")
+    of = Contents(tmp_path / "a.bag", "a.bag", "ros", frames.array, frames=frames, remarks=said, verdict="nothing lost")
+    taxel.convert(taxel.Recording(of), tmp_path / f"a{kind}")
+    back = taxel.open(tmp_path / f"a{kind}")
+    made = ("converted from a.bag",) * (kind == ".mcap")
+    assert (back.verdict, back.remarks) == ("nothing lost", said + made)
+    assert back.between(0, 5000).remarks == said + made
+    # Through another kind and back, each conversion to .mcap adds its line.
+    taxel.convert(back, tmp_path / "b.mcap")
+    assert taxel.open(tmp_path / "b.mcap").remarks == (*said, *made, f"converted from a{kind}")
+    lost = taxel.convert(back, tmp_path / "b.csv")
+    assert "the remark: at the bag's times" in lost
+    assert taxel.open(tmp_path / "b.csv").remarks == ()
+
+
+def test_remarks_of_merged_recordings_have_their_names_where_they_differ(tmp_path: Path) -> None:
+    events = some_events(50)
+    for name in ("a", "b"):
+        taxel.convert(events, tmp_path / f"{name}.lsa")
+        taxel.convert(tmp_path / f"{name}.lsa", tmp_path / f"{name}.mcap")
+    one, two = (taxel.open(tmp_path / f"{name}.mcap") for name in ("a", "b"))
+    assert taxel.merge([one, one], gap_us=10).remarks == one.remarks
+    assert len(one.remarks) == 2
+    both = taxel.merge([one, two], gap_us=10)
+    assert "a.mcap: converted from a.lsa" in both.remarks
+    assert "b.mcap: converted from b.lsa" in both.remarks
+    assert both.verdict == "the .lsa does not say what was lost"
+    taxel.convert(both, tmp_path / "both.mcap")
+    again = taxel.open(tmp_path / "both.mcap")
+    assert (again.remarks, again.verdict) == (both.remarks, both.verdict)
