@@ -20,5 +20,5 @@ collect_ignore_glob = ["data/*", "simulate/press_by_*.py"]
 def no_progress_on_a_slow_machine() -> Iterator[None]:
     """Let commands run long before a line of progress, which tests of stderr do not expect."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("taxel.cli._recordings._SAY_S", (600.0,))
+        patch.setattr("taxel.cli._recordings._REPORT_S", (600.0,))
         yield

@@ -249,7 +249,7 @@ def test_a_training_estimates_how_long_it_takes_by_the_folds_that_are_done(monke
 def test_without_a_terminal_lines_say_where_it_is_also_within_a_step(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(_recordings, "_SAY_S", (0.1, 0.2))
+    monkeypatch.setattr(_recordings, "_REPORT_S", (0.1, 0.2))
     with _recordings.progress(quiet=False) as update:
         update("reading a.npy")
         time.sleep(1.0)

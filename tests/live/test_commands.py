@@ -59,7 +59,7 @@ def test_taxel_record_keeps_the_registers_of_a_sensor_of_ones_own(tmp_path: Path
     registers = taxel.open(file).registers
     assert registers == source.registers
     assert registers.frame_us == pytest.approx(2000, rel=1e-3)
-    # Nobody stated a pitch.
+    # No pitch is stated.
     assert taxel.open(file).array.pitch_mm is None
     assert FileOptions(array=["4x4"]).one(file).array.pitch_mm is None
 

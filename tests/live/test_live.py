@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel import Array, Detection, DeviceError, Events, Neuron, ProblemError, Readout, wire
+from taxel import Array, Detection, DeviceError, Events, Neuron, ProblemError, Readout, Tare, wire
+from taxel.detect import PlainRule
 from taxel.encode import ContactArea
 from taxel.live import Live, heard, send
 
@@ -83,6 +84,37 @@ def test_detections_come_live_and_are_those_of_the_recording(tmp_path: Path) -> 
         np.testing.assert_array_equal(found.known, again.known[: len(found)])
     assert iterated == called[:5]
     assert heard(called).said is not None
+
+
+@pytest.mark.parametrize("tared", [False, True])
+@pytest.mark.parametrize("stretch", [1.5, 1.0])
+def test_a_board_that_lags_its_own_clock_gives_the_detections_of_its_recording(
+    tmp_path: Path, stretch: float, tared: bool
+) -> None:
+    pressed = presses(15)
+    t = np.r_[np.arange(0, 60_000, 10_000), pressed.t + 60_000]
+    ticks = np.r_[np.full(6, 60), pressed.intensity]
+    events = Events(t, np.full(len(t), 1), np.full(len(t), 2), np.ones(len(t), bool), array=SMALL, intensity=ticks)
+    readout, tare = (PlainRule("local_load", 2), 0.05) if tared else (touch(), None)
+    options = {"array": SMALL, "readout": readout, "tare": tare, "record": tmp_path / "lagging.mcap"}
+    with Live(0, host=LOOPBACK, **options) as live, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        begun, stamps = time.monotonic(), np.unique(events.t)
+        for t, one in zip(stamps, datagrams(events), strict=True):
+            time.sleep(max(0.0, begun + stretch * t * 1e-6 - time.monotonic()))
+            link.sendto(one, live.address)
+        wait_for(live, len(stamps))
+        time.sleep(0.2)
+        taken = live.tare
+    counters = live.stop().counters
+    recorded = taxel.open(tmp_path / "lagging.mcap")
+    if tared:
+        np.testing.assert_array_equal(taken.rest, Tare.take(recorded.events, start_us=0, stop_us=50_000).rest)
+    again = taxel.detect.run(readout, recorded, **({"tare": taken} if tared else {}))
+    found = {(one.label, one.t, one.known) for one in heard(recorded.detections)}
+    assert len(again) >= 10
+    assert {(one.label, one.t, one.known) for one in again} <= found
+    assert counters["late"] == 0
+    assert counters["detections"] == len(again) + counters["wrong"]
 
 
 def test_in_silence_what_is_owed_is_said() -> None:

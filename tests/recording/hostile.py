@@ -29,10 +29,13 @@ from formats import making as other  # the loaders' files
 import taxel
 from recording.making import record, some_events, some_frames
 from taxel import formats
-from taxel.cli import main
+from taxel.cli import _recordings, main
 
 #: Limits for a small file: memory beyond the program's own, bytes; processor time for all of a run, s per file.
 MEMORY, WORK_S = 3 << 29, 2.0
+
+# On a slow machine a line of progress is no second line of an error.
+_recordings._REPORT_S = (600.0,)
 
 #: Every kind of file that taxel.open and the loaders read, with a function that writes a valid one into a folder.
 KINDS: dict[str, Callable[[Path], Path]] = {}

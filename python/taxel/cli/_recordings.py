@@ -36,7 +36,7 @@ _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
 #: Of fewer pictures the noise is not known.
 _LEAST_PICTURES = 20
 #: Without a terminal a line says the step after so long, then after so long again; the last repeats, s.
-_SAY_S = (2.0, 8.0, 20.0, 30.0)
+_REPORT_S = (2.0, 8.0, 20.0, 30.0)
 #: So long after the last event of a board a label may follow, us, as people mark late; one further than the window of a
 #: score is named, as no detection can lie so near to it.
 _LATE_US, _NEAR_US = 1_000_000, 50_000
@@ -401,9 +401,9 @@ class _Steps:
         expected = f"; about {all_s:.0f} s in all" if all_s > after_s else ""
         return f"{self._step}, after {after_s:.0f} s{expected}"
 
-    def say(self, ended: Event) -> None:
+    def report(self, ended: Event) -> None:
         """Say where it is on stderr, first after a few seconds and then now and then, until it has ended."""
-        for wait_s in chain(_SAY_S, repeat(_SAY_S[-1])):
+        for wait_s in chain(_REPORT_S, repeat(_REPORT_S[-1])):
             if ended.wait(wait_s):
                 return
             typer.echo(f"taxel: {self}", err=True)
@@ -432,13 +432,13 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
                 yield show
         else:
             ended = Event()
-            saying = Thread(target=steps.say, args=(ended,), daemon=True)
-            saying.start()
+            reporting = Thread(target=steps.report, args=(ended,), daemon=True)
+            reporting.start()
             try:
                 yield steps.update
             finally:
                 ended.set()
-                saying.join()
+                reporting.join()
     # One that holds for several recordings is shown once.
     for message in dict.fromkeys(str(one.message) for one in caught if issubclass(one.category, UserWarning)):
         typer.echo(f"taxel: warning: {message}", err=True)

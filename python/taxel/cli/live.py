@@ -254,10 +254,7 @@ def _print_summary(summary: Summary, guard_frames: float) -> None:
         wrong = counted(counters["wrong"], "detection")
         typer.echo(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
     if counters["late"]:
-        typer.echo(
-            f"{counted(counters['late'], 'event')} out of order, or more than 0.1 s later than by the board's clock "
-            "(as from an emulated board on a machine too busy for its rate): read out on arrival, and recorded"
-        )
+        typer.echo(f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded")
     if counters["events_dropped"]:
         typer.echo(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
     for why in doubted(counters):

@@ -238,7 +238,7 @@ class Live:
         heartbeat_us; not of one that has ended), `bridged` (None, or of a board
         of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
         ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
-        `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those output in a
+        `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range
         that it had in training; None if that is not known), `detections_dropped`, `sources` (the counts of
         each other source), `sent` (of each destination: to,

@@ -2,30 +2,52 @@
 
 use taxel_core::detect::{Detection, ReadoutStream};
 use taxel_core::encode::Zeroing;
-use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::{EventsView, Result};
 
-/// Two copies of a readout. One gets the events that arrived and nothing else, so its detections are those of the recording. The
-/// other runs ahead of it by the host's clock while no data arrive, and is discarded when something does. So an event that comes
-/// later than the silence was assumed to last affects only detections that were output too early.
+use super::readout_queue::Quiet;
+
+/// A readout, and copies of it that advance by the host's clock while no data arrive. The next event discards those that it
+/// proves wrong. So an event that comes later than the silence was assumed to last affects only detections that were output too
+/// early.
 pub(super) struct Ahead {
+    /// Had the events that arrived and nothing else, so its detections are those of the recording.
     certain: Box<ReadoutStream>,
-    ahead: Option<Box<ReadoutStream>>,
-    /// Detections of the copy ahead that the other has not confirmed yet.
+    /// Up to the time that the board is assumed to have reached.
+    ahead: Option<Advanced>,
+    /// Up to 0.1 s before that: an event that interrupts a long silence does not make `certain` compute all of it again.
+    behind: Option<Advanced>,
+    /// Detections that were output ahead of `certain` and that it has not confirmed yet.
     early: Vec<Detection>,
     wrong: u64,
     found: Vec<Detection>,
 }
 
+/// A copy that advanced through a silence, and what it has detected since it was made.
+struct Advanced {
+    stream: Box<ReadoutStream>,
+    found: Vec<Detection>,
+}
+
+impl Advanced {
+    fn of(stream: &ReadoutStream) -> Self {
+        Self { stream: Box::new(stream.clone()), found: vec![] }
+    }
+
+    /// Whether no input that the copy missed is before `t` us.
+    fn holds_until(&self, t: i64) -> bool {
+        self.stream.now().is_none_or(|now| now <= t)
+    }
+}
+
 impl Ahead {
     pub(super) fn new(certain: Box<ReadoutStream>) -> Self {
-        Self { certain, ahead: None, early: vec![], wrong: 0, found: vec![] }
+        Self { certain, ahead: None, behind: None, early: vec![], wrong: 0, found: vec![] }
     }
 
     /// Processes the next events; adds to `out` the detections that are certain now and were not output before.
     pub(super) fn push(&mut self, events: EventsView<'_>, out: &mut Vec<Detection>) -> Result<()> {
-        if !events.is_empty() {
-            self.ahead = None;
+        if let Some(&earliest) = events.t.iter().min() {
+            self.end_silence(earliest);
             self.certain.push_events(events, &mut self.found)?;
             self.settle(out);
         }
@@ -34,20 +56,26 @@ impl Ahead {
 
     /// Assumes that no data arrive before `t` us; adds to `out` the detections that follow.
     pub(super) fn quiet(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
-        let ahead = self.ahead.get_or_insert_with(|| self.certain.clone());
-        ahead.advance(t, &mut self.found)?;
-        for detection in self.found.drain(..) {
-            if !self.early.iter().any(|e| same(e, &detection)) {
+        let ahead = self.ahead.get_or_insert_with(|| Advanced::of(&self.certain));
+        let before = ahead.found.len();
+        ahead.stream.advance(t, &mut ahead.found)?;
+        for detection in &ahead.found[before..] {
+            if !self.early.iter().any(|e| same(e, detection)) {
                 self.early.push(detection.clone());
-                out.push(detection);
+                out.push(detection.clone());
             }
         }
-        // A silence is certain once it ends so long ago that an event in it would be too late to be accepted.
-        self.advance(t - FARTHEST_BACK_US, out)
+        let t = Quiet::Believed(t).certain();
+        if self.certain.now().is_none_or(|now| now < t) {
+            let behind = self.behind.get_or_insert_with(|| Advanced::of(&self.certain));
+            behind.stream.advance(t, &mut behind.found)?;
+        }
+        Ok(())
     }
 
     /// Advances on the certainty that no data arrive before `t` us.
     pub(super) fn advance(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
+        self.end_silence(t);
         self.certain.advance(t, &mut self.found)?;
         self.settle(out);
         Ok(())
@@ -55,7 +83,7 @@ impl Ahead {
 
     /// Zeroes a taxel; detections that were output ahead of that time are not withdrawn.
     pub(super) fn zero(&mut self, zeroing: &Zeroing) -> Result<()> {
-        self.ahead = None;
+        (self.ahead, self.behind) = (None, None);
         self.certain.zero(zeroing)
     }
 
@@ -64,7 +92,7 @@ impl Ahead {
         self.certain.rest()
     }
 
-    /// Number of events that arrived out of order, or later than a silence that was certain.
+    /// Number of events that arrived out of order.
     pub(super) fn late(&self) -> u64 {
         self.certain.late()
     }
@@ -77,6 +105,15 @@ impl Ahead {
     /// As [`ReadoutStream::outside`], of the detections that are certain.
     pub(super) fn outside(&self) -> Option<u64> {
         self.certain.outside()
+    }
+
+    /// Ends the silence at `t` us: a copy that has not passed that time is what the certain readout would be there.
+    fn end_silence(&mut self, t: i64) {
+        let copies = [self.ahead.take(), self.behind.take()];
+        if let Some(copy) = copies.into_iter().flatten().find(|copy| copy.holds_until(t)) {
+            self.certain = copy.stream;
+            self.found.extend(copy.found);
+        }
     }
 
     /// Compares certain detections with those that were output ahead of them.
@@ -102,6 +139,8 @@ fn same(a: &Detection, b: &Detection) -> bool {
 mod tests {
     use std::collections::BTreeMap;
 
+    use rand::rngs::StdRng;
+    use rand::{Rng, SeedableRng};
     use taxel_core::detect::{Readout, TrainedNeuron};
     use taxel_core::encode::Encoder;
     use taxel_core::neuron::{Neuron, Time};
@@ -166,6 +205,35 @@ mod tests {
         straight.advance(150_000, &mut expected).unwrap();
         assert_eq!(out, expected);
         assert_eq!((ahead.wrong(), ahead.late()), (0, 0));
+    }
+
+    #[test]
+    fn whatever_silence_is_assumed_detections_are_those_of_the_events_and_those_counted_as_wrong() {
+        let mut random = StdRng::seed_from_u64(5);
+        for round in 0..200 {
+            let (mut ahead, mut out) = (readout(), vec![]);
+            let (mut straight, mut expected) = (readout(), vec![]);
+            let (mut t, mut ticks) = (0, 10);
+            for _ in 0..random.random_range(1..12) {
+                // From the same stamp up to a minute later; the silence assumed before may end after the event.
+                let pause = 10_f64.powf(random.random_range(0.0..7.8)) as i64 / 100 * 100;
+                for _ in 0..random.random_range(0..4) {
+                    ahead.quiet(t + (pause as f64 * random.random_range(0.0..1.6)) as i64, &mut out).unwrap();
+                }
+                t += pause;
+                ticks += random.random_range(0..12);
+                for (one, found) in [(&mut ahead, &mut out), (&mut straight, &mut expected)] {
+                    one.push(event(t, ticks).view(), found).unwrap();
+                }
+            }
+            for (one, found) in [(&mut ahead, &mut out), (&mut straight, &mut expected)] {
+                one.advance(t + 1_000_000, found).unwrap();
+            }
+            assert_eq!((ahead.late(), out.len() as u64), (0, expected.len() as u64 + ahead.wrong()), "{round}");
+            for one in &expected {
+                assert!(out.iter().any(|other| same(one, other)), "{round}: {one:?} is not among {out:?}");
+            }
+        }
     }
 
     #[test]

@@ -75,8 +75,7 @@ pub struct ReadoutCounts {
     pub read_out: u64,
     /// Events that did not fit in the queue before the readout.
     pub events_dropped: u64,
-    /// Events that arrived out of order, or more than 0.1 s after a silence that was assumed: the readout counted them
-    /// at the time that it had come to.
+    /// Events that arrived out of order: the readout counted them at the time that it had come to.
     pub late: u64,
     /// Detections that were output.
     pub detections: u64,

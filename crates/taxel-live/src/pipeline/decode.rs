@@ -10,7 +10,7 @@ use super::counters::Counters;
 use super::options::LiveOptions;
 use super::readout_queue::Quiet;
 use crate::capture::Datagram;
-use crate::clock::{BoardClock, Pace, leaves};
+use crate::clock::{BoardClock, Offset, Pace, leaves};
 
 /// Shortest interval at which the readout's time is advanced during silence; if frames are longer, it is advanced once
 /// per frame.
@@ -23,6 +23,8 @@ pub(super) struct DecodeStage {
     clock: BoardClock,
     /// What the clock showed when its last stretch ended.
     pace: Option<Pace>,
+    /// When the latest datagram with events could leave the board, us, and when it arrived, ns since 1970.
+    sent: Option<(i64, i64)>,
     /// Events that were decoded and not passed on yet.
     events: Events,
     held: Held,
@@ -112,6 +114,7 @@ impl DecodeStage {
             arrivals: Arrivals::default(),
             clock: BoardClock::default(),
             pace: None,
+            sent: None,
             events: Events::empty(options.array.clone()),
             held: Held::unknown(options.array.len()),
             latest: None,
@@ -160,7 +163,9 @@ impl DecodeStage {
             self.promise.note(info, arrived_ns / 1000, (self.gap_frames * self.frame_us) as i64);
         }
         let last = self.events.t[*row..].last().copied();
-        if let Some(left) = leaves(info, last, *bytes, self.frame_us())
+        let left = leaves(info, last, *bytes, self.frame_us());
+        self.sent = left.or(last).map(|left| (left, *arrived_ns)).or(self.sent);
+        if let Some(left) = left
             && self.clock.note(left, *arrived_ns)
         {
             self.pace = self.clock.pace();
@@ -262,14 +267,17 @@ impl DecodeStage {
         (self.decoder.version() == 1).then(|| TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)))
     }
 
-    /// The board's time before which everything has arrived, by the host's clock, if nothing arrived until `until_ns`.
+    /// The board's time before which everything has arrived, if nothing arrived until `until_ns`: the latest datagram's, and as
+    /// much as has passed since on the host's clock. A sender that lags its own clock is not assumed to have caught up.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn quiet(&self, until_ns: Option<i64>) -> Option<Quiet> {
         if self.decoder.version() != 1 {
             return None;
         }
         let guard = (self.guard_frames * self.frame_us) as i64;
+        let (board_us, host_ns) = self.sent?;
+        let since = Offset { board_us, host_ns, ..self.clock.offset().unwrap_or_default() };
         // Events of a frame are sent at its end: all events before the start of the frame that ends now have arrived.
-        Some(Quiet::Believed(self.clock.offset()?.board_us(until_ns?) - self.frame_us() - guard))
+        Some(Quiet::Believed(since.board_us(until_ns?) - self.frame_us() - guard))
     }
 }

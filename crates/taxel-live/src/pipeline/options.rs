@@ -20,7 +20,7 @@ pub struct LiveOptions {
     pub registers: Registers,
     /// Whether the board sends differences for intensities (the panel's "delta intensity").
     pub differences: bool,
-    /// During silence the readout's time follows the host's clock, this number of frames behind it.
+    /// During silence the readout's time follows the host's clock from the latest datagram on, this number of frames behind it.
     pub guard_frames: f64,
     /// Number of frames for which time waits at a gap in the sequence of version 2: the missing datagrams may only be
     /// late.

@@ -3,6 +3,7 @@
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use taxel_core::encode::Zeroing;
+use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::{Array, Events};
 
 use crate::locked::lock;
@@ -34,10 +35,12 @@ pub(super) enum Quiet {
 }
 
 impl Quiet {
-    /// The time, us.
-    pub(super) fn until(self) -> i64 {
+    /// The time before which no data can follow, us: a silence that is believed counts once an event in it would be too late
+    /// to be accepted.
+    pub(super) fn certain(self) -> i64 {
         match self {
-            Self::Believed(t) | Self::Promised(t) => t,
+            Self::Believed(t) => t - FARTHEST_BACK_US,
+            Self::Promised(t) => t,
         }
     }
 }

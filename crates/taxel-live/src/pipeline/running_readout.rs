@@ -133,7 +133,7 @@ impl RunningReadout {
                 }
             }
             Mode::Taring(rest) => {
-                if let Some((stop, inside)) = rest.push(&self.events, end.quiet.map(Quiet::until))? {
+                if let Some((stop, inside)) = rest.push(&self.events, end.quiet.map(Quiet::certain))? {
                     self.begin_reading(shared, stop, inside)?;
                 }
             }
