@@ -132,6 +132,7 @@ def test_what_contributing_says_is_enough(copy: Path, name: str) -> None:
     assert " passed" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "without", "said"),
     [

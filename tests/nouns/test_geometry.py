@@ -50,7 +50,7 @@ def test_files_and_the_compiled_part_keep_all_of_a_sensor(array: Array) -> None:
 
 
 @given(array=arrays())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=6, deadline=None)
 @pytest.mark.parametrize("ending", [".npz", ".h5"])
 def test_converted_files_keep_all_of_a_sensor(
     array: Array, ending: str, tmp_path_factory: pytest.TempPathFactory

@@ -180,6 +180,9 @@ def test_the_notes_of_one_sensor_are_labels_of_all_of_it(chromium: Any, tmp_path
         until(lambda: table.read_text().endswith("heel,250000,300000\n"), "the new time is saved")
         assert page.locator("#notes-as-labels").is_hidden()
         assert [(note.text, note.t) for note in taxel.open(tmp_path / "mat.mcap").notes] == [("heel", 250_000)]
+        until(lambda: page.locator("[title^='label heel at 0.25']").count() == 1, "the page has the new time")
+        page.locator("#label-list li button").nth(0).click()
+        until(lambda: clock(page) == 0.25, "the picture at the new time")
         page.locator("#label-list li button").nth(1).click()
         shows(page, "label-count", "^0 labels$")
         assert not taxel.open(tmp_path / "mat.mcap").notes

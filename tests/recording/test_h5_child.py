@@ -130,7 +130,7 @@ def test_a_damaged_file_is_one_error_or_reads(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     taxel.convert(some_events(200), path)
     whole, draw = path.read_bytes(), np.random.default_rng(3)
-    for _ in range(12):
+    for _ in range(4):
         data = bytearray(whole)
         for place in draw.integers(8, len(data), 4):
             data[place] = draw.integers(0, 256)

@@ -48,7 +48,7 @@ def test_every_format_has_files_to_spoil() -> None:
 
 @pytest.mark.parametrize("name", hostile.KINDS)
 def test_a_spoilt_file_is_read_or_refused_in_one_line(name: str, tmp_path: Path) -> None:
-    spoil(name, 1, 0, 30, tmp_path)
+    spoil(name, 1, 0, 8, tmp_path)
 
 
 @pytest.mark.slow

@@ -211,7 +211,8 @@ export class Labels {
     };
     go.onclick = () => {
       this.chosen = label_id;
-      this.player.seek(t_us);
+      // The row of a label whose time was just typed is an older one.
+      this.player.seek(this.labels.find((one) => one.label_id === label_id)?.t_us ?? t_us);
       this.show();
     };
     away.onclick = () => this.remove(label_id);
