@@ -29,8 +29,8 @@ def git(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
 
 
-#: Commits whose results are kept although only their work was handed on, in 91919491, and not they themselves. A result that
-#: is measured again leaves the list.
+#: Commits whose results are kept although only their work was handed on, in 91919491, and not they themselves. A
+#: result that is measured again leaves the list.
 HANDED_ON = {"0cf5108d": "panel", "15001545": "training", "96eb70e7": "figures/touch", "c0682af3": "rtl"}
 
 NAMED = sorted(
