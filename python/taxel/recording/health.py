@@ -147,8 +147,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     scale, least = ticks_by_unit(held), np.fmin.reduce(held.values, axis=None, initial=np.inf)
     ticks = held
     if np.isfinite(least):
-        values = held.values - least
-        ticks = Frames(frozen(np.multiply(values, scale, out=values)), held.t, array=held.array)
+        # Values at both ends of single precision are infinitely far apart.
+        with np.errstate(over="ignore"):
+            values = held.values - least
+            ticks = Frames(frozen(np.multiply(values, scale, out=values)), held.t, array=held.array)
     counts = _core.touches_of_frames(ticks._parts(), 0.0 if held.unit in FORCE_UNITS else np.nan)
     result = judged(held.array, TaxelStatistics(activity, moved, Touches.of(*counts)), loud=False)
     if not len(held):

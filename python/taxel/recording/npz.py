@@ -64,6 +64,10 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
     ------
     FormatError : a column is missing or invalid
     """
+    values = columns.get("values")
+    if values is not None and values.dtype.kind == "f" and values.flags.writeable:
+        # Of the NaNs of a damaged file some may be signalling ones, of which each computation would warn.
+        np.copyto(values, np.nan, where=np.isnan(values))
     columns = {name: frozen(values) for name, values in columns.items()}
     about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
     described = about.pop("array", None)
