@@ -545,3 +545,19 @@ def test_times_since_1970_are_written_from_the_beginning_on(folder: Path, traine
     drawn = (tmp_path / "walk.svg").read_text()
     assert drawn.count("time from 2023-11-14 22:13:20.000 UTC (s)") == 2
     assert "log10 (1 + changes)" in drawn
+
+
+def test_a_damaged_recording_is_said_beside_its_detections(
+    folder: Path, trained: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taxel.convert(folder / "9.npz", tmp_path / "whole.lsa")
+    damaged, data = tmp_path / "damaged.lsa", (tmp_path / "whole.lsa").read_bytes()
+    damaged.write_bytes(data[: len(data) // 2] + b"\xff\xff\xff" + data[len(data) // 2 :])
+    for name, warned in (("whole", False), ("damaged", True)):
+        words = ["detect", tmp_path / f"{name}.lsa", "--readout", trained, "--tare", folder / "tare.json", "--json"]
+        with pytest.raises(SystemExit) as ended:
+            main([*map(str, words), "--array", f"{ARRAY.rows}x{ARRAY.columns}"])
+        said = capsys.readouterr()
+        assert ended.value.code in (0, None), said.err
+        assert ("damaged.lsa: " in said.err and "in the bytes that came" in said.err) == warned
+        assert json.loads(said.out)["verdict"] == taxel.open(tmp_path / f"{name}.lsa").verdict

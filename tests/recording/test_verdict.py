@@ -63,6 +63,16 @@ def test_verdicts_of_all_kinds_of_files_are_on_the_page(tmp_path: Path) -> None:
         assert_listed("nothing lost; at the bag's times")
 
 
+@pytest.mark.parametrize("share", [0.02, 0.2, 0.5, 0.9, 0.999])
+def test_of_a_file_without_its_end_nothing_is_said_that_no_counts_show(tmp_path: Path, share: float) -> None:
+    whole, cut = tmp_path / "whole.mcap", tmp_path / "cut.mcap"
+    record(whole, some_events(3000))
+    data = whole.read_bytes()
+    cut.write_bytes(data[: max(3000, int(len(data) * share))])
+    recording = taxel.open(cut)
+    assert recording.verdict.endswith("no counts were saved yet") == (not recording.counts.get("received"))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_verdicts_of_all_counts_are_on_the_page(seed: int) -> None:
     draw = np.random.default_rng(seed)

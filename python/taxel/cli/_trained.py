@@ -161,7 +161,9 @@ class Result:
                 f"{one.largest_ms:+.3g} ms"
             )
             unpaired = ((self.opened[k], t) for k, t in one.to_dict()["unpaired"])
-            places = [f"{of.title} at {(t - beginning_us(recorded(of).t)) / 1e6:.3f} s" for of, t in unpaired]
+            places = [
+                f"{of.title} at {(t - beginning_us(recorded(of, hold=False).t)) / 1e6:.3f} s" for of, t in unpaired
+            ]
             if places:
                 more = f" and {len(places) - _NAMED} more" if len(places) > _NAMED else ""
                 of = counted(len(places), "label")

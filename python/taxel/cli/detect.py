@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from taxel.detect import Outcome, Score
+    from taxel.recording import Recording
 
 __all__ = ["detect"]
 
@@ -83,6 +85,7 @@ def detect(
             raise ProblemError(f"--truth {truth}: names no event in {recording}")
         for one, labelled in zip(opened, events, strict=True):
             update(f"detecting in {one.title}")
+            _warn_of_losses(one)
             rest = tare_of(tare, one)
             with _naming(one.title if len(opened) > 1 else None):
                 detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest)
@@ -101,7 +104,8 @@ def detect(
     written = {"written": csv, "report": None if report is None else report / "report.html"}
     places = {name: str(path) for name, path in written.items() if path is not None}
     if as_json:
-        typer.echo(json.dumps(_result(recording, readout, outcomes, together, window_ms) | places))
+        verdicts = [one.verdict for one in opened]
+        typer.echo(json.dumps(_result(recording, readout, outcomes, verdicts, together, window_ms) | places))
         return
     for outcome in outcomes:
         if recording.is_dir() or len(outcomes) > 1:
@@ -115,6 +119,12 @@ def detect(
         typer.echo(f"written to {path}" if name == "written" else f"{name}: {path}")
 
 
+def _warn_of_losses(recording: Recording) -> None:
+    """Warn of what was lost or damaged, as detections may lack or have wrong times."""
+    if "LOST" in recording.verdict or "in the bytes that came" in recording.verdict:
+        warnings.warn(f"{recording.title}: {recording.verdict}", stacklevel=2)
+
+
 @contextmanager
 def _naming(recording: str | None) -> Iterator[None]:
     """Name the recording, one of several, that an error is about."""
@@ -125,12 +135,18 @@ def _naming(recording: str | None) -> Iterator[None]:
 
 
 def _result(
-    recording: Path, readout: Path, outcomes: Sequence[Outcome], together: Score | None, window_ms: float
+    recording: Path,
+    readout: Path,
+    outcomes: Sequence[Outcome],
+    verdicts: Sequence[str],
+    together: Score | None,
+    window_ms: float,
 ) -> dict[str, Any]:
     """Return the detections as plain values for JSON; a detection has the keys of `taxel live --json`."""
     each: list[dict[str, Any]] = [
         {
             "recording": one.name,
+            "verdict": verdict,
             "outside": one.outside,
             "hint": _hint(one),
             "detections": [
@@ -145,7 +161,7 @@ def _result(
             ],
         }
         | ({} if one.score is None else {"score": one.score.to_dict()})
-        for one in outcomes
+        for one, verdict in zip(outcomes, verdicts, strict=True)
     ]
     if len(each) == 1 and not recording.is_dir():
         result = {"readout": str(readout), **each[0]}
@@ -160,7 +176,7 @@ def _hint(outcome: Outcome) -> str | None:
     from taxel.recorded import recorded  # noqa: PLC0415
     from taxel.recording.rest import of_pictures  # noqa: PLC0415
 
-    source = recorded(outcome.example.source)
+    source = recorded(outcome.example.source, hold=False)
     if len(outcome.found) or not isinstance(source, Frames):
         return None
     rest = of_pictures(source)

@@ -90,7 +90,7 @@ class Outcome(NamedTuple):
     @property
     def begin_us(self) -> int:
         """The time that text counts its times from, us: its first if they count from 1970, else 0."""
-        source = recorded(self.example.source)
+        source = recorded(self.example.source, hold=False)
         return beginning_us(np.array([int(to_us(source.start))]) if isinstance(source, SpikeTrains) else source.t)
 
     @property

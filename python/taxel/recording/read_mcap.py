@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,7 @@ class _Source:
         decoded = Once(lambda: self.reader.decode(pairing))
         arrived = lambda: self.remarks()["datagrams"] > 0  # noqa: E731  the same for two fields
         return Contents(
-            **self.common,
+            **self.common | {"verdict": once(lambda: self.verdict(lambda: decoded()[6]))},
             **self.remarked(),
             events=once(lambda: Events._from_parts(decoded()[0], self.array)),
             clock=once(lambda: _clock(decoded()), arrived),
@@ -211,8 +212,8 @@ class _Source:
         damage = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
         return {**damage, "received": counts.get("received"), **self.rebuilt()}
 
-    def verdict(self) -> str:
-        """Return in one line what was lost at which stage."""
+    def verdict(self, version_2: Callable[[], str] | None = None) -> str:
+        """Return in one line what was lost at which stage; `version_2` returns a board's counts of that wire, JSON."""
         rebuilt = self.rebuilt()
         bad = []
         if rebuilt["large_chunks"]:
@@ -224,6 +225,7 @@ class _Source:
             bad.append(f"{skipped} of the file skipped in {counted(rebuilt['gaps'], 'place')}")
         if rebuilt["torn_bytes"]:
             bad.append(f"{counted(rebuilt['torn_bytes'], 'torn byte')} at the end")
+        skipped_inside = rebuilt["gaps"] or rebuilt["bad_chunks"] or rebuilt["large_chunks"]
         lost = [f"LOST in the file: {', '.join(bad)}"] if bad else []
         if "finished" in self.ending:
             # Versions before wrote from what a recording was converted into its verdict.
@@ -234,9 +236,13 @@ class _Source:
             why = f"stopped by an error ({self.ending['stopped']}): what came last is missing"
         so_far = self.remarks()["counts"]
         known = "no counts were saved yet"
-        if so_far is not None:
+        if so_far is not None and so_far.get("received"):
             # If more was received than the file holds, the difference is in its unfinished end.
-            known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))
+            counts = {**so_far, "received": 0}
+            if version_2 is not None and so_far.get("missing") is not None and not skipped_inside:
+                # The file may hold more than its counts, which are saved now and then.
+                counts["missing"] = max(so_far["missing"], json.loads(version_2())["missing"])
+            known = _core.recording_verdict(json.dumps(counts))
         return "; ".join([why, *lost, f"until then: {known}"])
 
 

@@ -73,7 +73,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         facts |= {
             "seconds_host": host,
             "events_per_s_host": facts["events"] / host if host and "events" in facts else None,
-            "datagrams_per_s_host": len(clock.arrived_ns) / host if host else None,
+            "datagrams_per_s_host": recording.counts.get("datagrams", len(clock.arrived_ns)) / host if host else None,
             "drift_ppm": clock.drift_ppm,
             "delay_us": {"median": float(late[0]), "p99": float(late[1])},
             "clock_doubt": doubt(clock.drift_ppm, float(late[1]), float(late[0])),
