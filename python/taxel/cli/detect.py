@@ -16,7 +16,7 @@ from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, progress, references, tare_of, try_report
+from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_of, try_report
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -87,8 +87,9 @@ def detect(
             update(f"detecting in {one.title}")
             _warn_of_losses(one)
             rest = tare_of(tare, one)
-            with _naming(one.title if len(opened) > 1 else None):
-                detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest)
+            with _naming(one.title, readout):
+                begin_us = end_of_rest_us(tare, rest)
+                detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest, begin_us=begin_us)
             # Labels that the readout does not have do not count as missed.
             true = None if labelled is None else {label: labelled.get(label, _NONE) for label in loaded.labels}
             scored = None if true is None else score(detections, true, window_ms)
@@ -126,12 +127,12 @@ def _warn_of_losses(recording: Recording) -> None:
 
 
 @contextmanager
-def _naming(recording: str | None) -> Iterator[None]:
-    """Name the recording, one of several, that an error is about."""
+def _naming(recording: str, readout: Path) -> Iterator[None]:
+    """Name the recording and the readout that an error is about."""
     try:
         yield
     except ProblemError as error:
-        raise ProblemError(str(error) if recording is None else f"{recording}: {error}") from None
+        raise ProblemError(f"{recording}, by {readout}: {error}") from None
 
 
 def _result(

@@ -28,7 +28,7 @@ _SILENT_SHARE = 0.9
 #: A kernel that is shorter than this share of a picture is made an exponential one of that length, so that the time from
 #: a stamp to the next point of the grid, ...
 _TAU_SHARE = 0.25
-#: ... which is this share of a picture at most, changes the potential by no more than a tenth.
+#: ... whose step is this share of a picture, changes the potential by no more than a tenth.
 _STEP_SHARE = 0.02
 #: By which share of a picture an age of pictures begins early.
 _EARLY = 0.5
@@ -127,8 +127,7 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         refractory = max(float(every.get("refractory", Neuron().refractory)), _SILENT_SHARE * period_ms)
         made = {**values, "delay_ms": begin_ms(pictures), "refractory": refractory}
         if pictures_ms and float(every.get("tau", Neuron().tau)) < _TAU_SHARE * period_ms:
-            step_ms = min(float(every.get("step_ms", Neuron().step_ms)), _STEP_SHARE * period_ms)
-            made |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": step_ms}
+            made |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": _STEP_SHARE * period_ms}
         return made
 
     def neuron(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -278,7 +278,7 @@ class Recipe:
         known = tuple(inspect.signature(cls).parameters)
         for key in values:
             if key not in (*known, "encoders", *_OF_THE_FILE):
-                raise ProblemError(f"recipe: no key {shown(key)}: there are {', '.join(known)}, encoders")
+                raise ProblemError(f"a recipe has no key {shown(key)}: there are {', '.join(known)}, encoders")
         own = {key: value for key, value in values.items() if key in known}
         return cls(**{**own, "encoder": _encoder_of(values)})
 
@@ -322,6 +322,13 @@ class Recipe:
                     "or neurons, or write a recipe of your own"
                 )
         values = recipes.read(recipe)
+        several_of = values.get("encoders")
+        for key in changes or ():
+            if key.startswith("encoder.") and isinstance(several_of, Mapping):
+                raise ProblemError(
+                    f"{key}: recipe {recipe} has several encoders: change encoders.NAME{key[7:]}, where NAME is one of "
+                    f"{', '.join(several_of)}"
+                )
         if labels is not None:
             values = recipes.for_labels(values, several("labels", labels))
         values = changed(values, {} if changes is None else changes)

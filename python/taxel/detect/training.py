@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import callback, instance, parameters, shown
 from taxel._base.messages import counted
+from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.ages import ages_of, in_pictures, later_us
@@ -416,7 +417,8 @@ class Fitting:
                     f"{self._what}, round {n}: within {gap:.1e} of the least"
                 ),
             )
-        for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, caught):
+        begins = [_begin_ms(source) for source in self._sources]
+        for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, begins, caught):
             warnings.warn(f"{self._label}: {text_of}", stacklevel=5)
         return cone
 
@@ -434,10 +436,8 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     times = to_ms(events)
     outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
     if len(outside):
-        raise ProblemError(
-            f"{called(k, example)}: {label} at {outside[0]:.3f} ms lies outside it, {source.start:.3f} to "
-            f"{source.stop:.3f} ms"
-        )
+        at, start, stop = (ms - _begin_ms(source) for ms in (outside[0], source.start, source.stop))
+        raise ProblemError(f"{called(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms")
     return events
 
 
@@ -446,6 +446,11 @@ def rows_of(recipe: Recipe, label: str) -> str:
     cone, delay_ms = recipe.learner_of(label)
     values = {name: value for name, value in cone.get_params().items() if name not in ("neuron", *_NOT_OF_ROWS)}
     return parameters(values | {"delay_ms": delay_ms, "inputs": sorted(recipe.inputs_of(label))})
+
+
+def _begin_ms(trains: SpikeTrains) -> float:
+    """Return the time that text counts from, ms: the trains' first if they count from 1970, else 0."""
+    return to_ms(beginning_us(np.array([round(float(to_us(trains.start)))])))
 
 
 def _inputs(k: int, example: Example, recipe: Recipe, label: str, array: Array | None) -> SpikeTrains:
@@ -466,12 +471,14 @@ def _remarks(
     targets: Sequence[NDArray[np.float64]],
     names: Sequence[str],
     shift_ms: float,
+    begins_ms: Sequence[float],
     caught: Sequence[warnings.WarningMessage],
 ) -> Iterator[str]:
     """Yield the warnings of a fit, which name events and examples."""
     missed = cone.unreachable_
     if missed:
-        places = [f"{targets[p][k] - shift_ms:.10g} ms" + f" of {names[p]}" * (len(targets) > 1) for p, k in missed]
+        at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
+        places = [f"{ms:.10g} ms{name}" for ms, name in at]
         listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
         yield (
             f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too few input spikes come before "
