@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from taxel._base.messages import counted
 from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
@@ -22,7 +23,7 @@ from taxel.spikes import to_ms
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from taxel.detect import Outcome, Score
+    from taxel.detect import Outcome, PlainRule, Readout, Score
     from taxel.recording import Recording
 
 __all__ = ["detect"]
@@ -106,12 +107,12 @@ def detect(
     places = {name: str(path) for name, path in written.items() if path is not None}
     if as_json:
         verdicts = [one.verdict for one in opened]
-        typer.echo(json.dumps(_result(recording, readout, outcomes, verdicts, together, window_ms) | places))
+        typer.echo(json.dumps(_result(recording, readout, loaded, outcomes, verdicts, together, window_ms) | places))
         return
     for outcome in outcomes:
         if recording.is_dir() or len(outcomes) > 1:
             typer.echo(f"{outcome.name}:")
-        _print(outcome)
+        _print(outcome, loaded)
         if isinstance(loaded, Readout):
             typer.echo(outcome.outside_text)
     if together is not None:
@@ -138,6 +139,7 @@ def _naming(recording: str, readout: Path) -> Iterator[None]:
 def _result(
     recording: Path,
     readout: Path,
+    loaded: Readout | PlainRule,
     outcomes: Sequence[Outcome],
     verdicts: Sequence[str],
     together: Score | None,
@@ -149,7 +151,7 @@ def _result(
             "recording": one.name,
             "verdict": verdict,
             "outside": one.outside,
-            "hint": _hint(one),
+            "hint": _hint(one, loaded),
             "detections": [
                 {
                     "label": d.label,
@@ -171,17 +173,27 @@ def _result(
     return result if together is None else result | {"window_ms": window_ms, "score": together.to_dict()}
 
 
-def _hint(outcome: Outcome) -> str | None:
-    """Return what may have kept pictures from any detection: values that fall from their rest, if they do."""
-    from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
+def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
+    """Return what may have kept detections away: values that fall from their rest, or a rest that drifted off."""
+    from taxel.detect import PlainRule, Readout  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect.advice import drifted  # noqa: PLC0415
+    from taxel.encode import ContactArea, Moments  # noqa: PLC0415
+    from taxel.frames import Frames  # noqa: PLC0415
     from taxel.recorded import recorded  # noqa: PLC0415
     from taxel.recording.rest import of_pictures  # noqa: PLC0415
 
-    source = recorded(outcome.example.source, hold=False)
-    if len(outcome.found) or not isinstance(source, Frames):
-        return None
-    rest = of_pictures(source)
-    return f"rest: {rest}" if rest.falls else None
+    source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
+    if not len(outcome.found) and isinstance(source, Frames) and (rest := of_pictures(source)).falls:
+        return f"rest: {rest}"
+    # The local load tracks the rest.
+    floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []
+    for part in readout.encoder._each() if isinstance(readout, Readout) else ():
+        floors += [float(part.noise_floor)] if isinstance(part, ContactArea | Moments) else []
+    count = drifted(source, tare, max(floors)) if tare is not None and floors else 0
+    what = (
+        f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that lifts are missed"
+    )
+    return f"{what}: take another tare" if count else None
 
 
 def _table(outcomes: Sequence[Outcome]) -> str:
@@ -198,16 +210,16 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _print(outcome: Outcome) -> None:
-    """Print detections, with times from the recording's beginning on, or what may have kept them away."""
+def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:
+    """Print detections, with times from the recording's beginning on, and what may have kept others away."""
     from taxel.detections import Detections  # noqa: PLC0415  the command line starts quickly
 
     found, begin_us = outcome.found, outcome.begin_us
     detections = Detections._of(found.label, found.t - begin_us, found.known - begin_us, found.slope)
     typer.echo(repr(detections))
+    if (hint := _hint(outcome, readout)) is not None:
+        typer.echo(hint)
     if not len(detections):
-        if (hint := _hint(outcome)) is not None:
-            typer.echo(hint)
         return
     if begin_us:
         typer.echo(f"times are from {begun(begin_us)} on")

@@ -25,10 +25,10 @@ __all__ = ["Ages", "ages_of", "in_pictures", "later_us", "onsets"]
 #: A neuron that has fired is silent for that share of a picture at least: of stamps that are not regular two pictures
 #: may lie in the time of one.
 _SILENT_SHARE = 0.9
-#: A kernel that is shorter than this share of a picture is made an exponential one of that length, so that the time from
-#: a stamp to the next point of the grid, ...
+#: A kernel shorter than this share of a picture becomes an exponential one of that length, so that the time from a
+#: stamp to the next point of the grid, ...
 _TAU_SHARE = 0.25
-#: ... whose step is this share of a picture, changes the potential by no more than a tenth.
+#: ... whose step is this share of a picture, changes the potential by less than a tenth.
 _STEP_SHARE = 0.02
 #: By which share of a picture an age of pictures begins early.
 _EARLY = 0.5

@@ -352,33 +352,37 @@ class Fitting:
         self._names = [called(k, one) for k, one in enumerate(examples)]
         self._sources = sources if followed is None else [only(one, quantities[followed.train]) for one in sources]
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
-        shift_ms = received.latency_ms + self.delay_ms
         later = [np.zeros(len(times), np.int64) for times in felt]
         if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
             later = [later_us(one, ages, to_ms(t), delay_ms) for one, t in zip(sources, felt, strict=True)]
-            self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
+        shift_ms = received.latency_ms + self.delay_ms
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
+        self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
         trains = [_until(source, targets) for source, targets in zip(self._sources, self._targets, strict=True)]
-        for k, (train, times) in enumerate(zip(trains, self._targets, strict=True)):
-            if len(times) and not len(train.times):
-                where = called(k, examples[k]) if len(trains) > 1 else "the recording"
-                raise ProblemError(
-                    f"{label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; taxel "
-                    "info shows what was touched; falls = true in a layout file turns readings that fall with pressure"
-                )
+        self._check_felt(trains)
         silent = None
         if followed is not None:
             grid = learner._on_grid()
             silent = silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, grid.step_ms)
-        self._what = f"learning {label} from {counted(count, 'event')}"
-        self._report = report
+        self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
         report(self._what)
         try:
             self._rows = learner.prepare(trains, self._targets, silence=silent)
         except ProblemError as error:
             raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
+
+    def _check_felt(self, trains: Sequence[SpikeTrains]) -> None:
+        """Refuse an example with targets and without any spike up to them."""
+        for name, train, times in zip(self._names, trains, self._targets, strict=True):
+            if len(times) and not len(train.times):
+                where = name if len(trains) > 1 else "the recording"
+                raise ProblemError(
+                    f"{self._label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; "
+                    "taxel info shows what was touched; falls = true in a layout file turns readings that fall with "
+                    "pressure"
+                )
 
     def fits(self, recipe: Recipe) -> bool:
         """Whether the learner that a recipe describes needs these rows."""
@@ -437,7 +441,9 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
     if len(outside):
         at, start, stop = (ms - _begin_ms(source) for ms in (outside[0], source.start, source.stop))
-        raise ProblemError(f"{called(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms")
+        raise ProblemError(
+            f"{called(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms"
+        )
     return events
 
 
