@@ -96,9 +96,10 @@ def readout_run_events(
     wire_version: int,
     tare: str | None,
     zeroings: list[tuple[int, int, int, float]],
+    begin: int | None,
 ) -> tuple[_Detections, int | None]: ...
 def readout_run_frames(
-    readout: str, frames: _Frames, frame_us: float | None, tare: str | None
+    readout: str, frames: _Frames, frame_us: float | None, tare: str | None, begin: int | None
 ) -> tuple[_Detections, int | None]: ...
 
 # t and known (us), quantity

@@ -205,7 +205,7 @@ fn detections_live_are_those_of_the_recording() {
     let (events, detections) = recorded(&path);
     assert_eq!(detections, output, "the recording has the detections that were output");
     let (mut again, _) = Detector::from(readout(2.0))
-        .run_events(events.view(), 192.0, None, &[], Stop::never())
+        .run_events(events.view(), 192.0, None, &[], None, Stop::never())
         .expect("a sound readout");
     // Nothing moved the time on after the last event, and what it would have led to was not output.
     again.retain(|d| Some(&d.t) < events.t.last());
@@ -351,7 +351,7 @@ fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     let (mut again, _) = Detector::from(readout(2.0))
-        .run_events(expected.view(), 192.0, None, &[], Stop::never())
+        .run_events(expected.view(), 192.0, None, &[], None, Stop::never())
         .expect("a sound readout");
     again.retain(|d| Some(&d.t) < expected.t.last());
     assert!(again.len() > 3, "the presses are detected: {}", again.len());
@@ -432,7 +432,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     assert!(tare.rest.iter().all(|&rest| rest == Some(20.0)));
     assert_eq!(detections.len(), 5, "a press each 208 frames of 1000");
     let (again, _) = Detector::from(readout)
-        .run_events(recorded(&path).0.view(), 192.0, Some(&tare), &[], Stop::never())
+        .run_events(recorded(&path).0.view(), 192.0, Some(&tare), &[], None, Stop::never())
         .expect("a sound readout");
     assert_eq!(again, detections);
 }

@@ -174,13 +174,14 @@ fn readout_run_events<'py>(
     wire_version: u8,
     tare: Option<&str>,
     zeroings: Vec<(i64, u16, u16, f64)>,
+    begin: Option<i64>,
 ) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
     let ((readout, tare), events) = (parse(readout, tare)?, to_events(events)?);
     let zeroings: Vec<_> =
         zeroings.into_iter().map(|(t, x, y, rest)| Zeroing { t, x, y, rest, before: None }).collect();
     let events = events.view()?;
     let frames = FrameTime::on_wire(frame_us, wire_version);
-    let (found, outside) = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), &zeroings, stop))?;
+    let (found, outside) = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), &zeroings, begin, stop))?;
     Ok((from_detections(py, found), outside))
 }
 
@@ -193,10 +194,11 @@ fn readout_run_frames<'py>(
     frames: FramesIn<'py>,
     frame_us: Option<f64>,
     tare: Option<&str>,
+    begin: Option<i64>,
 ) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
     let ((readout, tare), frames) = (parse(readout, tare)?, to_frames(frames)?);
     let frames = frames.view()?;
-    let (found, outside) = enter(py, |stop| readout.run_frames(frames, frame_us, tare.as_ref(), stop))?;
+    let (found, outside) = enter(py, |stop| readout.run_frames(frames, frame_us, tare.as_ref(), begin, stop))?;
     Ok((from_detections(py, found), outside))
 }
 

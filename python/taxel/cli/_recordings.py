@@ -83,9 +83,8 @@ def tare_of(value: str | None, recording: Recording) -> Tare | None:
 
     if value is None:
         return None
-    try:
-        seconds = float(value)
-    except ValueError:
+    seconds = _seconds(value)
+    if seconds is None:
         return Tare.load(value)
     if not 0 < seconds < np.inf:
         raise ProblemError(f"--tare {value}: must be seconds above 0, or a file")
@@ -102,6 +101,19 @@ def tare_of(value: str | None, recording: Recording) -> Tare | None:
     if isinstance(source, Events):
         stop = min([stop, *(t for t, start in source.markers if start and t > first)])
     return _measured(recording, source, stop)
+
+
+def _seconds(value: str) -> float | None:
+    """Return the seconds that ``--tare`` says; None of a file."""
+    try:
+        return float(value)
+    except ValueError:
+        return None
+
+
+def end_of_rest_us(value: str | None, tare: Tare | None) -> int | None:
+    """Return the end of the tare if ``--tare`` took it from the recording itself: before it nothing is detected."""
+    return None if value is None or tare is None or _seconds(value) is None else tare.stop_us
 
 
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:

@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from taxel._base.messages import counted
 from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, progress, references, tare_of, try_report
+from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_of, try_report
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from taxel.detect import Outcome, Score
+    from taxel.detect import Outcome, PlainRule, Readout, Score
     from taxel.recording import Recording
 
 __all__ = ["detect"]
@@ -87,8 +88,9 @@ def detect(
             update(f"detecting in {one.title}")
             _warn_of_losses(one)
             rest = tare_of(tare, one)
-            with _naming(one.title if len(opened) > 1 else None):
-                detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest)
+            with _naming(one.title, readout):
+                begin_us = end_of_rest_us(tare, rest)
+                detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest, begin_us=begin_us)
             # Labels that the readout does not have do not count as missed.
             true = None if labelled is None else {label: labelled.get(label, _NONE) for label in loaded.labels}
             scored = None if true is None else score(detections, true, window_ms)
@@ -105,12 +107,12 @@ def detect(
     places = {name: str(path) for name, path in written.items() if path is not None}
     if as_json:
         verdicts = [one.verdict for one in opened]
-        typer.echo(json.dumps(_result(recording, readout, outcomes, verdicts, together, window_ms) | places))
+        typer.echo(json.dumps(_result(recording, readout, loaded, outcomes, verdicts, together, window_ms) | places))
         return
     for outcome in outcomes:
         if recording.is_dir() or len(outcomes) > 1:
             typer.echo(f"{outcome.name}:")
-        _print(outcome)
+        _print(outcome, loaded)
         if isinstance(loaded, Readout):
             typer.echo(outcome.outside_text)
     if together is not None:
@@ -126,17 +128,18 @@ def _warn_of_losses(recording: Recording) -> None:
 
 
 @contextmanager
-def _naming(recording: str | None) -> Iterator[None]:
-    """Name the recording, one of several, that an error is about."""
+def _naming(recording: str, readout: Path) -> Iterator[None]:
+    """Name the recording and the readout that an error is about."""
     try:
         yield
     except ProblemError as error:
-        raise ProblemError(str(error) if recording is None else f"{recording}: {error}") from None
+        raise ProblemError(f"{recording}, by {readout}: {error}") from None
 
 
 def _result(
     recording: Path,
     readout: Path,
+    loaded: Readout | PlainRule,
     outcomes: Sequence[Outcome],
     verdicts: Sequence[str],
     together: Score | None,
@@ -148,7 +151,7 @@ def _result(
             "recording": one.name,
             "verdict": verdict,
             "outside": one.outside,
-            "hint": _hint(one),
+            "hint": _hint(one, loaded),
             "detections": [
                 {
                     "label": d.label,
@@ -170,17 +173,27 @@ def _result(
     return result if together is None else result | {"window_ms": window_ms, "score": together.to_dict()}
 
 
-def _hint(outcome: Outcome) -> str | None:
-    """Return what may have kept pictures from any detection: values that fall from their rest, if they do."""
-    from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
+def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
+    """Return what may have kept detections away: values that fall from their rest, or a rest that drifted off."""
+    from taxel.detect import PlainRule, Readout  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect.advice import drifted  # noqa: PLC0415
+    from taxel.encode import ContactArea, Moments  # noqa: PLC0415
+    from taxel.frames import Frames  # noqa: PLC0415
     from taxel.recorded import recorded  # noqa: PLC0415
     from taxel.recording.rest import of_pictures  # noqa: PLC0415
 
-    source = recorded(outcome.example.source, hold=False)
-    if len(outcome.found) or not isinstance(source, Frames):
-        return None
-    rest = of_pictures(source)
-    return f"rest: {rest}" if rest.falls else None
+    source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
+    if not len(outcome.found) and isinstance(source, Frames) and (rest := of_pictures(source)).falls:
+        return f"rest: {rest}"
+    # The local load tracks the rest.
+    floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []
+    for part in readout.encoder._each() if isinstance(readout, Readout) else ():
+        floors += [float(part.noise_floor)] if isinstance(part, ContactArea | Moments) else []
+    count = drifted(source, tare, max(floors)) if tare is not None and floors else 0
+    what = (
+        f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that lifts are missed"
+    )
+    return f"{what}: take another tare" if count else None
 
 
 def _table(outcomes: Sequence[Outcome]) -> str:
@@ -197,16 +210,16 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _print(outcome: Outcome) -> None:
-    """Print detections, with times from the recording's beginning on, or what may have kept them away."""
+def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:
+    """Print detections, with times from the recording's beginning on, and what may have kept others away."""
     from taxel.detections import Detections  # noqa: PLC0415  the command line starts quickly
 
     found, begin_us = outcome.found, outcome.begin_us
     detections = Detections._of(found.label, found.t - begin_us, found.known - begin_us, found.slope)
     typer.echo(repr(detections))
+    if (hint := _hint(outcome, readout)) is not None:
+        typer.echo(hint)
     if not len(detections):
-        if (hint := _hint(outcome)) is not None:
-            typer.echo(hint)
         return
     if begin_us:
         typer.echo(f"times are from {begun(begin_us)} on")

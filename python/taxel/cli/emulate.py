@@ -7,6 +7,7 @@ import secrets
 import sys
 from collections import deque
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -308,10 +309,21 @@ def _pairs(option: str, assignments: Iterable[str]) -> dict[str, str]:
 
 
 def _number(option: str, name: str, value: str) -> float:
+    """Return a number as it was typed: 2 is no 2.0 in an error."""
     try:
-        return float(value)
+        number = float(value)
     except ValueError:
         raise ProblemError(f"--{option} {name}={value}: must be a number") from None
+    return int(number) if number.is_integer() else number
+
+
+@contextmanager
+def _named(option: str) -> Iterator[None]:
+    """Name the option that an error is about."""
+    try:
+        yield
+    except ProblemError as error:
+        raise ProblemError(f"--{option} {error}") from None
 
 
 def _flaws(assignments: list[str], seed: int) -> Flaws | None:
@@ -323,7 +335,8 @@ def _flaws(assignments: list[str], seed: int) -> Flaws | None:
         size, _, own = value.partition(":")
         sizes[name] = _number("flaw", name, size)
         seeds[name] = int(_number("flaw", name, own)) if own else seed
-    return Flaws(**sizes, seeds=seeds) if sizes else None
+    with _named("flaw"):
+        return Flaws(**sizes, seeds=seeds) if sizes else None
 
 
 def _circuit(assignments: list[str], seed: int) -> Circuit | None:
@@ -335,7 +348,8 @@ def _circuit(assignments: list[str], seed: int) -> Circuit | None:
         if name not in parts:
             raise ProblemError(f"--circuit {name}: must be one of {', '.join(parts)}")
         parts[name][name] = _number("circuit", name, value)
-    return Circuit(readout=VirtualGround(**readout), converter=Converter(**converter)) if assignments else None
+    with _named("circuit"):
+        return Circuit(readout=VirtualGround(**readout), converter=Converter(**converter)) if assignments else None
 
 
 def _faults(assignments: list[str], seed: int) -> Faults | None:
@@ -343,7 +357,8 @@ def _faults(assignments: list[str], seed: int) -> Faults | None:
     for name in shares:
         if name not in Faults._names():
             raise ProblemError(f"--fault {name}: must be one of {', '.join(Faults._names())}")
-    return Faults(**shares, seed=seed) if shares else None
+    with _named("fault"):
+        return Faults(**shares, seed=seed) if shares else None
 
 
 #: A board that is behind its time by less than this holds its rate, s: threads wake late, and catch up.

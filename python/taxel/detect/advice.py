@@ -20,8 +20,9 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
 
-__all__ = ["Advice", "advised", "loaded_at_rest"]
+__all__ = ["Advice", "advised", "drifted", "loaded_at_rest"]
 
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
@@ -31,6 +32,10 @@ _BEFORE_US = 20_000
 _LABELS = 4
 #: So many taxels above the rest are a touch.
 _TOUCH = 2
+#: Into so many parts a recording is divided to see a drift, at so many pictures of each.
+_PARTS, _LOOKS = 8, 40
+#: A touched taxel reads so many times its drift.
+_TIMES = 4
 
 
 class Advice(NamedTuple):
@@ -157,3 +162,34 @@ def _at(source: Events | Frames, t_us: int) -> Frames:
         return Frames.from_events(source, 1, t_us, t_us + 1)
     place = max(0, int(np.searchsorted(source.t, t_us, side="right")) - 1)
     return source[place : place + 1]
+
+
+def drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
+    """Return how many taxels drifted above a tare by more than the noise floor; 0 where it may be a load.
+
+    A taxel counts that reads no more in the first eighth of the recording and more in the last, in nine of ten
+    pictures, came there little by little, and reads four times as much while it is touched: a load that stays comes at
+    once, or is all that a taxel reads. A quarter of the taxels that were touched must do so, and two at least.
+
+    Parameters
+    ----------
+    source : Events or Frames
+    tare : Tare
+    noise_floor : float, in the sensor's unit
+    """
+    after = source.t[source.t >= tare.stop_us]
+    if not len(after):
+        return 0
+    if isinstance(source, Events):
+        source = Frames.from_events(source, max(1, int(after[-1] - after[0]) // (_PARTS * _LOOKS)), int(after[0]))
+    pictures = source.between(tare.stop_us, np.inf)
+    pictures = pictures[:: max(1, len(pictures) // (_PARTS * _LOOKS))]
+    looks = len(pictures) // _PARTS
+    if looks < _LOOKS // 4:
+        return 0
+    values = tare.off(pictures).values[: _PARTS * looks]
+    above, most = _core.touched_above(noise_floor), values.max(axis=0)
+    least = np.quantile(values.reshape(_PARTS, looks, *most.shape), 0.1, axis=1)
+    slowly = np.diff(least, axis=0).max(axis=0) <= least[-1] / 2
+    count = np.count_nonzero((least[0] < above) & (least[-1] >= above) & slowly & (most >= _TIMES * least[-1]))
+    return int(count) if count >= max(_TOUCH, np.count_nonzero(most >= _TIMES * above) / _TIMES) else 0

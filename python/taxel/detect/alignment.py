@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from taxel._base.arguments import whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.array import Array
+from taxel.detect.ages import Ages, onsets
 from taxel.detect.followed import Followed
 from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
-from taxel.encode import Encoder
 from taxel.spikes import SpikeTrains, to_us
 
 __all__ = ["Alignment", "align", "aligned_to"]
@@ -102,36 +101,6 @@ class Alignment:
         return f"Alignment({self.label}: {moved}, {self.unpaired.sum()} of {len(self.given)} without a pair)"
 
 
-class Ages(NamedTuple):
-    """The trains of the ages of a touch, one of which fires at every sample of it, and the least age, ms."""
-
-    trains: range
-    least_ms: float
-
-
-def ages_of(encoder: Encoder, array: Array | None) -> Ages | None:
-    """Return the trains of ages of an encoder, or of the first part of a composite one that has any."""
-    first = 0
-    for part in encoder._each():
-        first += part.trains(array or Array(1, 1)) * (2 if part.signed else 1)
-        ages = getattr(part, "ages_ms", None)
-        if ages is not None:
-            return Ages(range(first - len(ages), first), float(ages[0]))
-    return None
-
-
-def _onsets(pattern: SpikeTrains, ages: Ages) -> NDArray[np.float64]:
-    """Return when touches began, ms: the least age before its first spike after a pause, or after a greater age."""
-    times = [pattern[n] for n in ages.trains]
-    order = np.argsort(pooled := np.concatenate(times), kind="stable")
-    pooled, age = pooled[order], np.repeat(np.arange(len(times)), [len(t) for t in times])[order]
-    apart = np.diff(pooled)
-    begins = np.ones(len(pooled), np.bool_)
-    begins[1:] = (apart > 1.5 * apart.min(initial=np.inf)) | (np.diff(age) < 0)
-    onsets: NDArray[np.float64] = pooled[begins & (age == 0)] - ages.least_ms
-    return onsets
-
-
 def align(
     patterns: Sequence[SpikeTrains],
     label: str,
@@ -179,7 +148,7 @@ def align(
         for train in np.flatnonzero((counts > 0) & (counts <= _MOST_A_LABEL * len(truth))).tolist()
     }
     if ages is not None:
-        candidates[ages.trains[0]] = [_onsets(pattern, ages) for pattern in patterns]
+        candidates[ages.trains[0]] = [onsets(pattern, ages) for pattern in patterns]
     scores = {}
     for train, spikes in candidates.items():
         each = [np.rint(to_us(ms - latency_ms)).astype(np.int64) + by for ms, by in zip(spikes, shift, strict=True)]

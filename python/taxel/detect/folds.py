@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import callback, finite, flag, instance, several, shown, whole, window
 from taxel._base.messages import counted
 from taxel._core import ProblemError
+from taxel.detect.ages import in_pictures
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, floor_of, plain_score
@@ -158,7 +159,7 @@ def judge(
     report = _reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
-    whole = instance("recipe", recipe, Recipe)
+    whole = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
     recipe = possible(whole, examples)
     patterns = Encoded(examples, recipe, report, search=search)
     array = array_of(examples)
@@ -239,8 +240,8 @@ def choose(
     >>> choose(examples, recipe, k=2).neurons
     {'contact': {'ub': 2.0}}
     """
-    instance("recipe", recipe, Recipe)
     examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
+    recipe = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
     report = _reporting(progress)
     if isinstance(k, int | np.integer):
         k = whole("k", k, 2, 2**31)
@@ -311,7 +312,7 @@ def _marks(
                     refused.add(m)
                     continue
             with _quiet():
-                readout = readout_of({label: rows.fit(plan)}, plan, array)
+                readout = readout_of({label: rows.fit(plan)}, {label: rows.delay_ms}, plan, array)
             for part in fold.test:
                 found = _detected(readout, _read(examples, patterns, readout, part), part, clocks)
                 detections[m].setdefault(part.example, []).append(found)

@@ -404,10 +404,12 @@ def run_counting(
     frame_us: float | None = None,
     tare: Tare | None = None,
     wire_version: int | None = None,
+    begin_us: int | None = None,
 ) -> tuple[Detections, int | None]:
     """Return what `run` returns, and how many of it have an input outside the range that it had in training.
 
     None where that is not known: of a plain rule, of a readout whose file does not hold the range, of spike trains.
+    Nothing is detected before `begin_us`, the end of a fresh tare, as live; spike trains have none.
     """
     text = detector("readout", readout).to_json()
     period = None if frame_us is None else number("frame_us", frame_us, "us")
@@ -429,13 +431,13 @@ def run_counting(
                 own._warn_apart(source.array, "the recording")
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
-        columns, outside = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
+        columns, outside = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings, begin_us)
         return Detections._from_parts(columns), outside
     if not isinstance(source, Frames):
         raise ProblemError(
             f"source is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
-    columns, outside = _core.readout_run_frames(text, source._parts(), period, rest)
+    columns, outside = _core.readout_run_frames(text, source._parts(), period, rest, begin_us)
     return Detections._from_parts(columns), outside
 
 

@@ -19,14 +19,14 @@ from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import to_us
 
-__all__ = ["Recipe", "changed", "learner_from", "with_floor"]
+__all__ = ["LISTS", "Recipe", "changed", "learner_from", "with_floor"]
 
 
 #: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
 _OF_THE_FILE = ("fits", "also", "other")
 
 #: Keys of a neuron that list other points of it.
-_LISTS = ("search", "choose")
+LISTS = ("search", "choose")
 
 
 @dataclass(frozen=True)
@@ -165,15 +165,6 @@ class Recipe:
         """
         return tuple(several("inputs", self._of(label).get("inputs", ())))
 
-    def _trained_delay_of(self, label: str) -> float:
-        """Return how much later than the event, ms, a label's neuron is trained to fire.
-
-        Where an age of the touch begins then it is a step later: a spike at that age acts after its time.
-        """
-        learner, delay_ms = self.learner_of(label)
-        aged = any(getattr(part, "ages_ms", None) is not None for part in self._received(self._of(label))._each())
-        return delay_ms + (learner.neuron.step_ms if aged and learner.neuron is not None else 0.0)
-
     def _narrowed(self, labels: Sequence[str], *, search: bool = False, choices: bool = True) -> Recipe:
         """Return the recipe without the parts of a composite encoder that no neuron of these labels receives.
 
@@ -230,7 +221,7 @@ class Recipe:
     def _points(self, label: str, key: str) -> list[dict[str, Any]]:
         """Return the parameters of a label's neuron, and behind them the others that it lists under a key."""
         whole = self.neurons.get(text("label", label), {})
-        own = {name: value for name, value in whole.items() if name not in _LISTS}
+        own = {name: value for name, value in whole.items() if name not in LISTS}
         listed = several(f"neurons.{label}.{key}", whole.get(key, ()))
         return [own, *({**own, **mapping(f"neurons.{label}.{key}", point)} for point in listed)]
 
@@ -240,7 +231,7 @@ class Recipe:
 
     def _at(self, points: Mapping[str, Mapping[str, Any]]) -> Recipe:
         """Return the recipe with these parameters of its neurons, and with the points that it lists."""
-        lists = {label: {key: own[key] for key in _LISTS if key in own} for label, own in self.neurons.items()}
+        lists = {label: {key: own[key] for key in LISTS if key in own} for label, own in self.neurons.items()}
         return replace(self, neurons={label: {**point, **lists.get(label, {})} for label, point in points.items()})
 
     def _without_choices(self, part: str) -> Recipe:
@@ -287,7 +278,7 @@ class Recipe:
         known = tuple(inspect.signature(cls).parameters)
         for key in values:
             if key not in (*known, "encoders", *_OF_THE_FILE):
-                raise ProblemError(f"recipe: no key {shown(key)}: there are {', '.join(known)}, encoders")
+                raise ProblemError(f"a recipe has no key {shown(key)}: there are {', '.join(known)}, encoders")
         own = {key: value for key, value in values.items() if key in known}
         return cls(**{**own, "encoder": _encoder_of(values)})
 
@@ -331,6 +322,13 @@ class Recipe:
                     "or neurons, or write a recipe of your own"
                 )
         values = recipes.read(recipe)
+        several_of = values.get("encoders")
+        for key in changes or ():
+            if key.startswith("encoder.") and isinstance(several_of, Mapping):
+                raise ProblemError(
+                    f"{key}: recipe {recipe} has several encoders: change encoders.NAME{key[7:]}, where NAME is one of "
+                    f"{', '.join(several_of)}"
+                )
         if labels is not None:
             values = recipes.for_labels(values, several("labels", labels))
         values = changed(values, {} if changes is None else changes)

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import callback, instance, parameters, shown
 from taxel._base.messages import counted
+from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.alignment import Alignment, ages_of, align, aligned_to
+from taxel.detect.ages import ages_of, in_pictures, later_us
+from taxel.detect.alignment import Alignment, align, aligned_to
 from taxel.detect.examples import Example, array_of, called, checked
 from taxel.detect.followed import FOLLOWED_MS, Followed, follow, only, silence
-from taxel.detect.loads import lacks_noise
+from taxel.detect.loads import clock_of, lacks_noise
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import score_together
@@ -28,6 +30,7 @@ from taxel.detect.seen import seen
 from taxel.detections import Detections
 from taxel.encode import Composite, LocalLoad
 from taxel.learn import ConeR
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 __all__ = ["Trained", "train"]
@@ -120,9 +123,10 @@ def train(
 
 def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str], object] | None) -> Trained:
     """Train a readout as `train` does, and return how its labels were aligned as well."""
-    sound = checked(examples)
+    sound, clocks = checked(examples), [clock_of(one) for one in examples]
     report = (lambda _: None) if progress is None else callback("progress", progress)
-    possibly = possible(instance("recipe", recipe, Recipe), sound)
+    recipe = in_pictures(instance("recipe", recipe, Recipe), sound, clocks)
+    possibly = possible(recipe, sound)
     made = learn(Encoded(sound, possibly, report), possibly, array_of(sound), report)
     return made._replace(recipe=recipe._at(made.recipe.neurons))
 
@@ -191,8 +195,10 @@ def encoded(examples: Sequence[Example], recipe: Recipe, report: Callable[[str],
     return results
 
 
-def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | None) -> Readout:
-    """Return the readout of fitted learners, behind the encoder of the recipe that they were made by.
+def readout_of(
+    learners: Mapping[str, ConeR], delays_ms: Mapping[str, float], recipe: Recipe, array: Array | None
+) -> Readout:
+    """Return the readout of fitted learners with their delays, behind the encoder of the recipe that made them.
 
     Of a composite encoder the readout has the parts that its neurons receive; where that is one, it is the encoder.
     """
@@ -200,22 +206,21 @@ def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | Non
     encoder, inputs = recipe.encoder, {label: recipe.inputs_of(label) for label in learners}
     if isinstance(encoder, Composite) and len(encoder.parts) == 1:
         encoder, inputs = encoder.only(list(encoder.parts)), {}
-    delays = {label: recipe._trained_delay_of(label) for label in learners}
     threshold = float(recipe.run_threshold)
-    return Readout(encoder, learners, array=array, delay_ms=delays, run_threshold=threshold, inputs=inputs)
+    return Readout(encoder, learners, array=array, delay_ms=delays_ms, run_threshold=threshold, inputs=inputs)
 
 
 def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
     """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
-    learners, alignments, ranges = {}, {}, {}
+    learners, delays, alignments, ranges = {}, {}, {}, {}
     points = dict(recipe.neurons)
     for label in _labels_to_learn(examples.patterns, recipe):
         _, fitting, learners[label], points[label], _ = _best(examples, recipe, label, array, report)
-        ranges[label] = fitting.seen(learners[label])
+        delays[label], ranges[label] = fitting.delay_ms, fitting.seen(learners[label])
         if fitting.alignment is not None:
             alignments[label] = fitting.alignment
     made = replace(recipe, neurons=points) if recipe.neurons else recipe
-    return Trained(made, learners, readout_of(learners, made, array)._with_seen(ranges), alignments)
+    return Trained(made, learners, readout_of(learners, delays, made, array)._with_seen(ranges), alignments)
 
 
 class _Fit(NamedTuple):
@@ -317,9 +322,12 @@ class Fitting:
     ) -> None:
         self._label = label
         self._needs = rows_of(recipe, label)
-        learner, _ = recipe.learner_of(label)
+        learner, delay_ms = recipe.learner_of(label)
         received = recipe._received(recipe._of(label))
-        self._shift_ms = received.latency_ms + recipe._trained_delay_of(label)
+        ages = ages_of(received, array)
+        #: How much later than the event the neuron is trained to fire, ms, the encoder's latency apart. Where an age of
+        #: the touch begins then it is later: a spike at that age acts after its time.
+        self.delay_ms = delay_ms + (0.0 if ages is None else _acts_after_ms(learner._on_grid()))
         given = self._given = [_times(k, one, label) for k, one in enumerate(examples)]
         count = sum(map(len, given))
         if not count:
@@ -340,31 +348,41 @@ class Fitting:
             followed = every[place] if every else None
             self.alignment = aligned_to(followed, label, given)
         elif recipe.align:
-            self.alignment = align(sources, label, given, received.latency_ms, ages_of(received, array))
+            self.alignment = align(sources, label, given, received.latency_ms, ages)
         self._names = [called(k, one) for k, one in enumerate(examples)]
         self._sources = sources if followed is None else [only(one, quantities[followed.train]) for one in sources]
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
-        self._targets = [to_ms(times) + self._shift_ms for times in felt]
+        later = [np.zeros(len(times), np.int64) for times in felt]
+        if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
+            later = [later_us(one, ages, to_ms(t), delay_ms) for one, t in zip(sources, felt, strict=True)]
+        shift_ms = received.latency_ms + self.delay_ms
+        self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
+        self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
+        self._shift_ms = received.latency_ms + self.delay_ms
         trains = [_until(source, targets) for source, targets in zip(self._sources, self._targets, strict=True)]
-        for k, (train, times) in enumerate(zip(trains, self._targets, strict=True)):
-            if len(times) and not len(train.times):
-                where = called(k, examples[k]) if len(trains) > 1 else "the recording"
-                raise ProblemError(
-                    f"{label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; taxel "
-                    "info shows what was touched; falls = true in a layout file turns readings that fall with pressure"
-                )
+        self._check_felt(trains)
         silent = None
         if followed is not None:
             grid = learner._on_grid()
             silent = silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, grid.step_ms)
-        self._what = f"learning {label} from {counted(count, 'event')}"
-        self._report = report
+        self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
         report(self._what)
         try:
             self._rows = learner.prepare(trains, self._targets, silence=silent)
         except ProblemError as error:
             raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
+
+    def _check_felt(self, trains: Sequence[SpikeTrains]) -> None:
+        """Refuse an example with targets and without any spike up to them."""
+        for name, train, times in zip(self._names, trains, self._targets, strict=True):
+            if len(times) and not len(train.times):
+                where = name if len(trains) > 1 else "the recording"
+                raise ProblemError(
+                    f"{self._label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; "
+                    "taxel info shows what was touched; falls = true in a layout file turns readings that fall with "
+                    "pressure"
+                )
 
     def fits(self, recipe: Recipe) -> bool:
         """Whether the learner that a recipe describes needs these rows."""
@@ -403,9 +421,15 @@ class Fitting:
                     f"{self._what}, round {n}: within {gap:.1e} of the least"
                 ),
             )
-        for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, caught):
+        begins = [_begin_ms(source) for source in self._sources]
+        for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, begins, caught):
             warnings.warn(f"{self._label}: {text_of}", stacklevel=5)
         return cone
+
+
+def _acts_after_ms(neuron: Neuron) -> float:
+    """Return how long after a spike a neuron can be trained to fire by it, ms: at once where its potential jumps."""
+    return 1e-3 if neuron.kernel == "exponential" else neuron.step_ms
 
 
 def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
@@ -416,9 +440,9 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     times = to_ms(events)
     outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
     if len(outside):
+        at, start, stop = (ms - _begin_ms(source) for ms in (outside[0], source.start, source.stop))
         raise ProblemError(
-            f"{called(k, example)}: {label} at {outside[0]:.3f} ms lies outside it, {source.start:.3f} to "
-            f"{source.stop:.3f} ms"
+            f"{called(k, example)}: {label} at {at:.3f} ms lies outside it, {start:.3f} to {stop:.3f} ms"
         )
     return events
 
@@ -428,6 +452,11 @@ def rows_of(recipe: Recipe, label: str) -> str:
     cone, delay_ms = recipe.learner_of(label)
     values = {name: value for name, value in cone.get_params().items() if name not in ("neuron", *_NOT_OF_ROWS)}
     return parameters(values | {"delay_ms": delay_ms, "inputs": sorted(recipe.inputs_of(label))})
+
+
+def _begin_ms(trains: SpikeTrains) -> float:
+    """Return the time that text counts from, ms: the trains' first if they count from 1970, else 0."""
+    return to_ms(beginning_us(np.array([round(float(to_us(trains.start)))])))
 
 
 def _inputs(k: int, example: Example, recipe: Recipe, label: str, array: Array | None) -> SpikeTrains:
@@ -448,12 +477,14 @@ def _remarks(
     targets: Sequence[NDArray[np.float64]],
     names: Sequence[str],
     shift_ms: float,
+    begins_ms: Sequence[float],
     caught: Sequence[warnings.WarningMessage],
 ) -> Iterator[str]:
     """Yield the warnings of a fit, which name events and examples."""
     missed = cone.unreachable_
     if missed:
-        places = [f"{targets[p][k] - shift_ms:.10g} ms" + f" of {names[p]}" * (len(targets) > 1) for p, k in missed]
+        at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
+        places = [f"{ms:.10g} ms{name}" for ms, name in at]
         listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
         yield (
             f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too few input spikes come before "

@@ -95,7 +95,8 @@ impl Detector {
     }
 
     /// The detections of a whole recording of events with taxels that a person zeroed, continued by a second of
-    /// silence, and how many of them have an input outside its range in training ([`ReadoutStream::outside`]).
+    /// silence, and how many of them have an input outside its range in training ([`ReadoutStream::outside`]). Nothing is
+    /// detected before `begin` us ([`ReadoutStream::begin_at`]).
     ///
     /// # Errors
     ///
@@ -107,11 +108,13 @@ impl Detector {
         frames: impl Into<FrameTime>,
         tare: Option<&Tare>,
         zeroings: &[Zeroing],
+        begin: Option<i64>,
         stop: Stop<'_>,
     ) -> Result<(Vec<Detection>, Option<u64>)> {
         let frames = frames.into();
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
         let mut stream = self.stream(events.array, frames, tare)?;
+        begin.into_iter().for_each(|t| stream.begin_at(t));
         zeroings.iter().try_for_each(|zeroing| stream.zero(zeroing))?;
         events.check_order()?;
         let mut found = stream.push_recording(events, stop)?;
@@ -121,7 +124,7 @@ impl Detector {
 
     /// The detections of a whole recording of pictures, continued for a second with the last picture, and how many of
     /// them have an input outside its range in training. Frames last `frame_us`, or by default the median distance
-    /// between pictures.
+    /// between pictures. Nothing is detected before `begin` us.
     ///
     /// # Errors
     ///
@@ -131,6 +134,7 @@ impl Detector {
         frames: FramesView<'_>,
         frame_us: Option<f64>,
         tare: Option<&Tare>,
+        begin: Option<i64>,
         stop: Stop<'_>,
     ) -> Result<(Vec<Detection>, Option<u64>)> {
         let frame_us = match frame_us {
@@ -139,6 +143,7 @@ impl Detector {
         };
         let last = frames.t.last().copied().unwrap_or(0);
         let mut stream = self.stream(frames.array, frame_us, tare)?;
+        begin.into_iter().for_each(|t| stream.begin_at(t));
         let mut found = stream.push_frames(frames, stop)?;
         stream.advance(last.saturating_add(self.silence_us(frame_us.into())), &mut found)?;
         Ok((found, stream.outside()))

@@ -47,6 +47,8 @@ pub struct ReadoutStream {
     /// Taxels to be zeroed, in order of time, each after all events up to its time.
     zeroings: VecDeque<Zeroing>,
     late: u64,
+    /// Nothing before it is detected, us.
+    begin: i64,
 }
 
 /// What turns the encoder's spikes into detections.
@@ -75,7 +77,12 @@ impl ReadoutStream {
     fn of(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
         let repairs = Repairs::within(encoder.hears_repaired_ms());
         let (emitted, zeroings) = (vec![], VecDeque::new());
-        Self { encoder, array, decides, clock, now: None, emitted, repairs, zeroings, late: 0 }
+        Self { encoder, array, decides, clock, now: None, emitted, repairs, zeroings, late: 0, begin: i64::MIN }
+    }
+
+    /// Detects nothing before `t` us: where a tare was measured, the sensor was at rest.
+    pub fn begin_at(&mut self, t: i64) {
+        self.begin = t;
     }
 
     /// Processes the next events and appends the detections that are final now to `out`.
@@ -260,12 +267,12 @@ impl ReadoutStream {
                 neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());
                 // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
                 self.repairs.forget_before(ms(until));
-                neurons.settle(ms(until), &self.clock, out)
+                neurons.settle(ms(until), &self.clock, self.begin, out)
             }
             Decides::Rule(rule) => {
                 rule.receive(spikes);
                 self.repairs.forget_before(ms(until));
-                rule.settle(until, &self.clock, out);
+                rule.settle(until, &self.clock, self.begin, out);
                 Ok(())
             }
         }

@@ -73,10 +73,10 @@ impl Rest {
             }),
             ..Events::empty(self.array)
         };
-        // Detections in the interval itself are discarded, because the sensor was at rest.
-        let mut discarded = vec![];
-        stream.push_events(events.view(), &mut discarded)?;
-        stream.advance(stop, &mut discarded)?;
+        stream.begin_at(stop);
+        let mut none = vec![];
+        stream.push_events(events.view(), &mut none)?;
+        stream.advance(stop, &mut none)?;
         Ok((tare, stream))
     }
 }

@@ -89,10 +89,12 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
         others = [label for label in labels if _own(every[grids], label) is None]
         if not others:
             return grids, f"{' and '.join(labels)} on {what}"
+    # Foot-off and the like are no kinds of touch; nor is one label alone, as "slip".
+    steps = grids is not None and any(_own(values, label) for label in others for values in every.values())
+    if grids is not None and not steps and len(others) > 1:
+        return grids, f"kinds of touch on {what}"
     if source.unit in of:
         return of[source.unit], f"pictures in {source.unit}"
-    # Foot-off and the like are no kinds of touch.
-    steps = grids is not None and any(_own(values, label) for label in others for values in every.values())
     if grids is not None and array.taxels > _MOST_CHANNELS and not steps:
         return grids, what
     return _ANY, f"{what} in {source.unit}"

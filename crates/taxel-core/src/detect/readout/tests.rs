@@ -179,7 +179,7 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
         }
         let run = |events: &Events, zeroings: &[Zeroing]| {
             Detector::from(readout.clone())
-                .run_events(events.view(), 192.0, Some(&tare), zeroings, Stop::never())
+                .run_events(events.view(), 192.0, Some(&tare), zeroings, None, Stop::never())
                 .unwrap()
                 .0
         };

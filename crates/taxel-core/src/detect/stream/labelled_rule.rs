@@ -27,8 +27,8 @@ impl LabelledRule {
         self.waiting.extend(changes);
     }
 
-    /// Advances the rule to `until` us, before which every change is known.
-    pub fn settle(&mut self, until: i64, clock: &FrameClock, out: &mut Vec<Detection>) {
+    /// Advances the rule to `until` us, before which every change is known; emits what lies at `begin` us or later.
+    pub fn settle(&mut self, until: i64, clock: &FrameClock, begin: i64, out: &mut Vec<Detection>) {
         while let Some((change, repaired)) = self.waiting.pop_front() {
             if change.t >= ms(until) {
                 self.waiting.push_front((change, repaired));
@@ -38,7 +38,7 @@ impl LabelledRule {
         }
         self.rule.advance(until, clock, &mut self.decisions);
         out.extend(self.decisions.drain(..).filter_map(|Decision { which, t, known, repaired, .. }| {
-            let label = self.labels[which].clone()?;
+            let label = self.labels[which].clone().filter(|_| t >= begin)?;
             // A rule has no potential, hence no slope.
             Some(Detection { label, t, known, slope: f64::NAN, repaired })
         }));

@@ -1,0 +1,169 @@
+"""The age of a touch: in whole pictures where a recording has pictures, and when a touch reaches it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from math import ceil
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.array import Array
+from taxel.detect.examples import Example
+from taxel.detect.loads import Clock
+from taxel.detect.recipe import LISTS, Recipe
+from taxel.encode import Composite, Encoder
+from taxel.frames import Frames
+from taxel.neuron import Neuron
+from taxel.spikes import SpikeTrains, to_us
+
+__all__ = ["Ages", "ages_of", "in_pictures", "later_us", "onsets"]
+
+#: A neuron that has fired is silent for that share of a picture at least: of stamps that are not regular two pictures
+#: may lie in the time of one.
+_SILENT_SHARE = 0.9
+#: A kernel shorter than this share of a picture becomes an exponential one of that length, so that the time from a
+#: stamp to the next point of the grid, ...
+_TAU_SHARE = 0.25
+#: ... whose step is this share of a picture, changes the potential by less than a tenth.
+_STEP_SHARE = 0.02
+#: By which share of a picture an age of pictures begins early.
+_EARLY = 0.5
+
+
+class Ages(NamedTuple):
+    """The trains of the ages of a touch, one of which fires at every sample of it, and from which age on each, ms."""
+
+    trains: range
+    begin_ms: tuple[float, ...]
+
+
+def ages_of(encoder: Encoder, array: Array | None) -> Ages | None:
+    """Return the trains of ages of an encoder, or of the first part of a composite one that has any."""
+    first = 0
+    for part in encoder._each():
+        first += part.trains(array or Array(1, 1)) * (2 if part.signed else 1)
+        ages = getattr(part, "ages_ms", None)
+        if ages is not None:
+            return Ages(range(first - len(ages), first), tuple(map(float, ages)))
+    return None
+
+
+def onsets(pattern: SpikeTrains, ages: Ages) -> NDArray[np.float64]:
+    """Return when touches began, ms: the least age before its first spike after a pause, or after a greater age."""
+    times = [pattern[n] for n in ages.trains]
+    order = np.argsort(pooled := np.concatenate(times), kind="stable")
+    pooled, age = pooled[order], np.repeat(np.arange(len(times)), [len(t) for t in times])[order]
+    apart = np.diff(pooled)
+    begins = np.ones(len(pooled), np.bool_)
+    begins[1:] = (apart > 1.5 * apart.min(initial=np.inf)) | (np.diff(age) < 0)
+    found: NDArray[np.float64] = pooled[begins & (age == 0)] - ages.begin_ms[0]
+    return found
+
+
+def later_us(pattern: SpikeTrains, ages: Ages, felt_ms: NDArray[np.float64], age_ms: float) -> NDArray[np.int64]:
+    """Return how much later than at an age the first sample of each touch is that has it, us; 0 where none has.
+
+    Parameters
+    ----------
+    pattern : SpikeTrains
+    ages : Ages
+        Of the encoder that made it.
+    felt_ms : float64, shape (touches,), ms
+        When the touches began.
+    age_ms : float, ms
+        One of the ages.
+    """
+    after = np.append(onsets(pattern, ages), np.inf)
+    place = [round(to_us(one)) for one in ages.begin_ms].index(round(to_us(age_ms)))
+    fired = np.append(pattern[ages.trains[place]], np.inf)
+    first = fired[np.searchsorted(fired, felt_ms + age_ms - 1e-6)]
+    same = first < after[np.searchsorted(after, felt_ms + 1e-6)]
+    return np.rint(to_us(np.where(same, first - (felt_ms + age_ms), 0.0))).astype(np.int64)
+
+
+def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Clock]) -> Recipe:
+    """Return the recipe with the ages of a touch, and the delays at one, that the pictures of (checked) examples show.
+
+    A picture shows a touch at a whole number of pictures after its onset, so each age and delay is rounded up to whole
+    pictures, and points to try whose delays are then those of a point before are left out. As stamps are not regular,
+    each age begins half a picture early, and the age of a delay ends a picture later. Of events, whose state is known
+    at any time, all that holds only where a frame lasts longer than a delay, and ages begin in time. Of several
+    examples the longest picture counts.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    examples : sequence of Example
+    clocks : sequence of Clock
+        Of the examples: how long a frame of events lasts.
+    """
+    own = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()] or [recipe.learner]
+    delays = [_delay_ms(one) for one in own if _aged(recipe, one)]
+    pictures_ms = max(_picture_ms(one) for one in examples)
+    period_ms = pictures_ms or max((frame_us or 0.0) / 1e3 for frame_us, _ in clocks)
+    if not delays or not period_ms or (not pictures_ms and period_ms <= min(delays)):
+        return recipe
+    early = _EARLY if pictures_ms else 0.0
+    used: set[int] = set()
+
+    def count(ms: float) -> int:
+        return ceil(ms / period_ms - 1e-6)
+
+    def begin_ms(pictures: int) -> float:
+        return max(0.0, round(1e3 * (pictures - early) * period_ms) / 1e3)
+
+    def point(values: Mapping[str, Any], under: Mapping[str, Any], seen: dict[int, float]) -> dict[str, Any] | None:
+        every = {**under, **values}
+        if not _aged(recipe, every):
+            return dict(values)
+        pictures = count(_delay_ms(every))
+        if seen.setdefault(pictures, _delay_ms(every)) != _delay_ms(every):
+            return None
+        used.add(pictures)
+        refractory = max(float(every.get("refractory", Neuron().refractory)), _SILENT_SHARE * period_ms)
+        made = {**values, "delay_ms": begin_ms(pictures), "refractory": refractory}
+        if pictures_ms and float(every.get("tau", Neuron().tau)) < _TAU_SHARE * period_ms:
+            made |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": _STEP_SHARE * period_ms}
+        return made
+
+    def neuron(values: Mapping[str, Any]) -> dict[str, Any]:
+        first = {name: value for name, value in values.items() if name not in LISTS}
+        made, under = dict(first), {**recipe.learner, **first}
+        for key in LISTS:
+            seen: dict[int, float] = {}
+            made |= point(first, recipe.learner, seen) or {}
+            tried = [point(one, under, seen) for one in values.get(key, ())]
+            made |= {key: [one for one in tried if one is not None]} if key in values else {}
+        return made
+
+    def encoder(part: Encoder) -> Encoder:
+        ages = getattr(part, "ages_ms", None)
+        if ages is None:
+            return part
+        counts = {count(age) for age in ages} | used | {pictures + 1 for pictures in used}
+        return copy(part).set_params(ages_ms=[begin_ms(pictures) for pictures in sorted(counts)])
+
+    neurons = {label: neuron(values) for label, values in recipe.neurons.items()}
+    learner = recipe.learner if neurons else neuron(recipe.learner)
+    whole = recipe.encoder
+    parts = {name: encoder(part) for name, part in whole.parts.items()} if isinstance(whole, Composite) else {}
+    return replace(recipe, encoder=Composite(parts) if parts else encoder(whole), learner=learner, neurons=neurons)
+
+
+def _aged(recipe: Recipe, values: Mapping[str, Any]) -> bool:
+    """Whether a neuron with these parameters receives ages of a touch."""
+    return any(getattr(part, "ages_ms", None) is not None for part in recipe._received(values)._each())
+
+
+def _delay_ms(values: Mapping[str, Any]) -> float:
+    return float(values.get("delay_ms", 0.0))
+
+
+def _picture_ms(example: Example) -> float:
+    """Return the median distance of the pictures of a (checked) example, ms; 0 of what has no pictures."""
+    source = example.source
+    return float(np.median(np.diff(source.t))) / 1e3 if isinstance(source, Frames) and len(source) > 1 else 0.0
