@@ -99,3 +99,10 @@ def datagrams(came: list[tuple[int, int]]) -> list[bytes]:
             whole.append(bytes(held))
             held.clear()
     return whole
+
+
+def same(came: list[Any], expected: list[Any]) -> None:
+    """Compare what came with what was expected, and name the first that differs."""
+    for k, (one, other) in enumerate(zip(came, expected, strict=False)):
+        assert one == other, f"number {k}: {one!r} came, {other!r} was expected"
+    assert len(came) == len(expected), f"{len(came)} came, {len(expected)} were expected"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 #: A comparator that had not returned as its ramp began.
@@ -226,3 +227,71 @@ class Version2:
         counts = [frames, events, dropped, len(self.sent), faults]
         self.send(self.begin(base=at, **form | {"kind": 4}))
         self.sent[-1].body = b"".join(count.to_bytes(8, "little") for count in counts)
+
+
+class Comparators:
+    """Ideal comparators as the logic samples them: each trips within the tick of its taxel, from the ramp's rise on.
+
+    They are asked for once a fast clock, `delay` clocks of which pass from the ramp to the samples taken during it.
+    """
+
+    def __init__(self, delay: int) -> None:
+        self.late = deque([0] * (delay - 1))
+        self.high = self.sample = self.level = self.all = 0
+        self.trips: dict[int, int] = {}
+
+    def rise(self, ticks: list[int], inverted: bool) -> None:
+        """Begin a ramp: what the comparators of all channels will do."""
+        self.trips, self.level, self.sample = {}, 0, 0
+        self.all = (1 << 2 * len(ticks)) - 1 if inverted else 0
+        for channel, tick in enumerate(ticks):
+            if tick == NOT_RETURNED:
+                self.level |= 1 << 2 * channel
+            else:
+                self.trips[tick] = self.trips.get(tick, 0) | 1 << 2 * channel
+
+    def pairs(self) -> int:
+        """Return the samples of a clock that are there now: of each channel those of both halves."""
+        pairs = 0
+        for half in range(2):
+            pairs |= self.level << half
+            self.level |= self.trips.get(self.sample, 0)
+            self.sample += 1
+        self.late.append(pairs ^ self.all)
+        return self.late.popleft()
+
+
+class Scan:
+    """The changes and spikes of frames of one array, in the order of the scan (docs/wire.md)."""
+
+    def __init__(self, columns: int, rows: int, channels: int) -> None:
+        self.columns, self.rows, self.channels = columns, rows, channels
+        self.steps = -(-max(rows, 64) // channels)
+        self.held: dict[tuple[int, int], int] = {}
+        self.afferents: dict[tuple[int, int], Afferent] = {}
+
+    def taxels(self) -> list[tuple[int, int]]:
+        """Return all taxels as they are scanned: line and row."""
+        steps = range(self.steps)
+        rows = [self.steps * channel + step for step in steps for channel in range(self.channels)]
+        return [(x, y) for x in range(self.columns) for y in rows if y < self.rows]
+
+    def frame(
+        self, ticks: dict[tuple[int, int], int], ramp: int, floor: int, threshold: tuple[int, int, int] | None = None
+    ) -> list[tuple[int, int, int, int]]:
+        """Return line, row, polarity and value of each event; with a threshold (rest, jump, decay) those of FA-1."""
+        events = []
+        if threshold is None:
+            self.afferents.clear()
+        for taxel in self.taxels():
+            value = min(ticks[taxel], ramp)
+            if ticks[taxel] == NOT_RETURNED:
+                continue
+            if threshold:
+                spike = self.afferents.setdefault(taxel, Afferent()).frame(value, *threshold)
+                if spike:
+                    events.append((*taxel, *spike))
+            elif abs(value - self.held.get(taxel, 0)) > floor:
+                events.append((*taxel, int(value >= self.held.get(taxel, 0)), value))
+                self.held[taxel] = value
+        return events
