@@ -4,8 +4,8 @@ import ctypes
 
 import numpy as np
 import pytest
-from test_udp_sender import payload_of
 
+from ethernet import payload_of
 from logic import built
 from taxel import Array
 from taxel.simulate import Board

@@ -1,41 +1,13 @@
 """Frames of Ethernet as the simulated sender makes them, by a parser of their own: RFC 791, RFC 768, IEEE 802.3."""
 
 import shutil
-import struct
-import zlib
 
 import numpy as np
 import pytest
 
+from ethernet import GAP, payload_of
 from logic import RTL
 from sender import Sender
-
-FROM, TO = (bytes([192, 168, 52, 8]), 5208), (bytes([192, 168, 52, 1]), 5208)
-#: The least gap between frames, byte times.
-GAP = 12
-
-
-def payload_of(frame: bytes) -> bytes:
-    """Return the payload of a frame with preamble and check sequence, after looking at all that goes with it."""
-    assert frame[:8] == b"\x55" * 7 + b"\xd5"
-    body, check = frame[8:-4], frame[-4:]
-    assert check == struct.pack("<I", zlib.crc32(body))
-    assert len(body) >= 60
-    assert struct.unpack(">6s6sH", body[:14]) == (b"\xff" * 6, b"\x02TAX\0\0", 0x0800)
-    packet = body[14:]
-    words = struct.unpack(">10H", packet[:20])
-    total = sum(words)
-    assert (total & 0xFFFF) + (total >> 16) == 0xFFFF
-    version, length, fragment, hops, protocol, source, target = struct.unpack(">HH2xHBB2x4s4s", packet[:20])
-    assert (version, fragment, hops, protocol) == (0x4500, 0x4000, 64, 17)
-    assert (source, target) == (FROM[0], TO[0])
-    from_port, to_port, udp_length, udp_checksum = struct.unpack(">4H", packet[20:28])
-    assert (from_port, to_port, udp_checksum) == (FROM[1], TO[1], 0)
-    assert udp_length == length - 20
-    # What pads a short frame is zeros, and no more of them than it takes.
-    assert packet[length:] == bytes(max(46 - length, 0))
-    return packet[28:length]
-
 
 def sent(sender: Sender, payloads: list[bytes]) -> list[tuple[bytes, int]]:
     for payload in payloads:

@@ -5,15 +5,7 @@ import random
 import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
-
-
-def crc_32c(data):
-    crc = 0xFFFF_FFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ 0x82F6_3B78 * (crc & 1)
-    return ~crc & 0xFFFF_FFFF
+from models import crc_32c
 
 
 @cocotb.test()

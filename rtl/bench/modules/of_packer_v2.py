@@ -1,0 +1,127 @@
+"""The packer of version 2: which datagrams docs/wire-v2.md makes of the queue's entries, word by word."""
+
+import random
+from dataclasses import replace
+
+import cocotb
+from cocotb.triggers import FallingEdge
+from drivers import Pace, begin, offer, settled, vary
+from models import Datagram, Version2
+from structs import NUMBERS, pack, unpack
+
+EVENT, MARKER, FRAME, FLUSH = (NUMBERS[f"ENTRY_{name}"] for name in ("EVENT", "MARKER", "FRAME", "FLUSH"))
+COUNTS = ("frames", "events", "dropped", "faults")
+
+
+def drawn(frames, rows, board, valued, difference):
+    """Return entries of frames, and give them to the board; with them go what is repeated after an entry."""
+    entries, at, totals = [], random.randrange(1 << 20), dict.fromkeys(COUNTS, 0)
+    form, spikes, length = {"version_2": 1, "frame_sync": 1}, 0, 200
+
+    def kind():
+        return 0 if not valued and not spikes else 2 if form["wide_values"] or spikes else 1
+
+    for k in range(frames):
+        if k % 15 == 0:
+            # Other registers: what was gathered is sent first.
+            if k:
+                entries.append((pack("event_t", kind=FLUSH, format=form, at=at), None, None))
+                board.close(at)
+            spikes, wide, length = random.getrandbits(1), random.getrandbits(1), random.choice([30, 200, 9000, 70_000])
+            form = {"version_2": 1, "frame_sync": random.getrandbits(1), "spikes": spikes, "wide_values": wide or spikes}
+            often = random.choice([0, 0.1, 1])
+        sent = {"kind": kind(), "frame_sync": form["frame_sync"], "differences": int(difference and not spikes)}
+        for x in random.sample(range(128), random.choice([1, 3])) if random.random() < often else ():
+            time = at if form["frame_sync"] else at + random.randrange(length)
+            for y in sorted(random.sample(range(rows), min(rows, random.choice([1, 2, 9])))):
+                event = {"x": x, "y": y, "at": time, "more": random.getrandbits(1), "value": random.choice([7, 255, 256, 65535])}
+                lost = random.random() < 0.05
+                board.lost |= lost
+                board.event(**event, **sent)
+                entries.append((pack("event_t", kind=EVENT, format=form, lost=lost, **event), None, None))
+            at = time
+        at += length
+        # The frame's end, with what is repeated then.
+        states, counts = None, None
+        if random.random() < 0.1 and not spikes:
+            states = random.randrange(128), [random.choice([0, 255, 256, 65535]) for _ in range(rows)]
+        if random.random() < 0.1:
+            totals = {name: count + random.randrange(1 << 40) for name, count in totals.items()}
+            counts = totals
+        fields = dict(zip(("x", "y", "more", "value"), (length >> 24 & 127, length >> 17 & 127, length >> 16 & 1, length & 65535), strict=True))
+        also = states is not None or counts is not None
+        entries.append((pack("event_t", kind=FRAME, format=form, at=at, states=states is not None, totals=counts is not None, **fields), states, counts))
+        board.frame_end(at, length, also, **sent)
+        if states:
+            board.states(at, *states, **sent | {"kind": 1 if sent["kind"] == 1 else 2})
+        if counts:
+            board.totals(at, **counts, **sent)
+        if random.random() < 0.1:
+            start, lost = random.getrandbits(1), random.random() < 0.1
+            entries.append((pack("event_t", kind=MARKER, format=form, at=at, more=start, lost=lost), None, None))
+            board.lost |= lost
+            board.marker(at, start, **sent)
+    return entries
+
+
+@cocotb.test()
+async def datagrams_are_those_of_the_page(dut):
+    rows, valued, difference = int(dut.ROWS.value), int(dut.VALUED.value), int(dut.DIFFERENCE.value)
+    in_pace, link_pace = Pace(), Pace()
+    board = Version2(max(rows - 1, 0).bit_length(), 2 * int(dut.MOST.value), int(dut.HOLD_US.value), int(dut.HEARTBEAT_US.value))
+    entries = drawn(300, rows, board, valued, difference)
+    await begin(dut, valid=0, leaving=0, states_ready=0, sending=0)
+    cocotb.start_soon(vary(dut.clk, 1500, in_pace, link_pace))
+
+    def put(entry):
+        dut.entry.value = entry[0]
+
+    source = cocotb.start_soon(offer(dut.clk, dut.valid, dut.taken, put, entries, in_pace))
+    came, body, bank, sending, asked, quiet = [], [], None, False, 0, 0
+    taken, states = 0, None
+    while quiet < 300:
+        # The copied line comes to the packer a clock after it asked for a row.
+        dut.states_ready.value = int(states is not None and random.random() < 0.1)
+        dut.value_repeated.value = states[1][asked] if states and asked < rows else random.getrandbits(16)
+        sending = sending and not (random.random() < 0.2 and link_pace())
+        dut.sending.value = int(sending)
+        await settled()
+        asked = int(dut.row_repeated.value)
+        if int(dut.taken.value):
+            # What is repeated stands until it was sent.
+            _, states, totals = entries[taken]
+            taken += 1
+            if states:
+                dut.repeated_line.value = states[0]
+            if totals:
+                dut.totals.value = pack("totals_t", **totals, datagrams=random.getrandbits(48))
+        if int(dut.write.value):
+            # What is being sent stands still.
+            assert int(dut.bank.value) != bank or not sending
+            assert int(dut.place.value) == len(body)
+            body.append(int(dut.unit.value))
+        if int(dut.send.value):
+            assert not sending
+            head = unpack("datagram_t", dut.datagram.value)
+            assert head.units == len(body)
+            assert head.bank != bank
+            bank, sending = head.bank, True
+            came.append(
+                Datagram(
+                    kind=head.kind, base=head.base, frame_sync=head.frame_sync, differences=head.differences,
+                    dropped=head.dropped, line=head.line, span=head.span, sequence=head.sequence_number,
+                    body=b"".join(unit.to_bytes(2, "little") for unit in body),
+                )
+            )  # fmt: skip
+            body = []
+            k = len(came) - 1
+            assert came[k] == replace(board.sent[k], at=0, position=-1)
+        quiet = quiet + 1 if source.done() else 0
+        # An entry of version 1 comes: what was gathered goes.
+        dut.leaving.value = int(source.done())
+        await FallingEdge(dut.clk)
+    if board.begun:
+        board.close(board.begun.at)
+    assert came == [replace(datagram, at=0, position=-1) for datagram in board.sent]
+    assert {datagram.kind for datagram in came} >= {2, 3, 4, 7}
+    assert int(dut.idle.value)

@@ -1,0 +1,53 @@
+"""The serial line's receiver: bytes whose bits are up to 2.7 % too long or short, at any phase; none without stop bit."""
+
+import random
+
+import cocotb
+from cocotb.triggers import FallingEdge, Timer
+from drivers import begin, settled
+
+
+@cocotb.test()
+async def each_byte_comes_once(dut):
+    bit_ps = 10_000 * int(dut.CLOCKS.value)
+    came = []
+
+    async def watch():
+        while True:
+            await settled()
+            if int(dut.valid.value):
+                came.append(int(dut.data.value))
+            await FallingEdge(dut.clk)
+
+    async def send(bits, length):
+        for bit in bits:
+            dut.rx.value = bit
+            await Timer(length, "ps")
+
+    await begin(dut, rx=1)
+    cocotb.start_soon(watch())
+    for round_ in range(8):
+        sent = []
+        for _ in range(40):
+            byte = random.choice([0, 255, random.randrange(256)])
+            length = round(bit_ps * random.uniform(0.973, 1.027))
+            await send([0, *(byte >> k & 1 for k in range(8)), 1], length)
+            # The next byte may begin at once, at any phase of the clock.
+            dut.rx.value = 1
+            await Timer(random.choice([1, random.randrange(1, 3 * bit_ps)]), "ps")
+            sent.append(byte)
+        await Timer(2 * bit_ps, "ps")
+        assert came == sent
+        # Held low it is no byte; what comes after a long silence is.
+        came.clear()
+        await send([0] * (20 + round_), bit_ps)
+        assert came == []
+        await send([1] * 12, bit_ps)
+        came.clear()
+        # A reset forgets the byte that had begun.
+        await send([0, 1, 0], bit_ps)
+        dut.reset.value, dut.rx.value = 1, 1
+        await Timer(4 * 10_000, "ps")
+        dut.reset.value = 0
+        await Timer(12 * bit_ps, "ps")
+        assert came == []
