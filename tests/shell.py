@@ -1,14 +1,22 @@
-"""The command line as a shell calls it."""
+"""The command line, in the process of the tests: a process of its own takes a second to load what it needs."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import subprocess
-import sys
-from typing import Any
 
 import pytest
 
 from taxel.cli import main
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a command in this process; return what a process would."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as ended:
+        main([str(a) for a in arguments])
+    return subprocess.CompletedProcess(arguments, int(ended.value.code or 0), out.getvalue(), err.getvalue())
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
@@ -17,9 +25,3 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, s
         main([str(a) for a in arguments])
     said = capsys.readouterr()
     return int(ended.value.code or 0), said.out, said.err
-
-
-def run(*arguments: object, **how: Any) -> subprocess.CompletedProcess[str]:
-    """Run a command in a process of its own, with further keywords of `subprocess.run`."""
-    command = [sys.executable, "-m", "taxel", *map(str, arguments)]
-    return subprocess.run(command, check=False, capture_output=True, text=True, **how)

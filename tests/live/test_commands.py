@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from loopback import free_port
+from shell import run
 from typer.testing import CliRunner
 
 import taxel
@@ -29,8 +30,8 @@ from .boards import LOOPBACK, SMALL, command, listening, play, presses, recordin
 
 def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path: Path) -> None:
     port, file, events = free_port(), tmp_path / "walk.mcap", presses(3)
-    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--array", "4x4")
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    arguments = ("record", file, "--host", LOOPBACK, "--port", port, "--array", "4x4")
+    with subprocess.Popen(command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         listening(process)
         play(events, port)
         time.sleep(0.3)
@@ -39,7 +40,7 @@ def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path
     assert process.returncode == 0
     assert said.splitlines()[-1].startswith("nothing lost after arrival")
     np.testing.assert_array_equal(taxel.open(file).events.to_numpy(), events.to_numpy())
-    again = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    again = run(*arguments)
     assert again.returncode == 2
     said = f"taxel: {file}: exists already; give --overwrite, or name another"
     assert again.stderr.strip().splitlines() == [said]
@@ -90,8 +91,7 @@ def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(
 
 
 def test_the_panels_address_is_on_standard_error_where_lines_are_json() -> None:
-    arguments = command("live", "--panel", "--json", "--port", 0, "--host", LOOPBACK, "--seconds", 0.1)
-    ended = subprocess.run(arguments, capture_output=True, text=True, check=False, timeout=60)
+    ended = run("live", "--panel", "--json", "--port", 0, "--host", LOOPBACK, "--seconds", 0.1)
     assert ended.stdout == ""
     assert re.search(r"^panel: http://127\.0\.0\.1:\d+/#token=\w+$", ended.stderr, re.MULTILINE), ended.stderr
 
@@ -128,9 +128,9 @@ def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
 def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> None:
     port = free_port()
     automatic = ["--length", 0.3, "--countdown", 0, "--start-index", 7, "--trials", 2]
-    arguments = command("record", tmp_path / "step.lsa", "--host", LOOPBACK, "--port", port, *automatic)
+    arguments = ("record", tmp_path / "step.lsa", "--host", LOOPBACK, "--port", port, *automatic)
     with (
-        subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process,
+        subprocess.Popen(command(*arguments), stdout=subprocess.PIPE, text=True) as process,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
     ):
         while process.poll() is None:
@@ -140,7 +140,7 @@ def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> Non
     assert process.returncode == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["step7.lsa", "step7.lss", "step8.lsa", "step8.lss"]
     assert said.count("nothing lost after arrival") == 2
-    again = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    again = run(*arguments)
     assert (again.returncode, again.stderr.strip()) == (
         2,
         f"taxel: {tmp_path / 'step7.lsa'}: exists already; give --overwrite, or name another",
@@ -152,8 +152,7 @@ def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
         port = holder.address[1]
         with pytest.raises(OSError, match="in use"):
             Live(port, host=LOOPBACK)
-        arguments = command("record", tmp_path / "a.mcap", "--host", LOOPBACK, "--port", port)
-        done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+        done = run("record", tmp_path / "a.mcap", "--host", LOOPBACK, "--port", port)
     assert (done.returncode, done.stderr) == (3, f"taxel: UDP {LOOPBACK}:{port}: address already in use\n")
     assert not (tmp_path / "a.mcap").exists()
 
@@ -184,8 +183,7 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, difference
     keys = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired"}
     assert [set(line) for line in lines] == [keys | {"said_us", "said_ns"}] * 5
     heard_again = ("detect", tmp_path / "live.mcap", "--readout", tmp_path / "touch.json", "--json")
-    again = subprocess.run(command(*heard_again), capture_output=True, text=True, check=True)
-    detected = json.loads(again.stdout)["detections"]
+    detected = json.loads(run(*heard_again).stdout)["detections"]
     assert detected == [{key: line[key] for key in keys} for line in lines], "one schema"
     recorded = taxel.open(tmp_path / "live.mcap")
     np.testing.assert_array_equal([line["t_us"] for line in lines], recorded.detections.t)
@@ -233,8 +231,7 @@ def test_taxel_live_says_which_taxels_its_tare_does_not_know(tmp_path: Path) -> 
 
 def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
     touch().save(tmp_path / "touch.json")
-    arguments = command("live", "--readout", tmp_path / "touch.json", "--save-tare", tmp_path / "tare.json")
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    done = run("live", "--readout", tmp_path / "touch.json", "--save-tare", tmp_path / "tare.json")
     assert done.returncode == 2
     assert done.stderr == "taxel: --save-tare without a fresh tare: give --tare SECONDS\n"
 
@@ -243,8 +240,7 @@ def test_taxel_live_to_which_nothing_came_names_no_latency(tmp_path: Path) -> No
     touch().save(tmp_path / "touch.json")
     port = free_port()
     here = ["--host", LOOPBACK, "--port", port, "--array", "4x4", "--seconds", 0.2]
-    arguments = command("live", "--readout", tmp_path / "touch.json", *here)
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    done = run("live", "--readout", tmp_path / "touch.json", *here)
     assert done.returncode == 3
     assert f"nothing arrived at UDP {LOOPBACK}:{port}" in done.stdout
     assert "p50" not in done.stdout

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from shell import run
 
 import taxel
 from taxel import DeviceError, ProblemError
@@ -244,11 +245,6 @@ def test_ports_have_names() -> None:
     assert all(port.place and port.kind in ("usb", "pci", "bluetooth", "other") for port in ports())
 
 
-def command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    line = [sys.executable, "-m", "taxel", "device", *arguments]
-    return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False)
-
-
 def test_the_command_does_all_of_it_on_an_emulated_line(tmp_path: Path) -> None:
     link = tmp_path / "board"
     emulate = [sys.executable, "-m", "taxel", "emulate", "--line", str(link), "--port", "9", "--json", "--wire", "2"]
@@ -258,30 +254,32 @@ def test_the_command_does_all_of_it_on_an_emulated_line(tmp_path: Path) -> None:
         while not link.is_symlink():
             assert time.monotonic() < until
             time.sleep(0.02)
-        shown = json.loads(command("show", str(link), "--json").stdout)
+        shown = json.loads(run("device", "show", str(link), "--json").stdout)
         assert (shown["rows"], shown["columns"], shown["wire_version"]) == (64, 64, 2)
         assert shown["registers"]["line_period"] == 3.0
-        assert "line_period" in command("show", str(link)).stdout
-        said = json.loads(command("set", str(link), "noise_floor=6", "ramp=140", "--json").stdout)
+        assert "line_period" in run("device", "show", str(link)).stdout
+        said = json.loads(run("device", "set", str(link), "noise_floor=6", "ramp=140", "--json").stdout)
         assert (said["registers"]["noise_floor"], said["registers"]["ramp"]) == (6, 140)
-        assert command("set", str(link), "noise_floor=7").stdout == "noise_floor: 6 -> 7 ticks\n"
-        assert "nothing changed" in command("set", str(link), "noise_floor=7").stdout
-        assert json.loads(command("apply", str(link), "2 kHz", "--json").stdout)["registers"]["line_period"] == 7.81
-        assert json.loads(command("record", str(link), "stop", "--json").stdout)["registers"]["record"] == 0
-        refused = command("set", str(link), "line_read=99999")
+        assert run("device", "set", str(link), "noise_floor=7").stdout == "noise_floor: 6 -> 7 ticks\n"
+        assert "nothing changed" in run("device", "set", str(link), "noise_floor=7").stdout
+        assert (
+            json.loads(run("device", "apply", str(link), "2 kHz", "--json").stdout)["registers"]["line_period"] == 7.81
+        )
+        assert json.loads(run("device", "record", str(link), "stop", "--json").stdout)["registers"]["record"] == 0
+        refused = run("device", "set", str(link), "line_read=99999")
         assert refused.returncode == 3
         assert "rule 1" in refused.stderr
         assert refused.stderr.count("\n") == 1
-        assert command("watch", str(link), "--seconds", "0.3", "--json").returncode == 0
+        assert run("device", "watch", str(link), "--seconds", "0.3", "--json").returncode == 0
     finally:
         board.send_signal(2)
         out, _ = board.communicate(timeout=60)
     assert board.returncode == 0
     assert json.loads(out)["frames"] > 0
     assert not link.is_symlink()
-    gone = command("show", str(link))
+    gone = run("device", "show", str(link))
     assert (gone.returncode, gone.stderr.count("\n")) == (2, 1)
-    assert json.loads(command("ports", "--json").stdout) == [
+    assert json.loads(run("device", "ports", "--json").stdout) == [
         {"place": p.place, "kind": p.kind, "product": p.product, "maker": p.maker, "serial": p.serial, "usb": p.usb}
         for p in ports()
     ]

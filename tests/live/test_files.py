@@ -2,17 +2,17 @@
 
 import shutil
 import signal
-import subprocess
 import time
 from pathlib import Path
 
 import pytest
 from loopback import free_port
+from shell import run
 
 import taxel
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL, command, listening, play, presses, recording, wait_for, wait_until
+from .boards import LOOPBACK, SMALL, listening, play, presses, recording, wait_for, wait_until
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is always full")
@@ -32,8 +32,7 @@ def test_a_full_disk_is_one_clear_error(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("kind", ["mcap", "lsa"])
 def test_a_recording_to_which_nothing_came_is_not_kept(tmp_path: Path, kind: str) -> None:
     port, file = free_port(), tmp_path / f"walk.{kind}"
-    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--seconds", 0.2)
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    done = run("record", file, "--host", LOOPBACK, "--port", port, "--seconds", 0.2)
     assert done.returncode == 3
     assert done.stdout.startswith(f"nothing arrived at UDP {LOOPBACK}:{port} in 0.")
     assert "nothing lost" not in done.stdout
@@ -70,10 +69,7 @@ def test_a_second_recorder_does_not_take_the_file_of_a_running_one(tmp_path: Pat
         if not later:
             play(presses(2), port)
             wait_until(lambda: file.stat().st_size > 0)
-        done = subprocess.run(
-            command("record", file, "--host", LOOPBACK, "--port", free_port(), "--overwrite", "--seconds", 0.1),
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+        done = run("record", file, "--host", LOOPBACK, "--port", free_port(), "--overwrite", "--seconds", 0.1)
         said = "is being recorded by another program; end that first, or name another file"
         assert (done.returncode, done.stderr) == (3, f"taxel: {file}: {said}\n")
         play(presses(2), port)

@@ -97,11 +97,12 @@ def running(*arguments: str, folder: Path) -> Iterator[Process]:
 
 @pytest.fixture(scope="session")
 def chromium():  # type: ignore[no-untyped-def]  # Playwright may be absent
-    """Start the browser once for all tests; skip where there is none."""
+    """Start the browser once for all tests, with one page for most of them; skip where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
     if CHROMIUM is None:
         pytest.skip("no Chromium: on Debian, apt install chromium")
     with playwright.sync_playwright() as started:
         browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        browser.new_context().new_page()
         yield browser
         browser.close()

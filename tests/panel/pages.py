@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +16,7 @@ from loopback import free_port
 from tests.panel.browser import PATIENCE, running
 
 import taxel
+from taxel.live import Panel
 
 #: Pixels of a map, as a text that changes when the picture does.
 PIXELS = "name => document.getElementById(name).toDataURL()"
@@ -33,17 +35,44 @@ def until(true: Callable[[], Any], what: str) -> Any:
     raise AssertionError(f"not within {PATIENCE} s: {what}")
 
 
-def opened(browser: Any, url: str, **how: Any) -> Any:
-    """Open the panel in a context of its own; any error of the page is kept in `errors`."""
-    context = browser.new_context(**{"viewport": {"width": 1300, "height": 900}, **how})
-    context.set_default_timeout(PATIENCE * 1000)
-    page = context.new_page()
+@contextmanager
+def opened(
+    browser: Any, url: str, *, width: int = 1300, height: int = 900, motion: str = "no-preference", **how: Any
+) -> Iterator[Any]:
+    """Open the panel in the page of all tests, which knows nothing of others; with `how`, in a context of its own.
+
+    It may not have complained in the end. A page in a new context costs a second of processor time more.
+    """
+    page = browser.new_context(**how).new_page() if how else browser.contexts[0].pages[0]
+    page.context.set_default_timeout(PATIENCE * 1000)
+    page.set_viewport_size({"width": width, "height": height})
+    page.emulate_media(reduced_motion=motion)
+    page.mouse.move(0, 0)
     errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    listeners = {
+        "pageerror": lambda error: errors.append(str(error)),
+        "console": lambda message: errors.append(message.text) if message.type == "error" else None,
+    }
+    for name, listener in listeners.items():
+        page.on(name, listener)
     page.goto(url)
-    page.errors = errors
-    return page
+    try:
+        yield page
+        assert not errors
+    finally:
+        for name, listener in listeners.items():
+            page.remove_listener(name, listener)
+        page.evaluate("localStorage.clear()")
+        page.context.close() if how else page.goto("about:blank")
+
+
+@contextmanager
+def shown(browser: Any, file: Path, **how: Any) -> Iterator[Any]:
+    """Show a recording in a browser, by a panel in this process."""
+    with Panel(file) as panel, opened(browser, panel.url, **how) as page:
+        shows(page, "state-word", "^Replay$")
+        shows(page, "clock", r"\d")
+        yield page
 
 
 def shows(page: Any, name: str, pattern: str) -> None:
@@ -111,14 +140,12 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
 
 @pytest.fixture
 def page(chromium: Any, live: SimpleNamespace) -> Iterator[Any]:
-    """The panel in a browser, following the board; it may not have complained in the end."""
-    page = opened(chromium, live.url)
-    shows(page, "state-word", "^Live$")
-    shows(page, "events", r"^[1-9]")
-    shows(page, "clock", r"\d s")
-    yield page
-    assert not page.errors
-    page.context.close()
+    """The panel in a browser, following the board."""
+    with opened(chromium, live.url) as page:
+        shows(page, "state-word", "^Live$")
+        shows(page, "events", r"^[1-9]")
+        shows(page, "clock", r"\d s")
+        yield page
 
 
 @pytest.fixture(scope="module")
@@ -144,13 +171,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def replay(chromium: Any, recording: Path) -> Iterator[Any]:
     """The recording in a browser, without a board."""
-    with running("view", str(recording), "--no-open", folder=recording.parent) as server:
-        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
-        shows(page, "state-word", "^Replay$")
-        shows(page, "clock", r"\d s")
+    with shown(chromium, recording) as page:
         yield page
-        assert not page.errors
-        page.context.close()
 
 
 def record_form(page: Any, **values: Any) -> None:

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loopback import free_port
-from tests.panel.browser import running
 from tests.panel.pages import (
     FOLLOWS,
     live,
@@ -35,12 +33,14 @@ pytestmark = pytest.mark.timeout(600)
 def test_a_sensor_of_any_shape_is_seen_pointed_at_and_saved(
     chromium: Any, tmp_path: Path, rows: int, columns: int
 ) -> None:
-    port = str(free_port())
-    array = ("--array", f"{rows}x{columns}")
-    with running("live", "--panel", "--port", port, "--host", "127.0.0.1", *array, folder=tmp_path) as server:
-        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+    array = taxel.Array(rows, columns, pitch_mm=2.67)
+    with (
+        taxel.live.Live(0, host="127.0.0.1", array=array) as board,
+        taxel.live.Panel(board, folder=tmp_path) as panel,
+        opened(chromium, panel.url) as page,
+    ):
         shows(page, "state-word", FOLLOWS)
-        source = taxel.live.Source(taxel.Array(rows, columns), 100.0, to=f"127.0.0.1:{port}")
+        source = taxel.live.Source(array, 100.0, to="{}:{}".format(*board.address))
         for k in range(10):
             source.push(np.full((rows, columns), 100 + 10 * k))
         until(lambda: page.locator("#events").inner_text() != "–", "it is heard")
@@ -61,44 +61,45 @@ def test_a_sensor_of_any_shape_is_seen_pointed_at_and_saved(
             press(page, "s")
         width, height = np.frombuffer(Path(download.value.path()).read_bytes()[16:24], ">u4")
         assert 0 < height < 4 * width
-        assert not page.errors
-        page.context.close()
 
 
 def test_the_page_fits_a_phone_and_its_foot_hides_nothing(chromium: Any, live: SimpleNamespace) -> None:
-    page = opened(chromium, live.url, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
-    shows(page, "state-word", "^Live$")
-    for tab in ("board", "record", "labels", "view"):
-        page.locator(f"#tab-{tab}").click()
-        assert page.evaluate("document.documentElement.scrollWidth") <= 390, tab
-    # The counters' widest texts, as on a slow board.
-    for name, text in {"events": "120,000", "frames": "20,833", "latency": "134 / 134,218", "lost": "12,345"}.items():
-        page.locator(f"#{name}").evaluate("(place, text) => { place.textContent = text }", text)
-    edge = page.evaluate(
-        "Math.max(...[...document.querySelectorAll('header *')].map(e => e.getBoundingClientRect().right))"
-    )
-    assert edge <= 390
-    page.evaluate("window.scrollTo(0, document.body.scrollHeight)")
-    foot = page.locator("footer").bounding_box()
-    assert page.locator("header").bounding_box()["height"] + foot["height"] < 844 / 8
-    low = page.locator("aside").bounding_box()
-    assert low["y"] + low["height"] <= foot["y"]
-    for button in page.locator("footer button:visible, header button:visible").all():
-        assert min(button.bounding_box()["height"], button.bounding_box()["width"]) >= 44, button.inner_text()
-    page.context.close()
+    with opened(chromium, live.url, width=390, height=844, has_touch=True, is_mobile=True) as page:
+        shows(page, "state-word", "^Live$")
+        for tab in ("board", "record", "labels", "view"):
+            page.locator(f"#tab-{tab}").click()
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390, tab
+        # The counters' widest texts, as on a slow board.
+        for name, text in {
+            "events": "120,000",
+            "frames": "20,833",
+            "latency": "134 / 134,218",
+            "lost": "12,345",
+        }.items():
+            page.locator(f"#{name}").evaluate("(place, text) => { place.textContent = text }", text)
+        edge = page.evaluate(
+            "Math.max(...[...document.querySelectorAll('header *')].map(e => e.getBoundingClientRect().right))"
+        )
+        assert edge <= 390
+        page.evaluate("window.scrollTo(0, document.body.scrollHeight)")
+        foot = page.locator("footer").bounding_box()
+        assert page.locator("header").bounding_box()["height"] + foot["height"] < 844 / 8
+        low = page.locator("aside").bounding_box()
+        assert low["y"] + low["height"] <= foot["y"]
+        for button in page.locator("footer button:visible, header button:visible").all():
+            assert min(button.bounding_box()["height"], button.bounding_box()["width"]) >= 44, button.inner_text()
 
 
 @pytest.mark.parametrize("motion", ["reduce", "no-preference"])
 def test_nothing_moves_by_itself_where_less_motion_is_wanted(chromium: Any, live: SimpleNamespace, motion: str) -> None:
-    page = opened(chromium, live.url, reduced_motion=motion)
-    shows(page, "state-word", "^Live$")
-    record_form(page, name=f"motion-{motion}", index="")
-    press(page, "r")
-    shows(page, "record-word", "^Stop$")
-    assert bool(page.evaluate("document.getAnimations().length")) is (motion == "no-preference")
-    press(page, "r")
-    shows(page, "record-word", "^Record$")
-    page.context.close()
+    with opened(chromium, live.url, motion=motion) as page:
+        shows(page, "state-word", "^Live$")
+        record_form(page, name=f"motion-{motion}", index="")
+        press(page, "r")
+        shows(page, "record-word", "^Stop$")
+        assert bool(page.evaluate("document.getAnimations().length")) is (motion == "no-preference")
+        press(page, "r")
+        shows(page, "record-word", "^Record$")
 
 
 def test_every_control_has_a_name_and_every_id_is_one(page: Any) -> None:

@@ -83,8 +83,10 @@ def test_play_label_train_and_watch_the_new_readout(
     name: str, written: Any, options: tuple[str, ...], extra: int, chromium: Any, tmp_path: Path
 ) -> None:
     truth = written(tmp_path)
-    with running("view", name, *options, "--no-open", folder=tmp_path) as server:
-        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+    with (
+        running("view", name, *options, "--no-open", folder=tmp_path) as server,
+        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
+    ):
         shows(page, "state-word", "^Replay$")
         shows(page, "detections-none", "None in this recording")
         press(page, "Space")
@@ -120,6 +122,4 @@ def test_play_label_train_and_watch_the_new_readout(
         assert (missed, len(heard) - len(wanted)) in (([], 0), ([], extra))
         low = page.locator("#detection-list").bounding_box()
         assert low["y"] + 40 < 900, "detections are in sight"
-        assert not page.errors
-        page.context.close()
     assert taxel.Readout.load(tmp_path / "played.readout.json").labels == ("contact", "lift")

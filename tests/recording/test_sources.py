@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loopback import until
+from shell import run
 
 import taxel
 from taxel import _core
@@ -155,23 +156,19 @@ def test_of_one_board_and_numbers_the_files_own_is_the_board(tmp_path: Path) -> 
 def test_the_command_line_shows_and_writes_one_source(
     several: tuple[Path, dict[str, taxel.Events]], tmp_path: Path
 ) -> None:
-    def command(*arguments: object) -> subprocess.CompletedProcess[str]:
-        line = [sys.executable, "-m", "taxel", *map(str, arguments)]
-        return subprocess.run(line, capture_output=True, text=True, check=False)
-
-    said = json.loads(command("info", several[0], "--json").stdout)["sources"]
+    said = json.loads(run("info", several[0], "--json").stdout)["sources"]
     assert {name: one.get("events", one.get("pictures")) for name, one in said.items()} == {
         "right": 30, "left": 20, "imu": 50, "given": 5,
     }  # fmt: skip
     assert said["imu"]["columns"] == ["ax", "ay"]
     assert abs(said["left"]["against"]["offset_us"]) < 60_000_000
-    assert command("convert", several[0], tmp_path / "imu.csv", "--source", "imu").returncode == 0
+    assert run("convert", several[0], tmp_path / "imu.csv", "--source", "imu").returncode == 0
     assert taxel.open(tmp_path / "imu.csv").frames().values.shape == (50, 1, 2)
-    assert command("cut", several[0], tmp_path / "left.npz", "--source", "left", "--to", "0.1").returncode == 0
-    refused = command("convert", several[0], tmp_path / "x.csv")
+    assert run("cut", several[0], tmp_path / "left.npz", "--source", "left", "--to", "0.1").returncode == 0
+    refused = run("convert", several[0], tmp_path / "x.csv")
     assert refused.returncode == 2
     assert refused.stderr.startswith(f"taxel: {several[0]}: holds 4 sources (right, left, imu, given)")
-    unknown = command("cut", several[0], tmp_path / "x.npz", "--source", "up")
+    unknown = run("cut", several[0], tmp_path / "x.npz", "--source", "up")
     assert unknown.stderr == f"taxel: --source up: {several[0]} holds right, left, imu, given\n"
 
 

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from shell import run
 
 import taxel
 from taxel import ProblemError, wire
@@ -83,20 +84,7 @@ def test_the_command_says_what_it_sent(listener):
     port, heard, hear = listener
     thread = threading.Thread(target=hear)
     thread.start()
-    command = [
-        sys.executable,
-        "-m",
-        "taxel",
-        "emulate",
-        "--port",
-        str(port),
-        "--scenes",
-        "0",
-        "--tare",
-        "0.002",
-        "--json",
-    ]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    ended = run("emulate", "--port", port, "--scenes", 0, "--tare", 0.002, "--json")
     thread.join()
     said = json.loads(ended.stdout)
     assert said["bytes"] == sum(map(len, heard))
@@ -104,8 +92,7 @@ def test_the_command_says_what_it_sent(listener):
 
 
 def test_the_command_refuses_a_preset_that_is_none():
-    command = [sys.executable, "-m", "taxel", "emulate", "--preset", "9 kHz"]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    ended = run("emulate", "--preset", "9 kHz")
     assert ended.returncode == 2
     assert ended.stderr.count("\n") == 1
     assert "5.2 kHz" in ended.stderr
@@ -116,9 +103,9 @@ def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
     thread = threading.Thread(target=hear)
     thread.start()
     labels = tmp_path / "labels.csv"
-    command = [sys.executable, "-m", "taxel", "emulate", "--port", str(port), "--scenes", "1", "--seed", "3"]
+    arguments = ["emulate", "--port", str(port), "--scenes", "1", "--seed", "3", "--truth", str(labels)]
     began = time.time_ns()
-    process = subprocess.Popen([*command, "--truth", str(labels)], stderr=subprocess.DEVNULL)
+    process = subprocess.Popen([sys.executable, "-m", "taxel", *arguments], stderr=subprocess.DEVNULL)
     while process.poll() is None:
         if labels.exists() and labels.read_text().count("\n") > 1:
             break
@@ -135,7 +122,7 @@ def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
     host = [row.host_ns for row in rows]
     assert began < host[0] < host[-1] < ended
     np.testing.assert_allclose(np.diff(host), 1000 * np.diff(times), atol=2000)
-    again = subprocess.run([*command, "--truth", str(labels)], capture_output=True, text=True, timeout=60, check=False)
+    again = run(*arguments)
     assert (again.returncode, again.stdout) == (2, "")
     assert str(labels) in again.stderr
 
