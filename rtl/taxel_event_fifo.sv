@@ -3,7 +3,10 @@
 // It gives one every other clock at most: nothing but `ready` waits for `pop`, which is known late in a clock.
 module taxel_event_fifo #(
     parameter int DEPTH = 4096,
-    parameter int BITS = 47
+    parameter int BITS = 47,
+    // Of the memories in which the ring lies side by side: as wide as a RAM block of its depth is. A wider one becomes blocks of
+    // a part of the depth each, and to choose between these takes too long behind outputs that come late.
+    parameter int WIDTH = DEPTH > 8192 ? 1 : DEPTH > 4096 ? 2 : DEPTH > 2048 ? 4 : DEPTH > 1024 ? 9 : 18
 ) (
     input  logic            clk,
     input  logic            reset,
@@ -17,11 +20,11 @@ module taxel_event_fifo #(
 );
 
   localparam int PLACES = $clog2(DEPTH);
+  localparam int SLICES = (BITS + WIDTH - 1) / WIDTH;
 
-  logic [BITS-1:0] ring[DEPTH];
   logic [PLACES-1:0] write, read;
   logic [PLACES:0] waiting;  // in the ring
-  logic [BITS-1:0] fetched;
+  logic [SLICES-1:0][WIDTH-1:0] fetched;
   logic fetched_valid, fetch, move;
   logic none;  // waits
 
@@ -29,15 +32,17 @@ module taxel_event_fifo #(
   assign move  = fetched_valid && !ready;
   assign fetch = !none && (!fetched_valid || move);
 
+  for (genvar k = 0; k < SLICES; k++) begin : g_slice
+    logic [WIDTH-1:0] ring[DEPTH];
+    always_ff @(posedge clk) begin
+      if (push) ring[write] <= WIDTH'(entered >> (k * WIDTH));
+      if (fetch) fetched[k] <= ring[read];
+    end
+  end
+
   always_ff @(posedge clk) begin
-    if (push) begin
-      ring[write] <= entered;
-      write       <= write == PLACES'(DEPTH - 1) ? '0 : write + PLACES'(1);
-    end
-    if (fetch) begin
-      fetched <= ring[read];
-      read    <= read == PLACES'(DEPTH - 1) ? '0 : read + PLACES'(1);
-    end
+    if (push) write <= write == PLACES'(DEPTH - 1) ? '0 : write + PLACES'(1);
+    if (fetch) read <= read == PLACES'(DEPTH - 1) ? '0 : read + PLACES'(1);
     // What the count will be is not waited for: whether a word is fetched is known late in a clock.
     if (push != fetch) begin
       waiting <= push ? waiting + (PLACES + 1)'(1) : waiting - (PLACES + 1)'(1);
@@ -46,7 +51,7 @@ module taxel_event_fifo #(
     end
     if (fetch) fetched_valid <= 1'b1;
     else if (move) fetched_valid <= 1'b0;
-    if (move) oldest <= fetched;
+    if (move) oldest <= BITS'(fetched);
     if (move) ready <= 1'b1;
     else if (pop) ready <= 1'b0;
     if (reset) begin

@@ -34,7 +34,8 @@ module taxel_status_sender
     DIGITS,   // a count becomes digits, a bit a clock
     LOOK,     // a character is looked up for each kind of line
     LETTER,   // that of this kind is taken
-    SENDING   // and waits for the serial line
+    SENDING,  // and waits for the serial line
+    NEXT      // the next one is turned to, a clock later: when the line is ready is known late in a clock
   } state_t;
 
   state_t state;
@@ -198,15 +199,14 @@ module taxel_status_sender
           state        <= DIGITS;
         end
       end
-      default: begin
-        if (taken || letter == 8'd0) begin
-          at    <= at + 6'd1;
-          state <= letter_last ? IDLE : LOOK;
-          if (!counting && line.kind == ANSWER_OK && at >= 6'd10) line.value <= line.value << 4;
-          if (counting && at >= 6'(NAME)) begin
-            if (letter != 8'd0) zeros <= 1'b0;
-            digits <= digits << 4;
-          end
+      SENDING: if (taken || letter == 8'd0) state <= NEXT;
+      default: begin  // NEXT
+        at    <= at + 6'd1;
+        state <= letter_last ? IDLE : LOOK;
+        if (!counting && line.kind == ANSWER_OK && at >= 6'd10) line.value <= line.value << 4;
+        if (counting && at >= 6'(NAME)) begin
+          if (letter != 8'd0) zeros <= 1'b0;
+          digits <= digits << 4;
         end
       end
     endcase

@@ -16,8 +16,7 @@ module taxel_uart_tx #(
   logic [3:0] bits;  // how many are still to go
   logic [BITS-1:0] left;
 
-  assign ready = bits == 0;
-  assign tx    = shift[0];
+  assign tx = shift[0];
 
   always_ff @(posedge clk) begin
     if (ready) begin
@@ -25,17 +24,20 @@ module taxel_uart_tx #(
       if (valid) begin
         shift <= {1'b1, data, 1'b0};
         bits  <= 4'd10;
+        ready <= 1'b0;
       end
     end else if (left == BITS'(1)) begin
       left  <= BITS'(CLOCKS);
       shift <= {1'b1, shift[9:1]};
       bits  <= bits - 4'd1;
+      ready <= bits == 4'd1;
     end else begin
       left <= left - BITS'(1);
     end
     if (reset) begin
       shift <= '1;
       bits  <= '0;
+      ready <= 1'b1;
     end
   end
 

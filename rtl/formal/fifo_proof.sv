@@ -16,7 +16,7 @@ module fifo_proof (
   assign push = begun && wants && !full;
   assign pop  = begun && accepts && ready;
 
-  taxel_event_fifo #(.DEPTH(DEPTH), .BITS(4)) queue (
+  taxel_event_fifo #(.DEPTH(DEPTH), .BITS(4), .WIDTH(2)) queue (
       .clk, .reset(!begun), .push, .entered(word), .full, .empty, .ready, .oldest, .pop
   );
 

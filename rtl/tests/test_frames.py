@@ -148,6 +148,39 @@ def test_a_full_frame_of_64_by_64_goes_without_a_loss(version):
     assert "fault queue" not in pair.serial
 
 
+#: Version of the wire, the ramp (wide values above 255 ticks), whether events carry their frame's time; then the clocks
+#: that a taxel takes at most where all of a frame change.
+PACES = [(1, 150, True, 10.0), (2, 150, True, 3.04), (2, 510, True, 4.12), (2, 150, False, 3.2), (2, 510, False, 4.6)]
+
+
+@pytest.mark.parametrize(("version", "ramp", "frame_sync", "most"), PACES)
+def test_a_taxel_takes_so_many_clocks(version, ramp, frame_sync, most):
+    assert 0.98 * most < pace(version, ramp, frame_sync) <= most
+
+
+def pace(version: int, ramp: int, frame_sync: bool) -> float:
+    """Return clocks a taxel of a frame in which all change: the queue holds them, and the link is always ready."""
+    pair = Pair(64, 64)
+    held = pair.board.registers
+    preset = held.with_preset("2 kHz").replace(ramp=ramp, wire_version=version, frame_sync=frame_sync)
+    pair.write(held.commands_to(preset))
+    logic = pair.logic
+    logic.datagrams()
+    logic.call("link", 0)
+    logic.ticks(np.full((64, 64), ramp - 1, np.uint16))
+    logic.edge()
+    logic.edge()
+    logic.call("link", 256)
+    decoder, ends, events = Decoder(version), [], []
+    while sum(events) < 4096:
+        logic.run(4)
+        for datagram in logic.datagrams():
+            ends.append(logic.call("clock"))
+            events.append(len(decoder.push(datagram)))
+    # Two datagrams of version 2 stood in the buffer, and the last one is short.
+    return (ends[-2] - ends[2]) / sum(events[3:-1])
+
+
 def test_what_finds_no_room_is_dropped_counted_and_sent_later():
     pair = Pair(8, 8, QUEUE=16)
     pair.logic.call("link", 0)

@@ -58,11 +58,8 @@ PROOFS = (
             (FIFO, "fetch && waiting ==", "waiting =="),
             (FIFO, "none && !fetched_valid && !ready", "none && !ready"),
             (FIFO, "write == PLACES'(DEPTH - 1)", "write == PLACES'(DEPTH - 2)"),
-            (
-                FIFO,
-                "if (push) begin\n      ring[write] <= entered;",
-                "if (push) begin\n      if (!fetch) ring[write] <= entered;",
-            ),
+            (FIFO, "if (push) ring[write]", "if (push && !fetch) ring[write]"),
+            (FIFO, "entered >> (k * WIDTH)", "entered >> k"),
             (FIFO, "else if (pop) ready <= 1'b0;", ""),
         ),
     ),
