@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from taxel.detect import Outcome, Score
-    from taxel.recording import Recording
+    from taxel.recording import Recording, Verdict
 
 __all__ = ["detect"]
 
@@ -121,7 +121,7 @@ def detect(
 
 def _warn_of_losses(recording: Recording) -> None:
     """Warn of what was lost or damaged, as detections may lack or have wrong times."""
-    if "LOST" in recording.verdict or "in the bytes that came" in recording.verdict:
+    if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
         warnings.warn(f"{recording.title}: {recording.verdict}", stacklevel=2)
 
 
@@ -138,7 +138,7 @@ def _result(
     recording: Path,
     readout: Path,
     outcomes: Sequence[Outcome],
-    verdicts: Sequence[str],
+    verdicts: Sequence[Verdict],
     together: Score | None,
     window_ms: float,
 ) -> dict[str, Any]:
@@ -147,6 +147,7 @@ def _result(
         {
             "recording": one.name,
             "verdict": verdict,
+            "verdict_details": verdict.to_dict(),
             "outside": one.outside,
             "hint": _hint(one),
             "detections": [
