@@ -198,6 +198,19 @@ def test_info_counts_missing_values_readings_at_full_scale_and_gaps(tmp_path, ca
     assert all(f"  {name:<20}" in shown for name in ("missing values", "full scale", "gaps"))
 
 
+@pytest.mark.parametrize("seed", [3, 19])
+def test_the_tail_of_noise_is_not_at_full_scale(seed, tmp_path, capsys) -> None:
+    """With seed 19 two taxels read the greatest value of all in three pictures each."""
+    values = np.rint(np.random.default_rng(seed).normal(500, 6.6, (40_000, 2, 2)))
+    top = values.max()
+    at_top = np.count_nonzero(values == top, axis=0)
+    assert (np.count_nonzero(at_top >= 3) > 1) == (seed == 19)
+    for name, kept, cut_off in (("noise", values, None), ("cut", np.minimum(4 * values, 2060), 2060)):
+        frames = taxel.Frames(kept, np.arange(40_000) * 1000, unit="counts")
+        facts = facts_of(frames, tmp_path / f"{name}.npz", capsys)
+        assert (facts["full_scale"] or {"value": None})["value"] == cut_off, name
+
+
 def facts_of(frames: taxel.Frames, place: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
     taxel.convert(frames, place)
     code, shown, _ = call(capsys, "info", place, "--json")

@@ -11,8 +11,8 @@ import pytest
 from making import made
 from stated import examples, graded
 
-from taxel import Neuron, ProblemError, SpikeTrains
-from taxel.learn import Certificate, ConeR, ConeX, ConeXProblem, Row, check_certificate
+from taxel import Neuron, ProblemError, SpikeTrains, _core
+from taxel.learn import Certificate, ConeR, ConeX, ConeXProblem, Row, check_certificate, check_gap, check_solution
 from taxel.learn._statement import pattern_rows
 
 
@@ -219,6 +219,36 @@ def test_the_check_states_its_rows_itself(time, monkeypatch):
     monkeypatch.setattr(ConeXProblem, "row", none)
     cone.problem_._problem = cone.problem_.lb = cone.problem_.ub = None
     assert check_certificate(cone.problem_, cone.certificate_)
+
+
+#: What checks the arguments of a learner, a neuron and trains; it computes nothing of a proof.
+OF_ARGUMENTS = {"parameters", "check_parameters", "check_spikes"}
+
+
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+def test_the_three_checks_need_no_compiled_code(time, monkeypatch):
+    """Each function of the compiled part raises, except those that check arguments."""
+    refused = refuted(3, time=time)
+    trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
+    margin = {"margin": 1e-3} if time == "grid" else {}
+    solved = ConeX(neuron=Neuron(tau=10.0, time=time), lb=-1.0, ub=1.0, **margin).fit([trains], [[20.0]])
+    relaxed = ConeR(neuron=Neuron(tau=10.0), lb=-1.0, ub=1.0).fit([trains], [[20.0]])
+
+    def none(*_, **__):
+        raise AssertionError("compiled code was asked for")
+
+    for name in dir(_core):
+        one = getattr(_core, name)
+        an_error = isinstance(one, type) and issubclass(one, Exception)
+        if callable(one) and not name.startswith("__") and name not in OF_ARGUMENTS and not an_error:
+            monkeypatch.setattr(_core, name, none)
+    refused.problem_._problem = solved.problem_._problem = None
+    with pytest.raises(AssertionError, match="compiled code"):
+        solved.predict([trains])
+    assert check_certificate(refused.problem_, refused.certificate_)
+    assert check_solution(solved, [trains], [[20.0]])
+    assert check_gap(solved, [trains], [[20.0]]) <= 2 * solved.tolerance
+    assert check_gap(relaxed, [trains], [[20.0]]) <= 2 * relaxed.tolerance
 
 
 @pytest.mark.parametrize("kernel", ["alpha", "double_exponential", "exponential"])

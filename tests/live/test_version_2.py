@@ -23,7 +23,7 @@ def test_a_recording_of_version_2_says_that_nothing_was_lost(tmp_path):
     assert summary.counters["wire_version"] == 2
     assert summary.counters["wire"]["bytes"] == 0
     assert summary.counters["wire_v2"]["missing"] == 0
-    assert summary.verdict == "nothing lost"
+    assert (summary.verdict, summary.verdict.status) == ("nothing lost", "complete")
     recording = taxel.open(tmp_path / "two.mcap")
     events = recording.events
     repaired = summary.counters["wire_v2"]["repaired"]
@@ -42,10 +42,11 @@ def test_the_numbers_of_a_verdict_are_those_of_the_recording(tmp_path, capsys):
         emulate("{}:{}".format(*live.address), acts, seed=1, tare_ms=20.0, wire=2, faults=faults)
         verdict = live.stop().verdict
     recording = taxel.open(path)
-    assert recording.verdict == verdict
+    assert (recording.verdict, recording.verdict.to_dict()) == (verdict, verdict.to_dict())
+    assert verdict.status == "lost"
     said = {what: int(n) for n, what in re.findall(r"(\d+) ([^,;]+)", verdict)}
     found = recording.counts["decoder_version_2"]
-    assert said["datagrams lost or damaged on the way"] == found["missing"] > 5
+    assert said["datagrams lost or damaged on the way"] == found["missing"] == verdict.lost["lost_on_the_way"] > 5
     assert said["datagrams damaged"] == sum(found[cause] for cause in ("checksum", "short", "foreign")) > 5
     assert said.get("values repaired from the board's refresh", 0) == found["repaired"]
     _, printed, _ = call(capsys, "info", path)

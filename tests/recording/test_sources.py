@@ -64,11 +64,15 @@ def record_all(path: Path) -> dict[str, taxel.Events]:
         until(lambda: lines(live, "imu") == 51)
         until(lambda: live.counters["sources"]["left"]["decoded"] == 20 and live.counters["decoded"] == 30)
         live.note("standing")
-        counts = live.stop().counters["sources"]
+        summary = live.stop()
+        counts, verdict = summary.counters["sources"], summary.verdict
     os.close(ours)
     os.close(theirs)
     assert counts["imu"] == {"lines": 51, "strange": 1, "trouble": None}
     assert counts["given"]["lines"] == 5
+    assert verdict.parts["imu"].damaged == verdict.damaged == {"lines_that_could_not_be_read": 1}
+    assert (verdict.status, verdict.parts["left"].status) == ("damaged", "complete after arrival")
+    assert taxel.open(path).verdict.to_dict() == verdict.to_dict()
     assert counts["left"]["events"] == 20
     return sent
 

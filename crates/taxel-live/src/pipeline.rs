@@ -413,7 +413,8 @@ impl Live {
         let recorder = lock(&self.shared.recording.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
         let lost = recorder::losses(&counters, None);
-        let verdict = recordings::verdict(self.place(), &counters, counters.nothing_came(), &lost);
+        let verdict =
+            recordings::verdict(&self.shared.options.name, self.place(), &counters, counters.nothing_came(), &lost);
         joined?;
         self.check()?;
         ended?;

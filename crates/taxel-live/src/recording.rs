@@ -19,6 +19,7 @@ mod output;
 mod pictures;
 mod stream;
 mod topic;
+mod verdict;
 
 use std::collections::BTreeMap;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -37,6 +38,9 @@ pub use output::OutputFile;
 pub use pictures::{Encoding, PictureSource, Pictures};
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
+pub(crate) use verdict::JUMPS;
+use verdict::{BOARD_DROPPED, BOARD_RESET, REPAIRED, REPEATED};
+pub use verdict::{Basis, Condition, Found, NOTHING_LOST, Status, Verdict};
 
 /// Longest time that a datagram waits until its chunk is closed and passed to the operating system.
 ///
@@ -50,9 +54,6 @@ pub const PICTURE_EVERY: Duration = Duration::from_millis(100);
 /// Age of the oldest queued message at which the writing thread counts as starved of the processor: the next caller
 /// writes the queue.
 pub const LATE: Duration = Duration::from_millis(40);
-
-/// The verdict on version 1 when nothing was dropped between the socket and the file.
-pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
 
 /// The properties of a recording, stored at its beginning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -172,7 +173,7 @@ pub struct Counts {
     pub missing: Option<u64>,
     /// The verdict of the recording that this one was converted from.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub converted: Option<String>,
+    pub converted: Option<Verdict>,
 }
 
 impl Header {
@@ -268,80 +269,25 @@ fn check_name(name: &str) -> taxel_core::Result<()> {
     Ok(())
 }
 
-/// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
-const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
-/// ... resets, and values that differed from the board's own, as their events were lost.
-const BOARD_RESET: &str = "resets";
-const REPAIRED: &str = "events_repaired";
-
 impl Counts {
-    /// The verdict in one line: nothing lost after arrival, or what was lost where.
+    /// The verdict: nothing lost after arrival, or what was lost where.
     #[must_use]
-    pub fn verdict(&self) -> String {
-        let missing = self.received.saturating_sub(self.dropped_by_queue + self.recorded);
-        let bridged = self.bridged.as_deref().copied().unwrap_or_default();
-        let of_board = |cause: &str| self.decoder.get(cause).copied().unwrap_or(0);
-        let lost: Vec<String> = [
-            (of_board(BOARD_DROPPED), "times that the board dropped events"),
-            (self.dropped_by_kernel, "messages dropped by the kernel"),
-            (self.dropped_by_queue, "datagrams dropped by taxel's queue"),
-            (missing, "datagrams received but not recorded"),
-            (bridged.missing, "datagrams lost between the computers"),
-            (bridged.dropped, "datagrams dropped by the other computer"),
-            (bridged.dropped_by_kernel, "messages dropped by the other computer's kernel"),
-            (self.missing.unwrap_or(0), "datagrams lost or damaged on the way"),
-        ]
-        .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, what)| format!("{n} {what}"))
-        .collect();
-        let damage: Vec<String> = self
-            .decoder
-            .iter()
-            .filter(|(cause, n)| **n > 0 && ![BOARD_DROPPED, BOARD_RESET, REPAIRED].contains(&cause.as_str()))
-            .map(|(cause, n)| format!("{n} {}", cause.replace('_', " ")))
-            .collect();
-        let mut line = if lost.is_empty() && self.missing.is_some() {
-            "nothing lost".to_owned()
-        } else if lost.is_empty() {
-            NOTHING_LOST.to_owned()
-        } else {
-            format!("LOST: {}", lost.join(", "))
-        };
-        if !damage.is_empty() {
-            line = format!("{line}; in the bytes that came: {}", damage.join(", "));
-        }
-        for (n, what) in [
-            (of_board(REPAIRED), "values repaired from the board's refresh"),
-            (of_board(BOARD_RESET), "resets of the board"),
-        ] {
-            if n > 0 {
-                line = format!("{line}; {n} {what}");
-            }
-        }
-        if bridged.silences > 0 || bridged.restarts > 0 {
-            line = format!(
-                "{line}; the other computer was silent for a second or more {} times, and began anew {} times",
-                bridged.silences, bridged.restarts
-            );
-        }
-        if let Some(verdict) = &self.converted {
-            line.clone_from(verdict);
-        }
-        line
+    pub fn verdict(&self) -> Verdict {
+        Verdict::of_counts(self, NOTHING_LOST)
     }
 }
 
-/// What a decoder could not use, by cause, as recordings store it.
+/// What a decoder could not use, by cause, as recordings store it; `jumps` are those of [`wire::Ahead`].
 #[must_use]
-pub fn damage(counts: &wire::Counts) -> BTreeMap<String, u64> {
+pub fn damage(counts: &wire::Counts, jumps: u64) -> BTreeMap<String, u64> {
     [
         ("bytes_skipped", counts.skipped),
         ("short_events", counts.short),
         ("contradictory_kinds", counts.contradictory),
         ("outside_the_array", counts.outside),
         ("unpaired_intensities", counts.unpaired),
-        ("steps_back_in_time", counts.back),
+        ("events_out_of_order", counts.back),
+        (JUMPS, jumps),
     ]
     .map(|(cause, n)| (cause.to_owned(), n))
     .into()
@@ -352,7 +298,7 @@ pub fn damage(counts: &wire::Counts) -> BTreeMap<String, u64> {
 pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String, u64>, u64)> {
     let causes = [
         ("datagrams_damaged", counts.checksum + counts.short + counts.foreign),
-        ("datagrams_repeated", counts.repeated + counts.old),
+        (REPEATED, counts.repeated + counts.old),
         ("taxels_outside_the_array", counts.outside),
         ("datagrams_of_an_unknown_kind", counts.unknown_kind),
         ("malformed_bodies", counts.malformed),

@@ -143,7 +143,7 @@ fn what_came_there_comes_here_and_as_of_this_clock() {
     assert_eq!(received.counters.decoding.wire, sent.counters.decoding.wire);
     let bridged = came(&received);
     assert_eq!((bridged.missing, bridged.dropped, bridged.refused, bridged.ended), (0, 0, 0, true));
-    assert!(received.verdict.starts_with("nothing lost"), "{}", received.verdict);
+    assert!(received.verdict.text.starts_with("nothing lost"), "{}", received.verdict.text);
     let (there, here) = (near.recorded(), far.recorded());
     assert_eq!(there.len(), 3000);
     for (a, b) in there.iter().zip(&here) {
@@ -175,7 +175,7 @@ fn what_is_lost_repeated_or_spoilt_on_the_way_is_counted() {
     if bridged.ended {
         assert_eq!(came + bridged.missing, 3000);
     }
-    assert!(received.verdict.contains("lost between the computers"), "{}", received.verdict);
+    assert!(received.verdict.text.contains("lost between the computers"), "{}", received.verdict.text);
 }
 
 #[test]

@@ -121,7 +121,7 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
         } else {
             "nothing lost".to_owned()
         };
-        assert!(summary.verdict.starts_with(&verdict), "{}", summary.verdict);
+        assert!(summary.verdict.text.starts_with(&verdict), "{}", summary.verdict.text);
         let reader = Reader::open(&path.0).expect("a recording");
         let read = reader.decode(Pairing::Direct, Stop::never()).expect("sound chunks");
         let expected = decoded(&array, &sent);

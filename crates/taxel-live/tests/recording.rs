@@ -86,8 +86,8 @@ fn what_was_written_is_read_back_with_any_compression() {
         );
         assert_eq!(remarks.registers[0].1, header().registers.unwrap());
         assert_eq!((remarks.datagrams, remarks.datagram_bytes, remarks.pictures), (3000, 4_200_000, 1));
-        let Some(Ending::Finished { counts, verdict }) = reader.ending() else { panic!("not finished") };
-        assert_eq!((counts.received, counts.recorded, verdict.as_str()), (3000, 3000, NOTHING_LOST));
+        let Some(Ending::Finished { counts }) = reader.ending() else { panic!("not finished") };
+        assert_eq!((counts.received, counts.recorded, counts.verdict().text.as_str()), (3000, 3000, NOTHING_LOST));
     }
 }
 
@@ -260,14 +260,14 @@ fn wrong_files_are_refused_in_one_line() {
 #[test]
 fn the_verdict_states_what_was_lost_where() {
     let sound = Counts { received: 10, recorded: 10, ..Counts::default() };
-    assert_eq!(sound.verdict(), NOTHING_LOST);
+    assert_eq!(sound.verdict().text, NOTHING_LOST);
     let lossy = Counts { received: 10, recorded: 6, dropped_by_kernel: 2, dropped_by_queue: 3, ..Counts::default() };
-    let verdict = lossy.verdict();
+    let verdict = lossy.verdict().text;
     for part in
         ["LOST: 2 messages dropped by the kernel", "3 datagrams dropped by taxel's queue", "1 datagrams received"]
     {
         assert!(verdict.contains(part), "{verdict}");
     }
     let damaged = Counts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
-    assert_eq!(damaged.verdict(), format!("{NOTHING_LOST}; in the bytes that came: 7 skipped"));
+    assert_eq!(damaged.verdict().text, format!("{NOTHING_LOST}; in the bytes that came: 7 skipped"));
 }

@@ -144,7 +144,7 @@ async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> 
     let handle = live.handle.clone();
     let ended = tokio::task::spawn_blocking(move || handle.end_recording()).await.map_err(|_| failed())?;
     match ended.map_err(|error| error.to_string())? {
-        Summary { path: Some(_), verdict, .. } => Ok(verdict),
+        Summary { path: Some(_), verdict, .. } => Ok(verdict.text),
         Summary { path: None, .. } => Err("no datagrams arrived during the recording: no file was written".to_owned()),
     }
 }

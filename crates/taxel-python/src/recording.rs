@@ -12,7 +12,8 @@ use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, wire};
 use taxel_live::clock::{self, BoardClock};
 use taxel_live::recording::{
-    BoardChange, Counts, Encoding, Header, LsaWriter, Reader, Track, Writer, WriterOptions, decode_lsa, numbered,
+    Basis, BoardChange, Counts, Encoding, Header, LsaWriter, Reader, Track, Verdict, Writer, WriterOptions, decode_lsa,
+    numbered,
 };
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
@@ -22,7 +23,7 @@ use crate::parameters::parsed;
 use crate::threaded::Threaded;
 
 /// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram; counts of version 2 as JSON; when
-/// each datagram could leave the board, us.
+/// each datagram could leave the board, us; what a verdict takes from decoding, as JSON.
 type DecodedOut<'py> = (
     EventsOut<'py>,
     String,
@@ -32,6 +33,7 @@ type DecodedOut<'py> = (
     Bound<'py, PyArray1<u64>>,
     String,
     Bound<'py, PyArray1<i64>>,
+    String,
 );
 
 /// Arrival ns, number and own time us of each sample, all values, lines that could not be read, how often the clock began anew.
@@ -103,7 +105,7 @@ impl RecordingReader {
             "registers": all.registers, "markers": markers, "notes": all.notes, "detections": detections,
             "board": all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>(),
             "counts": all.counts, "datagrams": all.datagrams, "datagram_bytes": all.datagram_bytes,
-            "arrivals": all.arrivals, "pictures": all.pictures, "bad_chunks": bad_chunks,
+            "skipped_numbers": all.skipped_numbers(), "arrivals": all.arrivals, "pictures": all.pictures, "bad_chunks": bad_chunks,
             "samples": all.samples, "held": all.held, "zeroings": all.zeroings,
         });
         Ok(remarks.to_string())
@@ -122,6 +124,7 @@ impl RecordingReader {
             array(py, decoded.first),
             json!(decoded.version_2).to_string(),
             array(py, decoded.left),
+            json!(decoded.found).to_string(),
         ))
     }
 
@@ -332,16 +335,16 @@ impl RecordingWriter {
     }
 }
 
-/// The verdict line of counts given as JSON.
+/// The verdict of what is known of a recording: JSON in and out.
 #[pyfunction]
-fn recording_verdict(counts: &str) -> PyResult<String> {
-    Ok(parsed::<Counts>("counts", counts)?.verdict())
+fn recording_verdict(basis: &str) -> PyResult<String> {
+    Ok(json!(Verdict::of(parsed::<Basis>("verdict", basis)?)).to_string())
 }
 
 /// The damage among a decoder's counts: JSON in and out.
 #[pyfunction]
 fn recording_damage(counts: &str) -> PyResult<String> {
-    Ok(json!(taxel_live::recording::damage(&parsed("counts", counts)?)).to_string())
+    Ok(json!(taxel_live::recording::damage(&parsed("counts", counts)?, 0)).to_string())
 }
 
 /// Writes raw bytes as a complete `.lsa` with its `.lss`.

@@ -208,7 +208,7 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
 
     capture, wire, earlier = now["capture"], now["wire"], before["capture"]
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
-    damage, lost = f"{damaged:,} bytes and words, {wire['back']:,} steps back in time", ""
+    damage, lost = f"{damaged:,} bytes and words, {wire['back']:,} events out of order", ""
     if now["wire_version"] == 2:
         second = now["wire_v2"]
         damaged = second["checksum"] + second["short"] + second["foreign"] + second["malformed"]

@@ -111,7 +111,11 @@ def bridge(
         counts = published.counts
     if as_json:
         path = None if summary.path is None else str(summary.path)
-        typer.echo(json.dumps(asdict(summary) | {"path": path, "published": counts}))
+        typer.echo(
+            json.dumps(
+                asdict(summary) | {"path": path, "published": counts, "verdict_details": summary.verdict.to_dict()}
+            )
+        )
     else:
         sent = counts["block"]["sent"] + counts["drop"]["sent"]
         received = counted(summary.counters["capture"]["datagrams"], "datagram")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from taxel.detect import Outcome, PlainRule, Readout, Score
-    from taxel.recording import Recording
+    from taxel.recording import Recording, Verdict
 
 __all__ = ["detect"]
 
@@ -123,7 +123,7 @@ def detect(
 
 def _warn_of_losses(recording: Recording) -> None:
     """Warn of what was lost or damaged, as detections may lack or have wrong times."""
-    if "LOST" in recording.verdict or "in the bytes that came" in recording.verdict:
+    if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
         warnings.warn(f"{recording.title}: {recording.verdict}", stacklevel=2)
 
 
@@ -141,7 +141,7 @@ def _result(
     readout: Path,
     loaded: Readout | PlainRule,
     outcomes: Sequence[Outcome],
-    verdicts: Sequence[str],
+    verdicts: Sequence[Verdict],
     together: Score | None,
     window_ms: float,
 ) -> dict[str, Any]:
@@ -150,6 +150,7 @@ def _result(
         {
             "recording": one.name,
             "verdict": verdict,
+            "verdict_details": verdict.to_dict(),
             "outside": one.outside,
             "hint": _hint(one, loaded),
             "detections": [

@@ -160,7 +160,8 @@ def _sources(recording: Recording, tare: str | None, *, drawn: bool) -> dict[str
                 "drift_ppm": clock.drift_ppm - ours.drift_ppm,
             }
         sources[name] = facts
-    of_all = {"verdict": recording.verdict, "remarks": list(recording.remarks)}
+    verdict = recording.verdict
+    of_all = {"verdict": verdict, "verdict_details": verdict.to_dict(), "remarks": list(recording.remarks)}
     return {"file": str(recording.path), **of_all, "sources": sources}
 
 

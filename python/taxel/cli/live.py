@@ -194,7 +194,7 @@ def live(typed: _Typed) -> None:
     report_viewers(external, quiet=typed.as_json)
     if not typed.as_json:
         _print_summary(summary, typed.guard_frames)
-    elif summary.nothing_came or summary.lost:
+    elif summary.verdict.status in ("damaged", "lost", "nothing arrived"):
         typer.echo(f"taxel: {summary.verdict}", err=True)
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]

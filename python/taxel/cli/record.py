@@ -267,7 +267,7 @@ def _sources(texts: list[str]) -> dict[str, str]:
 def _print(summary: Summary, as_json: bool) -> None:
     if as_json:
         path = None if summary.path is None else str(summary.path)
-        typer.echo(json.dumps(asdict(summary) | {"path": path}))
+        typer.echo(json.dumps(asdict(summary) | {"path": path, "verdict_details": summary.verdict.to_dict()}))
         return
     counters = summary.counters
     if summary.path is not None:

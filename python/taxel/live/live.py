@@ -232,7 +232,8 @@ class Live:
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
-        `wire_late` (events of version 2 that arrived after time had passed theirs), `arrived_ns` (when the latest
+        `wire_late` (events of version 2 that arrived after time had passed theirs), `wire_jumps` (of the times of
+        version 1 ahead of this computer's clock), `arrived_ns` (when the latest
         datagram arrived, ns since 1970, or None), `heartbeat_us` (the longest interval between heartbeats of a board of
         version 2, or None), `arrival` (state: "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s,
         heartbeat_us; not of one that has ended), `bridged` (None, or of a board

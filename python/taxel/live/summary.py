@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 
 __all__ = ["Summary", "delays"]
@@ -20,8 +21,9 @@ class Summary:
     ----------
     counters : dict
         As `Live.counters`, at the end.
-    verdict : str
-        One line: that nothing was lost after arrival, what was lost where, or that nothing arrived.
+    verdict : Verdict
+        That nothing was lost after arrival, what was lost where, or that nothing arrived: a line of text with a status
+        and numbers by cause (`taxel.recording.Verdict`).
     path : Path or None
         The recording; None if nothing arrived: then a new file is removed, and an earlier one stays.
     tare : Tare or None
@@ -37,7 +39,7 @@ class Summary:
     """
 
     counters: dict[str, Any]
-    verdict: str
+    verdict: Verdict
     path: Path | None
     tare: Tare | None
 
@@ -64,7 +66,7 @@ def summary_of(text: str) -> Summary:
     values = json.loads(text)
     path = None if values["path"] is None else Path(values["path"])
     tare = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
-    return Summary(values["counters"], values["verdict"], path, tare)
+    return Summary(values["counters"], Verdict._from(values["verdict"]), path, tare)
 
 
 def delays(measured: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ from taxel.recording.merge import merge
 from taxel.recording.notes import BoardChange, Datagrams, Zeroing
 from taxel.recording.opening import open_any, open_recording
 from taxel.recording.recording import Recording
+from taxel.recording.verdict import Verdict
 
 __all__ = [
     "ENDINGS",
@@ -17,6 +18,7 @@ __all__ = [
     "Datagrams",
     "Health",
     "Recording",
+    "Verdict",
     "Zeroing",
     "convert",
     "cut",

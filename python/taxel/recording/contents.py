@@ -20,6 +20,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording.notes import BoardChange, Datagrams, Samples, Zeroing
+from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "named", "once", "several", "together"]
@@ -122,8 +123,8 @@ class Contents:
         The name of the clock of all times, if it is not the source's own.
     counts : mapping
         What was received and lost, by cause.
-    verdict : str
-        What was lost, in one line; None if that is not known.
+    verdict : Verdict, or a line
+        What was lost; None if that is not known.
     remarks : tuple of str
         What else there is to know: by whose times it is, what was left out, what it was converted from.
     datagrams : Datagrams
@@ -261,15 +262,19 @@ def several(sources: Mapping[str, Contents]) -> Contents:
         notes=once(lambda: first.notes),
         detections=once(lambda: first.detections),
         counts=once(lambda: {name: one.counts for name, one in sources.items()}),
-        verdict=once(
-            lambda: "; ".join(f"{name}: {one.verdict}" for name, one in sources.items() if one.verdict) or None
-        ),
+        verdict=once(lambda: _verdict(sources)),
         remarks=once(lambda: named([(name, one.remarks) for name, one in sources.items()])),
         truncated=once(lambda: any(one.truncated for one in sources.values())),
         lost=once(lambda: tuple(dict.fromkeys(line for one in sources.values() for line in one.lost))),
         clock_of=first.clock_of,
         sources=sources,
     )
+
+
+def _verdict(sources: Mapping[str, Contents]) -> Verdict | None:
+    """Return what several sources lost, as far as they say it."""
+    said = [(name, one.verdict) for name, one in sources.items() if one.verdict is not None]
+    return Verdict._together(said) if said else None
 
 
 def named(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:

@@ -17,7 +17,9 @@ from taxel.detections import Detections
 from taxel.formats.checks import sensor
 from taxel.labels import Note
 from taxel.recording.contents import Contents
+from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import BoardChange, Zeroing
+from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = ["about_of", "array_of", "board_changes_of", "detections_of", "json_of", "notes_of", "zeroings_of"]
@@ -42,7 +44,7 @@ def json_of(contents: Contents) -> str:
             [0, d.label, d.t, d.known, None if np.isnan(d.slope) else d.slope, d.repaired] for d in contents.detections
         ],
         "counts": dict(contents.counts),
-        "verdict": contents.verdict,
+        "verdict": None if contents.verdict is None else verdict_of(contents).to_dict(),
         "remarks": contents.remarks,
         "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in contents.zeroings],
         "columns": contents.columns,
@@ -174,7 +176,8 @@ _ENTRIES: dict[str, Any] = {
     "notes": lambda value, _: notes_of(value),
     "detections": lambda value, _: detections_of(value),
     "counts": lambda value, _: _counts(value),
-    "verdict": lambda value, _: text("verdict", value),
+    # Earlier versions wrote its line alone.
+    "verdict": lambda value, _: Verdict(value) if isinstance(value, str) else Verdict.from_dict(value),
     "remarks": lambda value, _: _texts(value),
     "zeroings": lambda value, _: zeroings_of(value),
     "columns": lambda value, _: _texts(value),

@@ -8,6 +8,7 @@ from taxel._core import FormatError
 from taxel.formats.layout import advice
 from taxel.formats.ros import is_bag
 from taxel.recording.contents import Contents
+from taxel.recording.verdict import Verdict
 
 __all__ = ["ENDINGS", "is_label_table", "is_own_table", "kind_of", "kind_of_file", "verdict_of"]
 
@@ -67,10 +68,12 @@ def kind_of_file(kind: str) -> str:
 _OTHERS = {"arrays": "file of arrays", "table": "table", "ros": "ROS bag"}
 
 
-def verdict_of(contents: Contents) -> str:
-    """Return in one line what was lost of a recording, or that its file does not say it."""
+def verdict_of(contents: Contents) -> Verdict:
+    """Return what was lost of a recording, or that its file does not say it."""
     verdict = contents.verdict
-    return f"the {kind_of_file(contents.kind)} does not say what was lost" if verdict is None else verdict
+    if verdict is None:
+        return Verdict._of({"silent": kind_of_file(contents.kind)})
+    return verdict if isinstance(verdict, Verdict) else Verdict(verdict)
 
 
 def kind_of(path: Path) -> str:

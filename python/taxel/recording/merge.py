@@ -24,6 +24,7 @@ from taxel.recording.fates import after
 from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import Zeroing
 from taxel.recording.recording import Recording
+from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = ["merge", "merged"]
@@ -120,9 +121,8 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         lost.append("the calibration (it is of one of the sensors)")
     fields["zeroings"] = _zeroings(parts, shifts, lefts, lost, beside=beside)
     fields["held"] = _beside_held(parts, array, lefts) if beside else _held(parts, tables, shifts, lost)
-    verdicts = [verdict_of(part) for part in parts]
-    alike = len(set(verdicts)) == 1
-    verdict = verdicts[0] if alike else "; ".join(f"{p.name}: {v}" for p, v in zip(parts, verdicts, strict=True))
+    # Parts of one file have the verdict of the whole, which counts once.
+    verdicts = {(p.path, p.name, p.label, v): (p.name, v) for p in parts for v in (verdict_of(p),)}
     together = after(
         "merge",
         parts[0].but(lost=tuple(dict.fromkeys(line for part in parts for line in part.lost))),
@@ -137,7 +137,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         frames=frames,
         notes=_notes(parts, tables, shifts),
         detections=_detections(parts, shifts),
-        verdict=None if all(part.verdict is None for part in parts) else verdict,
+        verdict=None if all(p.verdict is None for p in parts) else Verdict._together(verdicts.values()),
         remarks=named([(part.name, part.remarks) for part in parts]),
         truncated=any(part.truncated for part in parts),
         **fields,

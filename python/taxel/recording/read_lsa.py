@@ -9,6 +9,7 @@ from taxel import _core
 from taxel.array import Array
 from taxel.events import Events
 from taxel.recording.contents import Contents
+from taxel.recording.verdict import Verdict
 
 __all__ = ["read_lsa"]
 
@@ -30,11 +31,8 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Conte
     OSError : the file cannot be read
     """
     payload, parts, decoder, complete = _core.read_lsa(path, array._parts(), pairing, differences)
-    damage = json.loads(_core.recording_damage(decoder))
-    _, _, damaged = _core.recording_verdict(json.dumps({"decoder": damage})).partition("; ")
-    verdict = [f"not finished, as {path.with_suffix('.lss').name} is not there"] * (not complete)
-    verdict += ["the .lsa does not say what was lost"]
-    verdict += [damaged] * bool(damaged)
+    unmarked = None if complete else path.with_suffix(".lss").name
+    verdict = Verdict._of({"raw": [unmarked, json.loads(_core.recording_damage(decoder))]})
     return Contents(
         path,
         path.name,
@@ -42,7 +40,7 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Conte
         array,
         events=Events._from_parts(parts, array),
         counts={"bytes": len(payload), "decoder": json.loads(decoder)},
-        verdict="; ".join(verdict),
+        verdict=verdict,
         remarks=("times after a silence of more than 6.45 s are short by whole turns of 6.5536 s",),
         payload=payload,
         differences=differences,

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.columns import frozen
-from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.clock import Clock
@@ -21,6 +20,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Contents, Once, alone, once
 from taxel.recording.description import array_of, board_changes_of, detections_of, notes_of, zeroings_of
 from taxel.recording.notes import Datagrams, Samples
+from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = ["ascending", "read_mcap"]
@@ -80,7 +80,7 @@ class _Source:
         decoded = Once(lambda: self.reader.decode(pairing))
         arrived = lambda: self.remarks()["datagrams"] > 0  # noqa: E731  the same for two fields
         return Contents(
-            **self.common | {"verdict": once(lambda: self.verdict(lambda: decoded()[6]))},
+            **self.common | {"verdict": once(lambda: self.verdict(decoded))},
             **self.remarked(),
             events=once(lambda: Events._from_parts(decoded()[0], self.array)),
             clock=once(lambda: _clock(decoded()), arrived),
@@ -192,16 +192,19 @@ class _Source:
 
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
-        counts = self.ending.get("finished", {}).get("counts") or self.remarks()["counts"] or {}
-        _, decoder, _, _, number, _, decoder_2, *_ = decoded
-        missing = int(number[-1]) - int(number[0]) + 1 - len(number) if len(number) else 0
+        remarks = self.remarks()
+        counts = self.ending.get("finished", {}).get("counts") or remarks["counts"] or {}
+        of_2 = json.loads(decoded[6])
+        # What this computer dropped or the file lost is missing among the board's numbers too, and is counted apart.
+        of_2["missing"] -= min(of_2["missing"], remarks["skipped_numbers"])
         return {
-            "datagrams": self.remarks()["datagrams"],
-            "bytes": self.remarks()["datagram_bytes"],
-            "missing_numbers": max(0, missing),
+            "datagrams": remarks["datagrams"],
+            "bytes": remarks["datagram_bytes"],
+            "missing_numbers": remarks["skipped_numbers"],
+            "lost_in_file": self.verdict(lambda: decoded).lost.get("lost_in_file", 0),
             **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
-            "decoder": json.loads(decoder),
-            **({"decoder_version_2": of_2} if (of_2 := json.loads(decoder_2))["datagrams"] else {}),
+            "decoder": json.loads(decoded[1]),
+            **({"decoder_version_2": of_2} if of_2["datagrams"] else {}),
             **self.rebuilt(),
         }
 
@@ -212,38 +215,32 @@ class _Source:
         damage = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
         return {**damage, "received": counts.get("received"), **self.rebuilt()}
 
-    def verdict(self, version_2: Callable[[], str] | None = None) -> str:
-        """Return in one line what was lost at which stage; `version_2` returns a board's counts of that wire, JSON."""
-        rebuilt = self.rebuilt()
-        bad = []
-        if rebuilt["large_chunks"]:
-            bad.append(f"{counted(rebuilt['large_chunks'], 'chunk')} skipped, stated to unpack to more than 64 MiB")
-        if rebuilt["bad_chunks"]:
-            bad.append(f"{counted(rebuilt['bad_chunks'], 'bad chunk')} skipped")
-        if rebuilt["gaps"]:
-            skipped = counted(rebuilt["skipped_bytes"], "byte")
-            bad.append(f"{skipped} of the file skipped in {counted(rebuilt['gaps'], 'place')}")
-        if rebuilt["torn_bytes"]:
-            bad.append(f"{counted(rebuilt['torn_bytes'], 'torn byte')} at the end")
-        skipped_inside = rebuilt["gaps"] or rebuilt["bad_chunks"] or rebuilt["large_chunks"]
-        lost = [f"LOST in the file: {', '.join(bad)}"] if bad else []
-        if "finished" in self.ending:
-            # Versions before wrote from what a recording was converted into its verdict.
-            recorded = str(self.ending["finished"]["verdict"]).rpartition("a recording that says: ")[2]
-            return "; ".join([*lost, "while recording: " * bool(bad) + recorded])
-        why = "not finished: what came last is missing"
-        if "stopped" in self.ending:
-            why = f"stopped by an error ({self.ending['stopped']}): what came last is missing"
-        so_far = self.remarks()["counts"]
-        known = "no counts were saved yet"
-        if so_far is not None and so_far.get("received"):
-            # If more was received than the file holds, the difference is in its unfinished end.
-            counts = {**so_far, "received": 0}
-            if version_2 is not None and so_far.get("missing") is not None and not skipped_inside:
-                # The file may hold more than its counts, which are saved now and then.
-                counts["missing"] = max(so_far["missing"], json.loads(version_2())["missing"])
-            known = _core.recording_verdict(json.dumps(counts))
-        return "; ".join([why, *lost, f"until then: {known}"])
+    def verdict(self, decoded: Callable[[], tuple[Any, ...]] | None = None) -> Verdict:
+        """Return what was lost at which stage; `decoded` decodes a board."""
+        opened, remarks = self.opened, self.remarks()
+        stream = self.header.get("stream") is not None
+        messages = remarks["samples" if stream else "datagrams"]
+        condition = {
+            "ending": self.ending or None,
+            "rebuilt": opened,
+            "bad_chunks": remarks["bad_chunks"],
+            "messages": None if self.header.get("pictures") else messages,
+            "skipped_numbers": remarks["skipped_numbers"],
+            "so_far": remarks["counts"],
+            "lines": stream,
+        }
+        if decoded is not None and messages and self.must_decode():
+            condition["decoded"] = json.loads(decoded()[8])
+        return Verdict._of({"file": condition})
+
+    def must_decode(self) -> bool:
+        """Return whether the counts in the file do not tell what decoding finds: damage at the end, jumps of time."""
+        if "finished" not in self.ending:
+            return True
+        counts = self.ending["finished"]["counts"]
+        # Versions before did not count jumps; there are none in version 2, whose missing datagrams are counted.
+        jumps = counts["decoder"].get("jumps_of_time", counts.get("missing"))
+        return "converted" not in counts and jumps != 0
 
 
 def _clock(decoded: tuple[Any, ...]) -> Clock:

@@ -28,6 +28,7 @@ from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.notes import BoardChange, Datagrams, Zeroing
 from taxel.recording.on_clock import on_clock
 from taxel.recording.pictures import at_rate, calibrated, pictures
+from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 from taxel.wire import Registers
 
@@ -338,10 +339,11 @@ class Recording:
         return dict(self._contents.counts)
 
     @property
-    def verdict(self) -> str:
-        """One line: nothing lost, what was lost at which stage, or that the file does not say it.
+    def verdict(self) -> Verdict:
+        """What was lost at which stage: a line of text, with a status and numbers by cause (`taxel.recording.Verdict`).
 
-        The page *What the output means* lists its wordings; all else there is to know is in `remarks`.
+        That of a part is that of the whole file. The page *What the output means* lists statuses, causes and wordings;
+        all else there is to know is in `remarks`.
         """
         return verdict_of(self._contents)
 

@@ -23,6 +23,8 @@ _PEAK_US = 10_000
 _GAP = 2.5
 #: Reading: a taxel was at full scale if it read the greatest value in so many pictures, of at least so many levels.
 _AT_TOP, _LEVELS = 3, 50
+#: Reading: readings are cut off if the greatest value is so many times as frequent as each of so many values below it.
+_TIMES, _BELOW = 2, 3
 #: At most so many places of taxels are listed that were not touched enough: a large sensor may have millions.
 _PLACES = 100
 
@@ -98,6 +100,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "rebuilt": recording.rebuilt,
         "lost": list(recording.lost),
         "verdict": recording.verdict,
+        "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
     }
 
@@ -126,7 +129,8 @@ def _full_scale(frames: Frames) -> dict[str, Any] | None:
     """Return how many readings are at full scale, and of which value; None where the readings show none.
 
     It is the greatest value if two taxels or more read exactly that one in several pictures, and other values too.
-    Readings of few levels reach their greatest one by chance.
+    Readings of few levels reach their greatest one by chance, and in the tail of noise each value is rarer than the one
+    below it.
     """
     values = frames.values
     if not values.size:
@@ -134,11 +138,16 @@ def _full_scale(frames: Frames) -> dict[str, Any] | None:
     least, top = (float(of.reduce(values, axis=None)) for of in (np.fmin, np.fmax))
     if not np.isfinite(top - least) or (top - least < _LEVELS and not np.any(values % 1)):
         return None
+    below, tail = top, []
+    while len(tail) < _BELOW and below > least:
+        below = float(np.max(values, where=values < below, initial=least))
+        tail.append(np.count_nonzero(values == below))
     at_top = np.count_nonzero(values == top, axis=0)
     # A taxel that is always there is stuck.
     at_top[(at_top < _AT_TOP) | (at_top == np.count_nonzero(~np.isnan(values), axis=0))] = 0
-    taxels = int(np.count_nonzero(at_top))
-    return {"value": top, "readings": int(at_top.sum()), "taxels": taxels} if taxels > 1 else None
+    taxels, readings = int(np.count_nonzero(at_top)), int(at_top.sum())
+    cut_off = taxels > 1 and readings > _TIMES * np.mean(tail)
+    return {"value": top, "readings": readings, "taxels": taxels} if cut_off else None
 
 
 def _gaps(t: NDArray[np.int64]) -> dict[str, int] | None:

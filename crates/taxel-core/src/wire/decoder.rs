@@ -122,6 +122,12 @@ impl Decoder {
         &self.counts
     }
 
+    /// The newest time, and that of the last stamp, us; none before the first stamp.
+    pub(in crate::wire) fn times(&self) -> Option<(i64, i64)> {
+        let latest = self.clock.latest?;
+        Some((latest * STAMP_US, self.clock.behind.unwrap_or(latest) * STAMP_US))
+    }
+
     /// Decodes the next bytes; returns the events that they complete.
     ///
     /// `arrived` is the host's clock in us when the bytes came; it shows how long a silence of more than 6.45 s was.

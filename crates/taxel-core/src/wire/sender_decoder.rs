@@ -1,10 +1,13 @@
 //! Decodes one sender's datagrams to events, whichever version of the wire it sends.
 
+mod ahead;
+
 use crate::wire::decoder::{Counts, Decoder};
 use crate::wire::silence::silence;
 use crate::wire::v1::{FIRST, WORD_BYTES};
 use crate::wire::v2::{self, Header, Outcome};
 use crate::{Array, Events};
+pub use ahead::Ahead;
 
 /// For how long only whole words of version 1 must arrive before a sender of version 2 counts as changed to version 1,
 /// us.
@@ -46,6 +49,7 @@ pub struct SenderDecoder {
     whole_since: Option<i64>,
     refused: u64,
     changes: u64,
+    ahead: Ahead,
 }
 
 impl SenderDecoder {
@@ -54,7 +58,18 @@ impl SenderDecoder {
     pub fn new(one: Decoder, version: u8) -> Self {
         let array = one.array().clone();
         let two = v2::Decoder::new(array.clone());
-        Self { array, version, one, two, offset: Some(0), latest: None, whole_since: None, refused: 0, changes: 0 }
+        Self {
+            array,
+            version,
+            one,
+            two,
+            offset: Some(0),
+            latest: None,
+            whole_since: None,
+            refused: 0,
+            changes: 0,
+            ahead: Ahead::default(),
+        }
     }
 
     /// The version that the sender uses.
@@ -99,6 +114,12 @@ impl SenderDecoder {
         self.changes
     }
 
+    /// The jumps of time of version 1 ahead of the host's clock.
+    #[must_use]
+    pub fn ahead(&self) -> &Ahead {
+        &self.ahead
+    }
+
     /// Notes that the host has set the board to this version of the wire.
     pub fn expect(&mut self, version: u8, out: &mut Events) {
         if version != self.version {
@@ -127,9 +148,15 @@ impl SenderDecoder {
             }
             let rows = out.len();
             let markers = out.markers.len();
+            let before = self.one.times();
             self.one.push_into(datagram, arrived, out);
             self.one.end_of_datagram_into(out);
             self.carry(rows, markers, arrived, out);
+            if let (Some((_, last)), Some(arrived)) = (self.one.times(), arrived) {
+                let offset = self.offset.unwrap_or(0);
+                let (newest, first) = (before.map(|(newest, _)| newest + offset), out.t.get(rows).copied());
+                self.ahead.note(newest, first.unwrap_or(last + offset), last + offset, arrived);
+            }
         }
         if let Some(&t) = out.t[rows..].last() {
             let latest = self.latest.map_or(t, |(latest, _)| latest.max(t));

@@ -12,6 +12,7 @@ use crate::bridged::Bridged;
 use crate::capture;
 use crate::clock::{Offset, Pace};
 use crate::latency::Quantiles;
+use crate::recording::Verdict;
 
 /// Counts of what arrived, how it was processed, and what was lost at which stage.
 ///
@@ -64,6 +65,8 @@ pub struct DecodingCounts {
     /// Events of version 2 that arrived after time had advanced without them: their datagram was delayed longer than
     /// the pipeline waits at a gap.
     pub wire_late: u64,
+    /// Number of times that the times of version 1 jumped ahead of this computer's clock.
+    pub wire_jumps: u64,
     /// Number of decoded events.
     pub events: u64,
 }
@@ -207,6 +210,7 @@ impl DecodingCounts {
             wire_refused: self.wire_refused - earlier.wire_refused,
             wire_changes: self.wire_changes - earlier.wire_changes,
             wire_late: self.wire_late - earlier.wire_late,
+            wire_jumps: self.wire_jumps - earlier.wire_jumps,
             events: self.events - earlier.events,
         }
     }
@@ -232,8 +236,8 @@ impl ReadoutCounts {
 pub struct Summary {
     /// The final counts, whose sums are complete.
     pub counters: Counters,
-    /// The verdict in one line: nothing lost after arrival, what was lost where, or that nothing arrived.
-    pub verdict: String,
+    /// The verdict: nothing lost after arrival, what was lost where, or that nothing arrived.
+    pub verdict: Verdict,
     /// The file, if something was recorded: if nothing arrived, a new file is removed and an earlier one is unchanged.
     pub path: Option<PathBuf>,
     /// The fresh tare, where one was completed.

@@ -430,7 +430,7 @@ fn kind_of_name(path: &Path) -> Result<&str> {
 pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::Counts {
     // Datagrams that wait at the end belong to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
-    let mut decoder = recording::damage(&now.decoding.wire);
+    let mut decoder = recording::damage(&now.decoding.wire, now.decoding.wire_jumps);
     decoder.insert("bytes_of_version_1_refused".to_owned(), now.decoding.wire_refused);
     let missing = recording::damage_of_version_2(&now.decoding.wire_v2).map(|(causes, missing)| {
         decoder.extend(causes);
@@ -459,7 +459,7 @@ mod tests {
         let mut now = Counters::default();
         (now.decoding.wire_v2.datagrams, now.decoding.wire_v2.intact) = (100, 100);
         assert_eq!(losses(&now, None).missing, Some(0));
-        assert_eq!(losses(&now, None).verdict(), "nothing lost");
+        assert_eq!(losses(&now, None).verdict().text, "nothing lost");
         let begun = now.clone();
         // The board has sent version 1 since the recording began.
         now.decoding.wire.bytes = 50;
@@ -470,10 +470,11 @@ mod tests {
         now.decoding.wire_refused += 25;
         let lost = losses(&now, Some(&begun));
         assert_eq!(lost.missing, Some(3));
-        assert!(
-            lost.verdict().ends_with("in the bytes that came: 25 bytes of version 1 refused"),
-            "{}",
-            lost.verdict()
-        );
+        let verdict = lost.verdict();
+        assert!(verdict.text.ends_with("in the bytes that came: 25 bytes of version 1 refused"), "{}", verdict.text);
+        // What the queue dropped is missing among the board's numbers too.
+        now.capture.dropped_by_queue += 2;
+        let lost = losses(&now, Some(&begun)).verdict().lost;
+        assert_eq!((lost["dropped_by_queue"], lost["lost_on_the_way"]), (2, 1));
     }
 }

@@ -11,10 +11,10 @@ use super::counters::{Counters, SourceCounts, Summary};
 use super::options::{LiveOptions, Record};
 use super::recorder::{Host, Part, Recorder, losses};
 use super::shared::{Ended, Request, Shared};
-use super::sources::Numbers;
+use super::sources::{Numbers, losses_of_lines};
 use crate::capture::Origin;
 use crate::locked::lock;
-use crate::recording::Counts;
+use crate::recording::{Counts, Verdict};
 use crate::{Error, Result};
 
 /// Starts and ends the recordings of a pipeline.
@@ -98,7 +98,8 @@ impl Recordings {
             Counters { sources, ..recorder.since().map_or_else(Counters::default, |since| counters.since(since)) };
         let lost = recorder.losses(&counters);
         let path = recorder.finish(&counters)?;
-        let verdict = verdict(self.shared.receiver.place(), &came, came.nothing_came(), &lost);
+        let verdict =
+            verdict(&self.shared.options.name, self.shared.receiver.place(), &came, came.nothing_came(), &lost);
         let tare = self.shared.published().tare.clone();
         Ok(Some(Summary { counters: came, verdict, path, tare }))
     }
@@ -117,15 +118,18 @@ fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
     ended
 }
 
-/// One line: what was lost, or that nothing arrived.
-pub(super) fn verdict(place: &Origin, counters: &Counters, nothing: bool, lost: &Counts) -> String {
-    let verdict = if nothing { nothing_arrived(place, counters.seconds) } else { lost.verdict() };
-    let others = counters.sources.iter().filter_map(|(name, counts)| match counts {
-        SourceCounts::Board(counts) => Some(format!("{name}: {}", losses(counts, None).verdict())),
-        SourceCounts::Numbers { strange: 0, .. } => None,
-        SourceCounts::Numbers { strange, .. } => Some(format!("{name}: {strange} lines could not be read")),
+/// What was lost of each source, or that nothing arrived.
+pub(super) fn verdict(name: &str, place: &Origin, counters: &Counters, nothing: bool, lost: &Counts) -> Verdict {
+    let verdict =
+        if nothing { Verdict::nothing_arrived(nothing_arrived(place, counters.seconds)) } else { lost.verdict() };
+    let others = counters.sources.iter().map(|(name, counts)| {
+        let verdict = match counts {
+            SourceCounts::Board(counts) => losses(counts, None).verdict(),
+            SourceCounts::Numbers { lines, strange, .. } => Verdict::of_lines(&losses_of_lines(*lines, *strange)),
+        };
+        (name.clone(), verdict)
     });
-    std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ")
+    Verdict::together(std::iter::once((name.to_owned(), verdict)).chain(others).collect())
 }
 
 /// What a user should check if nothing arrived.

@@ -98,9 +98,7 @@ impl Numbers {
         drop(current);
         let (lines, strange) = (now.0 - before.0, now.1 - before.1);
         if let Some(track) = ended {
-            let decoder = BTreeMap::from([("lines_that_could_not_be_read".to_owned(), strange)]);
-            let counts = recording::Counts { received: lines, decoder, ..recording::Counts::default() };
-            track.end(&self.part.name, counts);
+            track.end(&self.part.name, losses_of_lines(lines, strange));
         }
         SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone() }
     }
@@ -155,6 +153,12 @@ impl Numbers {
         };
         thread.spawn(job).map_err(Error::socket("thread"))
     }
+}
+
+/// The losses of a stream of numbers, as recordings state them.
+pub(super) fn losses_of_lines(lines: u64, strange: u64) -> recording::Counts {
+    let decoder = BTreeMap::from([("lines_that_could_not_be_read".to_owned(), strange)]);
+    recording::Counts { received: lines, recorded: lines, decoder, ..recording::Counts::default() }
 }
 
 /// The running other sources of a pipeline.

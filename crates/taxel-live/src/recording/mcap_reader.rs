@@ -20,7 +20,7 @@ use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Events, Stop, problem};
 
 use super::stream::Sampling;
-use super::{BoardChange, Change, Counts, Header, Pictures, Samples, Topic, limits};
+use super::{BoardChange, Change, Counts, Found, Header, Pictures, Samples, Topic, limits};
 use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
@@ -90,6 +90,8 @@ pub struct Decoded {
     pub left: Vec<i64>,
     /// Number of chunks that could not be used.
     pub bad_chunks: u64,
+    /// What the decoder could not use, as a verdict states it.
+    pub found: Found,
 }
 
 impl Decoded {
@@ -104,6 +106,7 @@ impl Decoded {
             first: vec![],
             left: vec![],
             bad_chunks: 0,
+            found: Found::default(),
         }
     }
 }
@@ -166,7 +169,7 @@ impl Reader {
         };
         let ending = match &self.ending {
             Some(Ending::Finished { .. }) if source != 0 => {
-                self.ends.get(name).map(|counts| Ending::Finished { counts: counts.clone(), verdict: counts.verdict() })
+                self.ends.get(name).map(|counts| Ending::Finished { counts: counts.clone() })
             }
             whole => whole.clone(),
         };
@@ -383,6 +386,7 @@ impl Reader {
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.two().counts();
         decoded.bad_chunks = bad;
+        decoded.found = Found::of(&sender, header.origin_us);
         Ok(decoded)
     }
 }

@@ -19,7 +19,9 @@ use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::Change;
-use taxel_live::recording::{Ending, Header, NOTHING_LOST, Place, Reader, Remarks, Topic, begin_with};
+use taxel_live::recording::{
+    Basis, Condition, Found, Header, Place, Reader, Remarks, Topic, Verdict, begin_with, damage,
+};
 use taxel_live::{Error, Result};
 
 /// Memory that the keyframes of a recording may take, bytes.
@@ -91,24 +93,16 @@ impl RecordingIndex {
     /// `File` where it cannot be read, `Core` where it is not a recording.
     pub fn open(path: &Path) -> Result<Arc<Self>> {
         let bytes = std::fs::metadata(path).map_err(Error::file(path))?.len();
-        let (source, header, verdict, unfinished) = match path.extension().and_then(|e| e.to_str()) {
+        let (source, header, unfinished) = match path.extension().and_then(|e| e.to_str()) {
             Some("mcap") => {
                 let reader = Reader::open(path)?;
-                let verdict = match reader.ending() {
-                    Some(Ending::Finished { verdict, .. }) => verdict.clone(),
-                    Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
-                    None => "not finished: what came last is missing".to_owned(),
-                };
                 let (header, unfinished) = (reader.header().clone(), reader.rebuilt().unfinished);
-                (Source::Mcap(Box::new(reader)), header, verdict, unfinished)
+                (Source::Mcap(Box::new(reader)), header, unfinished)
             }
             Some("lsa") => {
                 let file = File::open(path).map_err(Error::file(path))?;
                 let header = Header::of_board(Array::thesis(), None, path.display().to_string(), 0);
-                let complete = path.with_extension("lss").exists();
-                let verdict =
-                    if complete { NOTHING_LOST.to_owned() } else { "no .lss: perhaps not complete".to_owned() };
-                (Source::Lsa(file, bytes), header, verdict, !complete)
+                (Source::Lsa(file, bytes), header, !path.with_extension("lss").exists())
             }
             _ => {
                 let name = path.display();
@@ -128,7 +122,7 @@ impl RecordingIndex {
             activity: Activity::new(&header_array),
             remarks: Remarks::default(),
             pace: None,
-            verdict,
+            verdict: String::new(),
             unfinished,
         };
         index.build()?;
@@ -168,7 +162,7 @@ impl RecordingIndex {
         place: &mut Place,
         decoding: &mut Decoding,
         events: &mut Events,
-        mut beside: Option<(&mut Remarks, &mut BoardClock)>,
+        mut beside: Option<&mut Contents>,
     ) -> Result<u64> {
         let mut bytes = 0;
         // A frame is shorter than a second.
@@ -176,14 +170,14 @@ impl RecordingIndex {
         let frame_us = self.header.registers.map_or(0, |registers| registers.frame_us() as i64);
         match (&self.source, &mut *decoding) {
             (Source::Mcap(reader), Decoding::Datagrams(decoder)) => {
-                reader.block(k, place, |message| {
+                let whole = reader.block(k, place, |message| {
                     if message.topic == Topic::Datagrams {
                         let before = events.len();
                         let info = decoder.push(message.data, Some(message.at_ns / 1000), events);
                         let last = events.t[before..].last().copied();
                         let left = leaves(&info, last, message.data.len(), frame_us);
-                        if let (Some((_, clock)), Some(left)) = (&mut beside, left) {
-                            clock.note(left, message.at_ns);
+                        if let (Some(contents), Some(left)) = (&mut beside, left) {
+                            contents.clock.note(left, message.at_ns);
                         }
                         bytes += message.data.len() as u64;
                     } else if message.topic == Topic::Held {
@@ -191,11 +185,14 @@ impl RecordingIndex {
                     } else if message.topic == Topic::Pressure {
                         return Ok(());
                     }
-                    if let Some((remarks, _)) = &mut beside {
-                        remarks.add(&message);
+                    if let Some(contents) = &mut beside {
+                        contents.remarks.add(&message);
                     }
                     Ok(())
                 })?;
+                if let Some(contents) = beside {
+                    contents.bad_chunks += u64::from(!whole);
+                }
             }
             (Source::Lsa(file, length), Decoding::Bytes(decoder)) => {
                 let offset = k as u64 * LSA_PIECE;
@@ -281,6 +278,7 @@ impl RecordingIndex {
         self.event_rate = contents.event_rate.into_bins();
         self.activity = contents.activity;
         self.remarks = contents.remarks;
+        self.verdict = contents.verdict;
         self.pace = contents.clock.pace();
         state.update_curve();
         let columns = state.time_columns().clone();
@@ -305,6 +303,8 @@ impl RecordingIndex {
             activity: Activity::new(&self.header.array),
             remarks: Remarks::default(),
             clock: BoardClock::default(),
+            bad_chunks: 0,
+            verdict: String::new(),
         };
         for k in 0..self.blocks() {
             let mut piece = Decoded { key: None, thin: false, held: None, changes: vec![] };
@@ -317,13 +317,8 @@ impl RecordingIndex {
             }
             events.clear();
             let held_before = contents.remarks.held.is_some();
-            since = since.saturating_add(self.block(
-                k,
-                &mut place,
-                &mut decoding,
-                &mut events,
-                Some((&mut contents.remarks, &mut contents.clock)),
-            )?);
+            let bytes = self.block(k, &mut place, &mut decoding, &mut events, Some(&mut contents))?;
+            since = since.saturating_add(bytes);
             if !held_before {
                 piece.held = contents.remarks.held.clone().filter(|held| held.len() == taxels);
                 let known = piece.held.iter().flatten().enumerate();
@@ -342,7 +337,34 @@ impl RecordingIndex {
                 break;
             }
         }
+        contents.verdict = self.verdict_on(&contents, &decoding).text;
         Ok(contents)
+    }
+
+    /// What was lost, as `Recording.verdict` states it in Python.
+    fn verdict_on(&self, contents: &Contents, decoding: &Decoding) -> Verdict {
+        let reader = match (&self.source, decoding) {
+            (Source::Mcap(reader), _) => reader,
+            (Source::Lsa(..), Decoding::Bytes(decoder)) => {
+                let name = self.path.with_extension("lss").file_name().map(|name| name.to_string_lossy().into_owned());
+                return Verdict::of(Basis::Raw(name.filter(|_| self.unfinished), damage(decoder.counts(), 0)));
+            }
+            (Source::Lsa(..), Decoding::Datagrams(_)) => return Verdict::default(),
+        };
+        let decoded = match decoding {
+            Decoding::Datagrams(sender) => Some(Found::of(sender, self.header.origin_us)),
+            Decoding::Bytes(_) => None,
+        };
+        Verdict::of(Basis::File(Box::new(Condition {
+            ending: reader.ending().cloned(),
+            rebuilt: reader.rebuilt(),
+            bad_chunks: contents.bad_chunks,
+            messages: Some(contents.remarks.datagrams),
+            skipped_numbers: contents.remarks.skipped_numbers(),
+            so_far: contents.remarks.counts.clone(),
+            decoded,
+            lines: false,
+        })))
     }
 }
 
@@ -364,6 +386,8 @@ struct Contents {
     activity: Activity,
     remarks: Remarks,
     clock: BoardClock,
+    bad_chunks: u64,
+    verdict: String,
 }
 
 struct RecordingChanges {

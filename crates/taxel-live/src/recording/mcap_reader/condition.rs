@@ -1,26 +1,25 @@
 //! The condition of a file: how its recording ended, and which parts are damaged.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::recording::Counts;
 
 /// How a recording ended, as the file states.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ending {
     /// As planned.
     Finished {
         /// Counts of what was received and lost.
         counts: Counts,
-        /// The writer's verdict in one line.
-        verdict: String,
     },
     /// Stopped because writing failed, with the operating system's error.
     Stopped(String),
 }
 
 /// The parts of a damaged file that were skipped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Rebuilt {
     /// Whether the end of the file is missing: writing was killed, or the file was truncated.
     pub unfinished: bool,

@@ -32,6 +32,8 @@ pub struct Remarks {
     pub datagram_bytes: u64,
     /// Times of the first and the last arrival, ns since 1970.
     pub arrivals: Option<(i64, i64)>,
+    /// Arrival numbers of the first and the last datagram.
+    pub numbers: Option<(u64, u64)>,
     /// Number of pictures.
     pub pictures: u64,
     /// Resets of the board, and changes of its version of the wire.
@@ -44,6 +46,12 @@ pub struct Remarks {
 }
 
 impl Remarks {
+    /// Number of arrival numbers between the first and the last datagram that the file lacks.
+    #[must_use]
+    pub fn skipped_numbers(&self) -> u64 {
+        self.numbers.map_or(0, |(first, last)| (last - first + 1).saturating_sub(self.datagrams))
+    }
+
     /// Adds a message; datagrams and pictures are only counted.
     pub fn add(&mut self, message: &Message<'_>) {
         match message.topic {
@@ -52,6 +60,8 @@ impl Remarks {
                 self.datagram_bytes += message.data.len() as u64;
                 let (first, last) = self.arrivals.unwrap_or((message.at_ns, message.at_ns));
                 self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
+                let (first, last) = self.numbers.unwrap_or((message.number, message.number));
+                self.numbers = Some((first.min(message.number), last.max(message.number)));
             }
             Topic::Pressure | Topic::Pictures => self.pictures += 1,
             // The checksum of a message that does not parse is valid, so another program wrote the message; it is

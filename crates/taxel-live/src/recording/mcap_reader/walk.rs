@@ -192,12 +192,10 @@ impl<'a> Walk<'a> {
                 self.ends = ends.collect();
                 self.ending = match record.metadata.get("stopped") {
                     Some(why) => Some(Ending::Stopped(why.clone())),
-                    None => record.metadata.get("counts").and_then(|text| serde_json::from_str(text).ok()).map(
-                        |counts: Counts| Ending::Finished {
-                            verdict: record.metadata.get("verdict").cloned().unwrap_or_else(|| counts.verdict()),
-                            counts,
-                        },
-                    ),
+                    None => {
+                        let counts = record.metadata.get("counts").and_then(|text| serde_json::from_str(text).ok());
+                        counts.map(|counts| Ending::Finished { counts })
+                    }
                 };
             }
             _ => {}

@@ -112,7 +112,7 @@ impl ChunkWriter {
     ) -> std::result::Result<(), McapError> {
         if let Some(counts) = counts {
             let mut end = BTreeMap::from([
-                ("verdict".to_owned(), counts.verdict()),
+                ("verdict".to_owned(), counts.verdict().text),
                 ("counts".to_owned(), json!(counts).to_string()),
                 ("header".to_owned(), json!(self.header).to_string()),
                 ("stopped_ns".to_owned(), now_ns().to_string()),

@@ -1,0 +1,104 @@
+//! Detects where the times of version 1 jump ahead of the host's clock, as they do after a damaged stamp: the stamps that
+//! follow seem to lie a turn of the 16-bit counter later, and all times since are 6.5536 s too late.
+
+use crate::events::FARTHEST_BACK_US;
+
+/// Reading: a board's time that gains so much on the host's clock has jumped, us: somewhat less than half a turn of the
+/// counter, as a damaged stamp and the next one may gain half a turn each.
+const JUMP_US: i64 = 3_000_000;
+
+/// Reading: a board's clock drifts less than 1 in this against the host's.
+const DRIFT: i64 = 1000;
+
+/// The jumps of a sender's time ahead of the host's clock, and after which time they make times doubtful.
+///
+/// Compared are datagrams: how far the last stamp of each is ahead of its arrival, against the most before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Ahead {
+    /// Number of jumps.
+    pub jumps: u64,
+    /// The newest time before the first jump, us; times after it are doubtful.
+    pub after: Option<i64>,
+    /// The most that a stamp was ahead of its arrival, us, and the last arrival.
+    most: Option<(i64, i64)>,
+    /// How much farther ahead the last datagram was, and the newest time before it, if that was more than
+    /// [`FARTHEST_BACK_US`].
+    rose: Option<(i64, i64)>,
+}
+
+impl Ahead {
+    /// Notes a datagram: the newest time before it, the times of its first and its last stamp, and its arrival, us.
+    pub(super) fn note(&mut self, newest: Option<i64>, first: i64, last: i64, arrived: i64) {
+        let ahead = |t: i64| t.saturating_sub(arrived);
+        let allowed = match self.most {
+            Some((most, then)) if then <= arrived => most.saturating_sub(arrived.saturating_sub(then) / DRIFT),
+            // The first datagram, or the host's clock was set back.
+            _ => ahead(first),
+        };
+        let rise = ahead(last).saturating_sub(allowed);
+        let before = newest.unwrap_or(first);
+        let rose = self.rose.take();
+        if rise > JUMP_US && rose.is_none_or(|(rise, _)| rise <= JUMP_US) {
+            self.jumps += 1;
+            self.after = self.after.or(rose.map(|(_, before)| before)).or(Some(before));
+        }
+        // One datagram alone may be ahead by its damaged last stamp.
+        let stays = rise <= FARTHEST_BACK_US || rose.is_some();
+        self.rose = (!stays).then_some((rise, before));
+        self.most = Some((if stays { allowed.max(ahead(last)) } else { allowed }, arrived));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::wire::SenderDecoder;
+    use crate::wire::decoder::Decoder;
+    use crate::wire::v1::Word;
+    use crate::{Array, Events};
+
+    /// The decoder after datagrams of stamps, each with its arrival, us.
+    fn of(datagrams: impl IntoIterator<Item = (Vec<u16>, i64)>) -> (SenderDecoder, Events) {
+        let mut decoder = SenderDecoder::new(Decoder::new(Array::thesis()), 1);
+        let mut events = Events::empty(Array::thesis());
+        for (stamps, arrived) in datagrams {
+            let words = stamps.iter().flat_map(|&stamp| Word::Change { stamp, x: 3, y: 4, p: true }.to_bytes());
+            decoder.push(&words.collect::<Vec<_>>(), Some(arrived), &mut events);
+        }
+        (decoder, events)
+    }
+
+    /// A datagram of three stamps every 10 ms, from `from` on.
+    fn regular(from: i64, count: i64) -> impl Iterator<Item = (Vec<u16>, i64)> {
+        (from..from + count).map(|k| ((0..3).map(|n| (100 * k + n) as u16).collect(), 7_000_000 + 10_000 * k))
+    }
+
+    #[test]
+    fn a_damaged_stamp_makes_times_doubtful_from_there_on() {
+        for flipped in [1 << 11, 1 << 14, 1 << 15] {
+            for place in 0..3 {
+                let mut datagrams: Vec<_> = regular(1, 100).collect();
+                datagrams[50].0[place] ^= flipped;
+                let (decoder, events) = of(datagrams);
+                assert_eq!(decoder.ahead().jumps, 1, "{flipped} at {place}");
+                let after = decoder.ahead().after.unwrap();
+                let (wrong, at) = (events.t[150 + place], events.t[149]);
+                assert!(wrong != 510_000 + 100 * place as i64);
+                assert_eq!(after, at, "{flipped} at {place}");
+                assert!(events.t[299] - events.t[0] > 7_000_000, "a turn too late");
+            }
+        }
+    }
+
+    #[test]
+    fn silences_delays_drift_and_a_host_set_back_are_no_jumps() {
+        let silent = regular(1, 50).chain(regular(900, 50)).chain(regular(9000, 50));
+        assert_eq!(of(silent).0.ahead().jumps, 0);
+        let delayed =
+            regular(1, 900).map(|(stamps, at)| (stamps, at + if at % 3_000_000 < 400_000 { 900_000 } else { 0 }));
+        assert_eq!(of(delayed).0.ahead().jumps, 0);
+        let drifting = (0..30_000).map(|k| (vec![(1000 * k) as u16], 100_000 * k - 9 * k));
+        assert_eq!(of(drifting).0.ahead().jumps, 0);
+        let set_back = regular(1, 100).map(|(stamps, at)| (stamps, if at < 7_500_000 { at } else { at - 60_000_000 }));
+        assert_eq!(of(set_back).0.ahead().jumps, 0);
+    }
+}

@@ -1,0 +1,467 @@
+//! The verdict of a recording: what was lost or damaged at which stage, as a status, as numbers by cause and as one line.
+//!
+//! All wordings of verdicts are made here; `docs/outputs.md` lists them.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use taxel_core::wire::SenderDecoder;
+
+use super::{Counts, Ending, Rebuilt, damage, damage_of_version_2};
+
+/// The wording of version 1 when nothing was dropped between the socket and the file.
+pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
+/// The same for a stream of numbers.
+const NO_LINE_LOST: &str = "nothing lost after arrival (lines without numbers cannot show what was lost before it)";
+
+/// How much of a recording is there, from the best to the worst; of several parts the worst counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// Everything that the board sent between the first and the last datagram.
+    Complete,
+    /// Everything that arrived; what was lost before cannot be known.
+    #[serde(rename = "complete after arrival")]
+    CompleteAfterArrival,
+    /// The file does not say what was lost.
+    #[default]
+    Unknown,
+    /// Bytes that arrived, or their times, cannot be relied upon.
+    Damaged,
+    /// What came last is missing.
+    Unfinished,
+    /// Something was lost, by one of the causes.
+    Lost,
+    /// Nothing arrived at all.
+    #[serde(rename = "nothing arrived")]
+    NothingArrived,
+}
+
+/// What a recording lost.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(from = "Stored")]
+pub struct Verdict {
+    /// How much is there.
+    pub status: Status,
+    /// All of it in one line.
+    pub text: String,
+    /// What was lost, by cause.
+    pub lost: BTreeMap<String, u64>,
+    /// What could not be used, by cause: of the bytes that came, and of the file.
+    pub damaged: BTreeMap<String, u64>,
+    /// What happened without a loss of its own: repeated datagrams, repaired values, resets and others.
+    pub noted: BTreeMap<String, u64>,
+    /// The board's time after which times are doubtful, us.
+    pub doubtful_after_us: Option<i64>,
+    /// The verdicts of the recordings or sources that this one is made of, by name.
+    pub parts: Vec<(String, Verdict)>,
+}
+
+/// A verdict in a file; earlier versions wrote its line alone.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Stored {
+    Line(String),
+    Whole(Whole),
+}
+
+#[derive(Deserialize)]
+struct Whole {
+    status: Status,
+    text: String,
+    #[serde(default)]
+    lost: BTreeMap<String, u64>,
+    #[serde(default)]
+    damaged: BTreeMap<String, u64>,
+    #[serde(default)]
+    noted: BTreeMap<String, u64>,
+    #[serde(default)]
+    doubtful_after_us: Option<i64>,
+    #[serde(default)]
+    parts: Vec<(String, Verdict)>,
+}
+
+impl From<Stored> for Verdict {
+    fn from(stored: Stored) -> Self {
+        match stored {
+            Stored::Line(line) => Self::of_line(&line),
+            Stored::Whole(Whole { status, text, lost, damaged, noted, doubtful_after_us, parts }) => {
+                Self { status, text, lost, damaged, noted, doubtful_after_us, parts }
+            }
+        }
+    }
+}
+
+/// What a verdict is made from.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Basis {
+    /// The counts of what was received and lost.
+    Counts(Counts),
+    /// A recording of the live format.
+    File(Box<Condition>),
+    /// Raw bytes: the name of the missing `.lss`, and what the decoder could not use.
+    Raw(Option<String>, BTreeMap<String, u64>),
+    /// A kind of file that does not state what was lost.
+    Silent(String),
+    /// Several recordings or sources.
+    Together(Vec<(String, Verdict)>),
+    /// The line that an earlier version wrote.
+    Line(String),
+}
+
+/// One source of a file of the live format: how it ended, and what reading found.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub struct Condition {
+    /// How the recording ended.
+    pub ending: Option<Ending>,
+    /// Damage found at opening.
+    pub rebuilt: Rebuilt,
+    /// Number of chunks that could not be used.
+    pub bad_chunks: u64,
+    /// Number of datagrams or lines in the file, if known.
+    pub messages: Option<u64>,
+    /// Arrival numbers that the file lacks between its first and last datagram.
+    pub skipped_numbers: u64,
+    /// The last counts before the end.
+    pub so_far: Option<Counts>,
+    /// What decoding found, if the file was decoded.
+    pub decoded: Option<Found>,
+    /// Whether the source is a stream of numbers.
+    pub lines: bool,
+}
+
+/// What decoding a file found.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Found {
+    /// What the decoder could not use, by cause.
+    pub damage: BTreeMap<String, u64>,
+    /// For version 2: sequence numbers that are missing.
+    pub missing: Option<u64>,
+    /// The time after which times are doubtful, us.
+    pub doubtful_after_us: Option<i64>,
+}
+
+impl Found {
+    /// What a decoder found; `origin_us` is added to its times.
+    #[must_use]
+    pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
+        let mut causes = damage(sender.counts(), sender.ahead().jumps);
+        let missing = damage_of_version_2(&sender.two().counts()).map(|(more, missing)| {
+            causes.extend(more);
+            missing
+        });
+        Self { damage: causes, missing, doubtful_after_us: sender.ahead().after.map(|t| t + origin_us) }
+    }
+}
+
+impl Verdict {
+    /// The verdict on what there is to know.
+    #[must_use]
+    pub fn of(basis: Basis) -> Self {
+        match basis {
+            Basis::Counts(counts) => Self::of_counts(&counts, NOTHING_LOST),
+            Basis::File(condition) => Self::of_file(*condition),
+            Basis::Raw(unmarked, damage) => Self::of_raw(unmarked, &damage),
+            Basis::Silent(kind) => {
+                let text = format!("the {kind} does not say what was lost");
+                Self { status: Status::Unknown, text, ..Self::default() }
+            }
+            Basis::Together(parts) => Self::together(parts),
+            Basis::Line(line) => Self::of_line(&line),
+        }
+    }
+
+    /// The verdict if nothing arrived at all.
+    pub(crate) fn nothing_arrived(text: String) -> Self {
+        Self { status: Status::NothingArrived, text, ..Self::default() }
+    }
+
+    /// The verdict on a stream of numbers.
+    pub(crate) fn of_lines(counts: &Counts) -> Self {
+        Self::of_counts(counts, NO_LINE_LOST)
+    }
+
+    /// The verdict on counts; `nothing_lost` is the line if they show no loss and do not count what was sent.
+    pub(crate) fn of_counts(counts: &Counts, nothing_lost: &str) -> Self {
+        if let Some(verdict) = &counts.converted {
+            return verdict.clone();
+        }
+        let bridged = counts.bridged.as_deref().copied().unwrap_or_default();
+        let of_board = |cause: &str| counts.decoder.get(cause).copied().unwrap_or(0);
+        let dropped = [
+            (counts.dropped_by_kernel, "dropped_by_kernel", "messages dropped by the kernel"),
+            (counts.dropped_by_queue, "dropped_by_queue", "datagrams dropped by taxel's queue"),
+            (
+                counts.received.saturating_sub(counts.dropped_by_queue + counts.recorded),
+                "not_recorded",
+                "datagrams received but not recorded",
+            ),
+            (bridged.missing, "lost_between_computers", "datagrams lost between the computers"),
+            (bridged.dropped, "dropped_by_other_computer", "datagrams dropped by the other computer"),
+            (bridged.dropped_by_kernel, "dropped_by_other_kernel", "messages dropped by the other computer's kernel"),
+        ];
+        // The board's numbers also skip what was dropped after it was sent, which is counted above.
+        let behind: u64 = dropped.iter().filter(|(_, cause, _)| *cause != "not_recorded").map(|(n, ..)| n).sum();
+        let on_the_way = counts.missing.unwrap_or(0).saturating_sub(behind);
+        let board = (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events");
+        let way = (on_the_way, "lost_on_the_way", "datagrams lost or damaged on the way");
+        let mut verdict = Self::default();
+        let mut words = vec![];
+        for (n, cause, what) in std::iter::once(board).chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
+            verdict.lost.insert(cause.to_owned(), n);
+            words.push(format!("{n} {what}"));
+        }
+        if words.is_empty() && counts.missing.is_none() && counts.received + counts.recorded == 0 {
+            return Self::nothing_arrived("nothing arrived".to_owned());
+        }
+        // After a reset the board's numbers begin anew: what was lost just before or after it they do not show.
+        let knows = counts.missing.is_some() && of_board(BOARD_RESET) == 0;
+        verdict.status = match (&words[..], knows) {
+            ([], true) => Status::Complete,
+            ([], false) => Status::CompleteAfterArrival,
+            _ => Status::Lost,
+        };
+        let mut pieces = vec![if !words.is_empty() {
+            format!("LOST: {}", words.join(", "))
+        } else if counts.missing.is_some() {
+            "nothing lost".to_owned()
+        } else {
+            nothing_lost.to_owned()
+        }];
+        pieces.extend(verdict.damage_of(&counts.decoder));
+        for (n, cause, what) in [
+            (of_board(REPAIRED), REPAIRED, "values repaired from the board's refresh"),
+            (of_board(BOARD_RESET), BOARD_RESET, "resets of the board"),
+        ] {
+            if n > 0 {
+                verdict.noted.insert(cause.to_owned(), n);
+                pieces.push(format!("{n} {what}"));
+            }
+        }
+        if bridged.silences > 0 || bridged.restarts > 0 {
+            verdict.noted.insert("silences_of_other_computer".to_owned(), bridged.silences);
+            verdict.noted.insert("restarts_of_other_computer".to_owned(), bridged.restarts);
+            pieces.push(format!(
+                "the other computer was silent for a second or more {} times, and began anew {} times",
+                bridged.silences, bridged.restarts
+            ));
+        }
+        verdict.text = pieces.join("; ");
+        verdict
+    }
+
+    /// Adds what a decoder could not use; returns its line.
+    fn damage_of(&mut self, decoder: &BTreeMap<String, u64>) -> Option<String> {
+        let no_damage = [BOARD_DROPPED, BOARD_RESET, REPAIRED];
+        let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
+        for (cause, n) in found() {
+            // Each repeated datagram is decoded once.
+            let place = if cause == REPEATED { &mut self.noted } else { &mut self.damaged };
+            place.insert(cause.clone(), *n);
+        }
+        if !self.damaged.is_empty() {
+            self.status = self.status.max(Status::Damaged);
+        }
+        let words: Vec<String> = found().map(|(cause, n)| format!("{n} {}", cause.replace('_', " "))).collect();
+        (!words.is_empty()).then(|| format!("in the bytes that came: {}", words.join(", ")))
+    }
+
+    /// The verdict on a source of a file.
+    fn of_file(condition: Condition) -> Self {
+        let Condition { ending, rebuilt, bad_chunks, messages, skipped_numbers, so_far, decoded, lines } = condition;
+        let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
+        let decoded = decoded.unwrap_or_default();
+        let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
+        let mut no_counts = false;
+        let (mut verdict, why, recorded) = match ending {
+            Some(Ending::Finished { counts }) => (Self::of_counts(&counts, nothing_lost), None, Some(counts.recorded)),
+            ending => {
+                let why = match ending {
+                    Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
+                    _ => "not finished: what came last is missing".to_owned(),
+                };
+                let counts = so_far.filter(|counts| counts.received > 0);
+                no_counts = counts.is_none();
+                // The file may hold more than its counts, which are saved now and then; where parts were skipped,
+                // decoding finds faults that never came.
+                let counts = counts.unwrap_or_else(|| Counts { recorded: messages.unwrap_or(0), ..Counts::default() });
+                let found = if skipped { Found::default() } else { decoded.clone() };
+                let dropped = if skipped { 0 } else { skipped_numbers };
+                let until = Self::of_counts(&so_far_with(counts, found, dropped), nothing_lost);
+                (until, Some(why), None)
+            }
+        };
+        let lost_in_file = match (recorded, messages) {
+            (Some(recorded), Some(messages)) => recorded.saturating_sub(messages),
+            (None, _) if skipped => {
+                skipped_numbers.saturating_sub(verdict.lost.get("dropped_by_queue").copied().unwrap_or(0))
+            }
+            _ => 0,
+        };
+        let (whole, came_short) = (why.is_none(), !verdict.lost.is_empty());
+        let mut bad = vec![];
+        for (n, cause, text) in [
+            (
+                rebuilt.large_chunks,
+                "large_chunks",
+                format!("{} skipped, stated to unpack to more than 64 MiB", counted(rebuilt.large_chunks, "chunk")),
+            ),
+            (bad_chunks, "bad_chunks", format!("{} skipped", counted(bad_chunks, "bad chunk"))),
+            (
+                rebuilt.skipped_bytes,
+                "skipped_bytes",
+                format!(
+                    "{} of the file skipped in {}",
+                    counted(rebuilt.skipped_bytes, "byte"),
+                    counted(rebuilt.gaps, "place")
+                ),
+            ),
+            (rebuilt.torn_bytes, "torn_bytes", format!("{} at the end", counted(rebuilt.torn_bytes, "torn byte"))),
+        ] {
+            if n > 0 {
+                verdict.damaged.insert(cause.to_owned(), n);
+                bad.push(text);
+            }
+        }
+        if lost_in_file > 0 {
+            verdict.lost.insert("lost_in_file".to_owned(), lost_in_file);
+            bad.push(format!("{} lost", counted(lost_in_file, if lines { "line" } else { "datagram" })));
+        }
+        if !whole && verdict.status == Status::NothingArrived {
+            // It may have come after what is left of the file.
+            verdict.status = Status::Unfinished;
+        }
+        if !whole || rebuilt.torn_bytes > 0 {
+            verdict.status = verdict.status.max(Status::Unfinished);
+        }
+        if skipped || lost_in_file > 0 {
+            verdict.status = verdict.status.max(Status::Lost);
+        }
+        let damaged_file = (!bad.is_empty()).then(|| format!("LOST in the file: {}", bad.join(", ")));
+        let before = match (&why, &damaged_file) {
+            (Some(_), _) => "until then: ",
+            (None, Some(_)) => "while recording: ",
+            (None, None) => "",
+        };
+        let mut pieces: Vec<String> = why.into_iter().chain(damaged_file).collect();
+        if no_counts {
+            pieces.push(format!("{before}no counts were saved yet"));
+            // That nothing was lost is not known then.
+            let known = verdict.text.split_once("; ").map(|(_, damage)| damage);
+            pieces.extend(if came_short { Some(&*verdict.text) } else { known }.map(str::to_owned));
+        } else {
+            pieces.push(format!("{before}{}", verdict.text));
+        }
+        if let Some(after) = decoded.doubtful_after_us {
+            verdict.status = verdict.status.max(Status::Damaged);
+            verdict.doubtful_after_us = Some(after);
+            // A recorder of an earlier version did not count jumps.
+            let jumps = decoded.damage.get(JUMPS).copied().unwrap_or(1);
+            verdict.damaged.entry(JUMPS.to_owned()).or_insert(jumps);
+            pieces.push(format!("times after {after} us are doubtful"));
+        }
+        verdict.text = pieces.join("; ");
+        verdict
+    }
+
+    /// The verdict on raw bytes.
+    fn of_raw(unmarked: Option<String>, damage: &BTreeMap<String, u64>) -> Self {
+        let mut verdict = Self { status: Status::Unknown, ..Self::default() };
+        let damage = verdict.damage_of(damage);
+        if unmarked.is_some() {
+            verdict.status = verdict.status.max(Status::Unfinished);
+        }
+        let unmarked = unmarked.map(|name| format!("not finished, as {name} is not there"));
+        let silent = "the .lsa does not say what was lost".to_owned();
+        verdict.text = unmarked.into_iter().chain([silent]).chain(damage).collect::<Vec<_>>().join("; ");
+        verdict
+    }
+
+    /// The verdict on several recordings or sources: the worst status, and the sums of their numbers.
+    ///
+    /// Equal verdicts without numbers are one.
+    pub(crate) fn together(parts: Vec<(String, Self)>) -> Self {
+        let numbers = |one: &Self| !(one.lost.is_empty() && one.damaged.is_empty() && one.noted.is_empty());
+        if let [(_, first), others @ ..] = &parts[..]
+            && (others.is_empty() || (others.iter().all(|(_, one)| one == first) && !numbers(first)))
+        {
+            return first.clone();
+        }
+        let mut whole = Self { status: Status::Complete, ..Self::default() };
+        let mut pieces = vec![];
+        for (name, part) in parts {
+            whole.status = whole.status.max(part.status);
+            for (sums, counts) in
+                [(&mut whole.lost, &part.lost), (&mut whole.damaged, &part.damaged), (&mut whole.noted, &part.noted)]
+            {
+                counts.iter().for_each(|(cause, n)| *sums.entry(cause.clone()).or_default() += n);
+            }
+            pieces.push(format!("{name}: {}", part.text));
+            let taken = |name: &str| whole.parts.iter().any(|(known, _)| known == name);
+            let unique = (2..).map(|k| format!("{name} ({k})")).find(|other| !taken(other));
+            let name = if taken(&name) { unique.unwrap_or_default() } else { name };
+            whole.parts.push((name, part));
+        }
+        whole.text = pieces.join("; ");
+        whole
+    }
+
+    /// The verdict whose line is all that an earlier version wrote: its status, without numbers.
+    fn of_line(line: &str) -> Self {
+        // Versions before wrote from what a recording was converted into its verdict.
+        let text = line.rsplit("a recording that says: ").next().unwrap_or(line).to_owned();
+        let has = |words: &[&str]| words.iter().any(|words| text.contains(words));
+        let status = if has(&["nothing arrived"]) {
+            Status::NothingArrived
+        } else if has(&["LOST"]) {
+            Status::Lost
+        } else if has(&["not finished", "what came last is missing"]) {
+            Status::Unfinished
+        } else if has(&["in the bytes that came", "could not be read"]) {
+            Status::Damaged
+        } else if has(&["does not say"]) {
+            Status::Unknown
+        } else if has(&["nothing lost after arrival", "resets of the board"]) {
+            Status::CompleteAfterArrival
+        } else if has(&["nothing lost"]) {
+            Status::Complete
+        } else {
+            Status::Unknown
+        };
+        Self { status, text, ..Self::default() }
+    }
+}
+
+/// The last counts of an unfinished recording, with what decoding found since; the arrival numbers that the file skips
+/// were dropped by the queue.
+fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64) -> Counts {
+    // If more was received than the file holds, the difference is in its unfinished end.
+    counts.received = 0;
+    counts.dropped_by_queue = counts.dropped_by_queue.max(skipped_numbers);
+    for (cause, n) in found.damage {
+        let known = counts.decoder.entry(cause).or_default();
+        *known = n.max(*known);
+    }
+    // What was dropped after its arrival is missing among the board's numbers too.
+    let missing = found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue);
+    counts.missing = counts.missing.max(missing.filter(|n| counts.missing.is_some() || *n > 0));
+    counts
+}
+
+/// A number and what it counts, in the plural unless it is 1.
+fn counted(n: u64, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+/// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
+pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
+/// ... resets, values that differed from the board's own, as their events were lost, and datagrams that came again.
+pub(super) const BOARD_RESET: &str = "resets";
+pub(super) const REPAIRED: &str = "events_repaired";
+pub(super) const REPEATED: &str = "datagrams_repeated";
+/// Jumps of the times of version 1 ahead of the host's clock.
+pub(crate) const JUMPS: &str = "jumps_of_time";

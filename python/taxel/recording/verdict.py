@@ -1,0 +1,155 @@
+"""The verdict of a recording: what was lost or damaged at which stage, as one line and as data."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal, Self, get_args
+
+from taxel import _core
+from taxel._base.arguments import text
+from taxel._core import ProblemError
+
+__all__ = ["STATUSES", "Status", "Verdict"]
+
+Status = Literal["complete", "complete after arrival", "unknown", "damaged", "unfinished", "lost", "nothing arrived"]
+
+#: All statuses, from the best to the worst.
+STATUSES: tuple[Status, ...] = get_args(Status)
+
+#: The whole numbers of a verdict, each a mapping from cause to number.
+_NUMBERS = ("lost", "damaged", "noted")
+
+
+class Verdict(str):
+    """State what a recording lost: a line of text with a status, and numbers by cause.
+
+    The page *What the output means* lists statuses, causes and wordings.
+
+    Parameters
+    ----------
+    line : str
+        A line that an earlier version wrote: only its status is known, and no numbers.
+
+    Attributes
+    ----------
+    status : {"complete", "complete after arrival", "unknown", "damaged", "unfinished", "lost", "nothing arrived"}
+        From the best to the worst; of several parts the worst.
+    lost : dict of int
+        What was lost, by cause; of several parts the sum.
+    damaged : dict of int
+        What could not be used, of the bytes that came and of the file, by cause.
+    noted : dict of int
+        What is no loss of its own: repeated datagrams, repaired values, resets of the board and others.
+    doubtful_after_us : int, us, or None
+        The time after which times are doubtful.
+    parts : dict of Verdict
+        Of several sources or merged recordings that of each, by name; else empty.
+
+    Examples
+    --------
+    >>> verdict = Verdict.from_dict(
+    ...     {"status": "lost", "text": "LOST: 2 datagrams lost or damaged on the way", "lost": {"lost_on_the_way": 2}}
+    ... )
+    >>> verdict.status, verdict.lost, "LOST" in verdict
+    ('lost', {'lost_on_the_way': 2}, True)
+    """
+
+    _held: Mapping[str, Any]
+
+    def __new__(cls, line: str) -> Self:
+        """Return the verdict of a line."""
+        return cls._of({"line": text("line", line)})
+
+    @classmethod
+    def _of(cls, basis: Mapping[str, Any]) -> Self:
+        """Return the verdict on what is known of a recording, which the compiled part gives."""
+        return cls._from(json.loads(_core.recording_verdict(json.dumps(basis))))
+
+    @classmethod
+    def _from(cls, held: Mapping[str, Any]) -> Self:
+        """Return the verdict that the compiled part states."""
+        made = super().__new__(cls, held["text"])
+        made._held = held
+        return made
+
+    @classmethod
+    def _together(cls, parts: Iterable[tuple[str, str]]) -> Self:
+        """Return the verdict on several recordings or sources, each with its name."""
+        every = [(name, one if isinstance(one, Verdict) else Verdict(one)) for name, one in parts]
+        return cls._of({"together": [(name, one._held) for name, one in every]})
+
+    @property
+    def status(self) -> Status:
+        """How much of the recording is there."""
+        return self._held["status"]  # type: ignore[no-any-return]
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """What was lost, by cause."""
+        return dict(self._held["lost"])
+
+    @property
+    def damaged(self) -> dict[str, int]:
+        """What could not be used, by cause."""
+        return dict(self._held["damaged"])
+
+    @property
+    def noted(self) -> dict[str, int]:
+        """What is no loss of its own, by cause."""
+        return dict(self._held["noted"])
+
+    @property
+    def doubtful_after_us(self) -> int | None:
+        """The time after which times are doubtful, us."""
+        return self._held["doubtful_after_us"]  # type: ignore[no-any-return]
+
+    @property
+    def parts(self) -> dict[str, Verdict]:
+        """The verdicts of the sources or merged recordings, by name."""
+        return {name: Verdict._from(part) for name, part in self._held["parts"]}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return text, status and numbers, ready for JSON.
+
+        Returns
+        -------
+        dict
+            By the names of the attributes, and the line as "text"; each of "parts" is such a dict.
+
+        Examples
+        --------
+        >>> Verdict("nothing lost").to_dict()["status"]
+        'complete'
+        """
+        numbers = {name: dict(self._held[name]) for name in _NUMBERS}
+        parts = {name: part.to_dict() for name, part in self.parts.items()}
+        about = {"status": self.status, "text": str(self), **numbers}
+        return about | {"doubtful_after_us": self.doubtful_after_us, "parts": parts}
+
+    @classmethod
+    def from_dict(cls, held: Mapping[str, Any]) -> Self:
+        """Return the verdict that `to_dict` gave.
+
+        Parameters
+        ----------
+        held : dict
+            As from `to_dict`, also by way of JSON; all but "status" and "text" may be missing.
+
+        Raises
+        ------
+        ProblemError : not such a dict
+
+        Examples
+        --------
+        >>> Verdict.from_dict(Verdict("nothing lost").to_dict()) == "nothing lost"
+        True
+        """
+        return cls._of({"together": [("", _stated(held))]})
+
+
+def _stated(held: Any) -> dict[str, Any]:
+    """Return a verdict from `to_dict` as the compiled part states it."""
+    if not isinstance(held, Mapping) or not isinstance(held.get("parts", {}), Mapping):
+        raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
+    return {**held, "parts": [(name, _stated(part)) for name, part in held.get("parts", {}).items()]}

@@ -1,0 +1,324 @@
+"""The numbers of a verdict are the known losses, and its status is never better than the truth, whatever goes wrong."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import _core
+from taxel.recording import Verdict
+from taxel.recording.verdict import STATUSES
+from taxel.simulate import Board, Version2
+from taxel.wire import Registers
+
+from .making import HEADER, record, some_events
+
+START_NS = HEADER["started_ns"]
+
+
+def at_least(verdict: Verdict, status: str) -> bool:
+    """Whether a status is that one or a worse one."""
+    return STATUSES.index(verdict.status) >= STATUSES.index(status)
+
+
+@cache
+def sent_by_a_board(frames: int = 1500) -> list[bytes]:
+    """The datagrams of version 2 of a board of which some taxels change in each frame, by sequence number."""
+    board = Board(Registers(wire_version=2), version_2=Version2(states_us=0))
+    draw, held = np.random.default_rng(3), np.full(4096, 20, np.uint16)
+    sent = []
+    for _ in range(frames):
+        held[draw.integers(0, 4096, 200)] ^= 64
+        sent += board.frame(held)
+    return sent
+
+
+@dataclass
+class Told:
+    """What is known to have happened on the way to a file."""
+
+    lost: set[int] = field(default_factory=set)
+    damaged: int = 0
+    repeated: int = 0
+    dropped: int = 0
+
+
+def on_the_way(sent: list[bytes], draw: np.random.Generator, told: Told) -> list[bytes]:
+    """The datagrams that arrive: some are lost, damaged, repeated or overtaken; the first and the last arrive whole."""
+    share = draw.choice([0.0, 0.02, 0.1], 4)
+    came = []
+    for number, one in enumerate(sent):
+        inner = 0 < number < len(sent) - 1
+        if inner and draw.random() < share[0]:
+            told.lost.add(number)
+            continue
+        if inner and draw.random() < share[1]:
+            bad = bytearray(one)
+            # Not in the first two bytes, which tell the version of the wire.
+            bad[int(draw.integers(2, len(bad)))] ^= int(draw.integers(1, 256))
+            told.lost.add(number)
+            told.damaged += 1
+            came.append(bytes(bad))
+            continue
+        came.append(one)
+        if inner and draw.random() < share[2]:
+            told.repeated += 1
+            came.append(one)
+        if len(came) > 2 and inner and draw.random() < share[3]:
+            came[-1], came[-2] = came[-2], came[-1]
+    return came
+
+
+def write(path: Path, came: list[bytes], draw: np.random.Generator, told: Told, *, finish: bool) -> None:
+    """Record as the live pipeline does: what its queue drops has an arrival number, and is missing to the decoder."""
+    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
+    decoder = taxel.wire.Decoder(2)
+    share, recorded = draw.choice([0.0, 0.05]), 0
+
+    def counts(received: int) -> str:
+        found = decoder.counts
+        causes = {
+            "jumps_of_time": 0,
+            "datagrams_damaged": found.checksum + found.short + found.foreign,
+            "datagrams_repeated": found.repeated + found.old,
+            "events_repaired": found.repaired,
+        }
+        known = {"received": received, "recorded": recorded, "dropped_by_queue": told.dropped}
+        return json.dumps({**known, "missing": found.missing, "decoder": causes})
+
+    for number, one in enumerate(came):
+        if 0 < number < len(came) - 1 and draw.random() < share:
+            told.dropped += 1
+            continue
+        writer.datagram(START_NS + number * 100_000, number, one)
+        decoder.push(one)
+        recorded += 1
+        if number % 50 == 49:
+            writer.counts(START_NS + number * 100_000, counts(number + 1))
+    if finish:
+        writer.finish(counts(len(came)))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_numbers_of_a_verdict_are_the_losses(seed: int, tmp_path: Path) -> None:
+    draw, told, path = np.random.default_rng(seed), Told(), tmp_path / "a.mcap"
+    finish = bool(draw.random() < 0.6)
+    came = on_the_way(sent_by_a_board(), draw, told)
+    write(path, came, draw, told, finish=finish)
+    whole = taxel.open(path)
+    recorded = len(whole.datagrams())
+    assert recorded == len(came) - told.dropped
+    # Each number that the decoder lacks was lost on the way or dropped here; a repeated one may have been dropped once.
+    decoder = taxel.wire.Decoder(2)
+    for one in whole.datagrams():
+        decoder.push(one)
+    missing = decoder.counts.missing
+    expected = {"dropped_by_queue": told.dropped, "lost_on_the_way": max(missing - told.dropped, 0)}
+    if finish:
+        assert whole.verdict.lost == {cause: n for cause, n in expected.items() if n}
+        assert whole.verdict.damaged.get("datagrams_damaged", 0) == decoder.counts.checksum
+        assert whole.verdict.noted.get("datagrams_repeated", 0) == decoder.counts.repeated
+        assert (whole.verdict.status == "complete") == (not missing and not told.dropped)
+    else:
+        assert whole.verdict.startswith("not finished: ")
+        assert whole.verdict.lost.get("lost_on_the_way", 0) >= max(missing - told.dropped, 0)
+        assert at_least(whole.verdict, "lost" if missing else "unfinished")
+
+    # Then the file is damaged in its middle: what it loses is told apart from what was lost on the way.
+    data = bytearray(path.read_bytes())
+    place = data.index(whole.datagrams()[recorded // 2])
+    data[place + 5] ^= 1
+    path.write_bytes(data)
+    damaged = taxel.open(path)
+    gone = recorded - len(damaged.datagrams())
+    assert gone > 0
+    assert damaged.verdict.status == "lost"
+    if finish:
+        assert damaged.verdict.lost == {**whole.verdict.lost, "lost_in_file": gone}
+        assert f"{gone} datagrams lost" in damaged.verdict
+    left, all_of_it = damaged.datagrams().number, whole.datagrams().number
+    if not finish and len(left) and (left[0], left[-1]) == (all_of_it[0], all_of_it[-1]):
+        # Without final counts it is the numbers that the file skips, less what the last counts know to be dropped.
+        assert gone <= damaged.verdict.lost["lost_in_file"] <= gone + told.dropped
+    assert damaged.counts["lost_in_file"] == damaged.verdict.lost.get("lost_in_file", 0)
+    if len(left):
+        assert damaged.counts["decoder_version_2"]["missing"] <= len(told.lost)
+    assert damaged.verdict.damaged["bad_chunks"] == 1
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_a_cut_file_is_no_better_than_unfinished(share: float, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    write(path, sent_by_a_board(), np.random.default_rng(0), Told(), finish=True)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * share)])
+    assert at_least(taxel.open(path).verdict, "unfinished")
+
+
+def test_loss_in_a_board_s_own_last_second_is_seen_in_a_file_without_its_end(tmp_path: Path) -> None:
+    """What comes after the last counts is not in them: decoding finds it."""
+    sent = sent_by_a_board()
+    came, path = sent[:], tmp_path / "a.mcap"
+    del came[-5]
+    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
+    for number, one in enumerate(came):
+        writer.datagram(START_NS + number, number, one)
+        if number == len(came) // 2:
+            writer.counts(START_NS + number, json.dumps({"received": number, "recorded": number, "missing": 0}))
+    del writer
+    verdict = taxel.open(path).verdict
+    assert (verdict.status, verdict.lost) == ("lost", {"lost_on_the_way": 1})
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_times_after_a_damaged_stamp_are_doubtful(seed: int, tmp_path: Path) -> None:
+    draw, path = np.random.default_rng(seed), tmp_path / "a.mcap"
+    events = some_events(3000, seed=seed, intensity=False)
+    events.markers = ()
+    sent = [taxel.wire.encode(events[k : k + 10]) for k in range(0, 3000, 10)]
+    arrived = [
+        START_NS + int(events.t[min(k + 9, 2999)]) * 1000 + int(draw.integers(0, 40_000_000))
+        for k in range(0, 3000, 10)
+    ]
+    wrong = int(draw.integers(1, 299)) if seed % 3 else None
+    if wrong is not None:
+        bad = bytearray(sent[wrong])
+        place = 5 * int(draw.integers(0, 10))
+        # A stamp of 16 bits lies in the first three bytes; this bit is worth 0.8 s or more.
+        stamp = taxel.wire.decode(bytes(bad[place : place + 5])).t[0]
+        for byte, bit in ((place, 0), (place + 1, 6), (place + 1, 5)):
+            flipped = bytearray(bad)
+            flipped[byte] ^= 1 << bit
+            again = taxel.wire.decode(bytes(flipped[place : place + 5]))
+            if len(again) == 1 and abs(int(again.t[0]) - int(stamp)) > 300_000:
+                sent[wrong] = bytes(flipped)
+                break
+        else:
+            pytest.fail("no bit of the stamp")
+    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
+    for number, (one, at) in enumerate(zip(sent, arrived, strict=True)):
+        writer.datagram(at, number, one)
+    writer.finish(json.dumps({"received": len(sent)}))
+    recording = taxel.open(path)
+    late = np.flatnonzero(recording.events.t - recording.events.t[0] != events.t - events.t[0])
+    if wrong is None:
+        assert not len(late)
+        assert (recording.verdict.status, recording.verdict.doubtful_after_us) == ("complete after arrival", None)
+        return
+    assert recording.verdict.status == "damaged"
+    after = recording.verdict.doubtful_after_us
+    assert after is not None
+    assert f"times after {after} us are doubtful" in recording.verdict
+    # All that are wrong come after that time, and it is no earlier than the datagram before.
+    assert recording.events.t[late].min() > after
+    assert after >= recording.events.t[10 * (wrong - 1)]
+
+
+@pytest.mark.parametrize("kind", ["mcap", "npz", "h5", "csv", "lsa"])
+def test_conversions_keep_a_verdict_with_its_numbers(kind: str, tmp_path: Path) -> None:
+    draw, told = np.random.default_rng(1), Told()
+    came = on_the_way(sent_by_a_board(), draw, told)
+    del came[5]
+    write(tmp_path / "a.mcap", came, draw, told, finish=True)
+    first = taxel.open(tmp_path / "a.mcap").verdict
+    assert first.lost["lost_on_the_way"] > 0
+    taxel.convert(tmp_path / "a.mcap", tmp_path / f"b.{kind}")
+    second = taxel.open(tmp_path / f"b.{kind}").verdict
+    if kind in ("csv", "lsa"):
+        assert second.startswith(f"the .{kind} does not say what was lost")
+        # Version 1 cannot tell reordered datagrams from damaged stamps.
+        assert second.status == ("damaged" if "events out of order" in second else "unknown")
+    else:
+        assert second.to_dict() == first.to_dict()
+    taxel.convert(tmp_path / f"b.{kind}", tmp_path / "c.mcap")
+    assert taxel.open(tmp_path / "c.mcap").verdict.to_dict() == second.to_dict()
+
+
+def test_a_merged_verdict_is_the_worst_and_keeps_those_of_its_parts(tmp_path: Path) -> None:
+    record(tmp_path / "good.mcap", some_events(300))
+    for name, lost in (("bad", 2), ("worse", 3)):
+        writer = _core.RecordingWriter(tmp_path / f"{name}.mcap", json.dumps(HEADER), "none", False)
+        writer.datagram(START_NS, 0, taxel.wire.encode(some_events(20, start=1_000_000)))
+        writer.finish(json.dumps({"received": 1, "dropped_by_kernel": lost}))
+    good, bad, worse = (taxel.open(tmp_path / f"{name}.mcap") for name in ("good", "bad", "worse"))
+    both = taxel.merge([good, bad, worse], gap_us=10)
+    verdict = both.verdict
+    assert (verdict.status, verdict.lost) == ("lost", {"dropped_by_kernel": 5})
+    assert list(verdict.parts) == ["good.mcap", "bad.mcap", "worse.mcap"]
+    assert [one.status for one in verdict.parts.values()] == ["complete after arrival", "lost", "lost"]
+    assert verdict == "; ".join(f"{name}: {one}" for name, one in verdict.parts.items())
+    for kind in ("npz", "h5", "mcap"):
+        taxel.convert(both, tmp_path / f"both.{kind}")
+        assert taxel.open(tmp_path / f"both.{kind}").verdict.to_dict() == verdict.to_dict()
+    # Parts of one file have its verdict, which counts once; two files that lost as much have lost twice as much.
+    middle = int(bad.events.t[10])
+    assert taxel.merge([bad.between(0, middle), bad.between(middle, 2**40)]).verdict.lost == {"dropped_by_kernel": 2}
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "bad.mcap").write_bytes((tmp_path / "bad.mcap").read_bytes())
+    twice = taxel.merge([bad, taxel.open(tmp_path / "other" / "bad.mcap")], gap_us=10).verdict
+    assert (twice.lost, list(twice.parts)) == ({"dropped_by_kernel": 4}, ["bad.mcap", "bad.mcap (2)"])
+
+
+def test_a_lsa_without_its_lss_is_unfinished_and_with_damage_still(tmp_path: Path) -> None:
+    taxel.convert(some_events(100), tmp_path / "a.lsa")
+    (tmp_path / "a.lss").unlink()
+    assert taxel.open(tmp_path / "a.lsa").verdict.status == "unfinished"
+    data = (tmp_path / "a.lsa").read_bytes()
+    (tmp_path / "b.lsa").write_bytes(data[:100] + b"\x05\x06" + data[100:])
+    verdict = taxel.open(tmp_path / "b.lsa").verdict
+    assert (verdict.status, verdict.damaged) == ("unfinished", {"bytes_skipped": 2})
+    (tmp_path / "b.lss").touch()
+    assert taxel.open(tmp_path / "b.lsa").verdict.status == "damaged"
+
+
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [
+        ("nothing lost", "complete"),
+        (
+            "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)",
+            "complete after arrival",
+        ),
+        ("nothing lost; 1 resets of the board", "complete after arrival"),
+        ("the .csv does not say what was lost", "unknown"),
+        ("nothing lost; in the bytes that came: 3 bytes skipped", "damaged"),
+        ("not finished: what came last is missing; until then: nothing lost", "unfinished"),
+        ("a.mcap: nothing lost; b.mcap: LOST: 3 messages dropped by the kernel", "lost"),
+        ("converted from a.mcap, a recording that says: nothing lost", "complete"),
+        ("as another program has it", "unknown"),
+    ],
+)
+def test_the_line_of_an_earlier_version_has_a_status(line: str, status: str) -> None:
+    verdict = Verdict(line)
+    assert (verdict.status, verdict.lost) == (status, {})
+    assert verdict == line.rpartition("says: ")[2]
+
+
+def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
+    import copy
+    import pickle
+
+    verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
+    for again in (copy.deepcopy(verdict), pickle.loads(pickle.dumps(verdict)), Verdict.from_dict(verdict.to_dict())):
+        assert (again, again.to_dict()) == (verdict, verdict.to_dict())
+        assert type(again) is Verdict
+    assert json.loads(json.dumps([verdict])) == ["LOST: 2 messages dropped by the kernel"]
+    verdict.lost["dropped_by_kernel"] = 0
+    assert verdict.lost == {"dropped_by_kernel": 2}
+    with pytest.raises(AttributeError):
+        verdict.status = "complete"  # type: ignore[misc]
+    for nonsense in (
+        {},
+        {"status": "fine", "text": ""},
+        {"status": "lost"},
+        [],
+        {"status": "lost", "text": "", "lost": 3},
+    ):
+        with pytest.raises(taxel.ProblemError, match="verdict"):
+            Verdict.from_dict(nonsense)  # type: ignore[arg-type]
