@@ -82,7 +82,7 @@ def _laid_out(text: str) -> str:
     option = "; give --array {}, or rows and columns in a layout file, if they are a grid's taxels row by row"
     if re.search(r"\d+ x \d+ channels without a pitch$", text):
         return option.format("ROWSxCOLUMNS")
-    trained = re.search(r"an array of 1 x (\d+) taxels: the readout was trained on (\d+) x (\d+)\b", text)
+    trained = re.search(r"an array of 1 x (\d+) taxels: the readout was trained on (\d+) x (\d+)$", text)
     if trained and int(trained[1]) == int(trained[2]) * int(trained[3]):
         return option.format(f"{trained[2]}x{trained[3]}")
     return ""

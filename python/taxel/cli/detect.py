@@ -135,7 +135,7 @@ def _naming(recording: str, readout: Path) -> Iterator[None]:
     try:
         yield
     except ProblemError as error:
-        raise ProblemError(f"{recording}: {error} ({readout})") from None
+        raise ProblemError(f"{recording}, by {readout}: {error}") from None
 
 
 def _result(
