@@ -278,6 +278,10 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
             "no parameter 'wings'",
         ),
         (
+            ("train", "1.npz", "--recipe", "touch", "--set", "encoder.noise_floor=2"),
+            "taxel: encoder.noise_floor: recipe touch has several encoders: change encoders.NAME.noise_floor",
+        ),
+        (
             ("train", "1.npz", "--recipe", "recipe.toml", "--set", "wings=2"),
             "a recipe has no key 'wings': there are encoder, learner",
         ),
