@@ -15,7 +15,9 @@ from taxel.detect.training import trained
 KINDS = ("small", "large")
 
 
-def touched(seed: int, rate: float, jitter: float = 0.0, rise_s: float = 0.02) -> tuple[Frames, dict[str, np.ndarray]]:
+def touched(
+    seed: int, rate: float, jitter: float = 0.0, rise_s: float = 0.02, start_us: int = 0
+) -> tuple[Frames, dict[str, np.ndarray]]:
     """Return pictures of 16 touches by two sizes of ball on 7 x 7 taxels, and when which began; stamps may vary."""
     random = np.random.default_rng(seed)
     begins = 1.5 + 0.9 * np.arange(16) + random.uniform(0, 0.2, 16)
@@ -28,18 +30,27 @@ def touched(seed: int, rate: float, jitter: float = 0.0, rise_s: float = 0.02) -
         shape = np.exp(-((y - at[0]) ** 2 + (x - at[1]) ** 2) / (6.5 if wide else 2.0))
         force = np.clip((t - begin) / rise_s, 0, 1) * (t < begin + 0.5) * random.uniform(0.4, 0.6)
         values += force[:, None, None] * shape
-    times = np.rint(1e6 * begins).astype(np.int64)
-    frames = Frames(values, np.rint(1e6 * (t - t[0])).astype(np.int64), unit="mV", array=Array(7, 7))
+    times = start_us + np.rint(1e6 * begins).astype(np.int64)
+    frames = Frames(values, start_us + np.rint(1e6 * (t - t[0])).astype(np.int64), unit="mV", array=Array(7, 7))
     return frames, {"small": times[~large], "large": times[large]}
 
 
 @pytest.mark.parametrize(
-    ("rate", "jitter", "rise_s"),
-    [(25, 0, 0.02), (60, 0, 0.02), (100, 0, 0.02), (100, 0.2, 0.02), (250, 0.1, 0.02), (100, 0, 0.3)],
+    ("rate", "jitter", "rise_s", "start_us"),
+    [
+        (25, 0, 0.02, 0),
+        (60, 0, 0.02, 0),
+        (100, 0, 0.02, 0),
+        (100, 0, 0.02, 1_795_000_000_000_000),
+        (100, 0.2, 0.02, 0),
+        (250, 0.1, 0.02, 0),
+        (100, 0, 0.3, 0),
+    ],
 )
-def test_kinds_are_told_at_any_rate(rate: float, jitter: float, rise_s: float) -> None:
-    learnt, unseen = (touched(seed, rate, jitter, rise_s) for seed in (1, 2))
-    examples = [Example(frames, labels, Tare.take(frames, stop_us=1_200_000)) for frames, labels in (learnt, unseen)]
+def test_kinds_are_told_at_any_rate(rate: float, jitter: float, rise_s: float, start_us: int) -> None:
+    learnt, unseen = (touched(seed, rate, jitter, rise_s, start_us) for seed in (1, 2))
+    rest_us = start_us + 1_200_000
+    examples = [Example(frames, labels, Tare.take(frames, stop_us=rest_us)) for frames, labels in (learnt, unseen)]
     readout = trained(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012), None).readout
     result = score(run(readout, unseen[0], tare=examples[1].tare), unseen[1])
     assert result.missed + result.false <= 1, result

@@ -114,6 +114,16 @@ def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
         assert "pattern" not in said
 
 
+def test_events_out_of_reach_are_named_from_the_beginning_of_a_recording_since_1970() -> None:
+    begin_us = 1_795_000_000_000_000
+    frames = taxel.Frames([[[v]] for v in (0.0, 9.0, 9.0, 0.0)], begin_us + 10_000 * np.arange(4), unit="N")
+    plan = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "ub": 1e-6, "delay_ms": 1.0})
+    with pytest.warns(UserWarning, match=r"out of reach.* \(10 ms\)"):
+        train([Example(frames, {"contact": [begin_us + 10_000]})], plan)
+    with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms lies outside it, 0.000 to 30.000 ms"):
+        train([Example(frames, {"contact": [begin_us + 5_000_000]})], plan)
+
+
 def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
     """Two labels lie within its refractory time."""
     plan = recipe()

@@ -63,6 +63,22 @@ def test_a_rule_detects_live_what_it_detects_in_the_recording(rule: PlainRule, t
         assert np.isnan(found.slope).all()
 
 
+def test_in_a_fresh_tare_nothing_is_detected_live_or_from_the_recording(tmp_path: Path, capsys) -> None:
+    rule, events = PlainRule("area", 2), touches(6)
+    rule.save(tmp_path / "rule.json")
+    with Live(0, host=LOOPBACK, array=SMALL, readout=rule, tare=0.05, record=tmp_path / "rule.mcap") as live:
+        play(events, live.address[1])
+        wait_for(live, len(np.unique(events.t)))
+    live.stop()
+    detections = heard(taxel.open(tmp_path / "rule.mcap").detections)
+    asked = ("detect", tmp_path / "rule.mcap", "--readout", tmp_path / "rule.json", "--tare", 0.05, "--json")
+    again = [one["t_us"] for one in json.loads(call(capsys, *asked)[1])["detections"]]
+    assert len(again) == 8, "two of six touches lie in the tare"
+    assert again[0] >= 50_000
+    assert detections.t.tolist() == again[: len(detections)]
+    assert len(detections) >= 6
+
+
 def test_in_silence_the_end_is_detected() -> None:
     events = touches(1)
     with Live(0, host=LOOPBACK, array=SMALL, readout=PlainRule("area", 2, frames=200), tare=TARE) as live:

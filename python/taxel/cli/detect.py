@@ -67,7 +67,8 @@ def detect(
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
-    from taxel._base.files import try_whole, write_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel._base.arguments import finite  # noqa: PLC0415  the command line starts quickly
+    from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
     from taxel.detect import Example, Outcome, Readout, load, score  # noqa: PLC0415
     from taxel.detect.readout import run_counting  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
@@ -76,6 +77,7 @@ def detect(
         try_whole(csv, overwrite=overwrite)
     if report is not None:
         try_report(report)
+    finite("frame_us", 1.0 if frame_us is None else frame_us, "us", least=1.0, most=3.6e9)
     loaded = load(readout)
     outcomes = []
     with progress(as_json) as update:

@@ -22,6 +22,8 @@ from taxel.spikes import SpikeTrains, to_us
 
 __all__ = ["Ages", "ages_of", "in_pictures", "later_us", "onsets"]
 
+#: Times that are nearer are the same, ms: stamps are whole us, and since 1970 resolved to a quarter of one.
+_SAME_MS = 5e-4
 #: A neuron that has fired is silent for that share of a picture at least: of stamps that are not regular two pictures
 #: may lie in the time of one.
 _SILENT_SHARE = 0.9
@@ -80,8 +82,8 @@ def later_us(pattern: SpikeTrains, ages: Ages, felt_ms: NDArray[np.float64], age
     after = np.append(onsets(pattern, ages), np.inf)
     place = [round(to_us(one)) for one in ages.begin_ms].index(round(to_us(age_ms)))
     fired = np.append(pattern[ages.trains[place]], np.inf)
-    first = fired[np.searchsorted(fired, felt_ms + age_ms - 1e-6)]
-    same = first < after[np.searchsorted(after, felt_ms + 1e-6)]
+    first = fired[np.searchsorted(fired, felt_ms + age_ms - _SAME_MS)]
+    same = first < after[np.searchsorted(after, felt_ms + _SAME_MS)]
     return np.rint(to_us(np.where(same, first - (felt_ms + age_ms), 0.0))).astype(np.int64)
 
 
