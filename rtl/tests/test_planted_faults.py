@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+from test_modules import MODULES, simulated
 from test_totals import answered_and_counted
 from test_version_2 import OFTEN
 
@@ -85,6 +86,58 @@ SPIKES = [
 ]
 
 
+#: Those that the tests of single modules see: module, what stands there, what stands there instead.
+OF_MODULES = [
+    ("afferents", "size[21:6]", "size[22:7]"),
+    ("afferents", "if (fresh_1) held_2.begun <= 1'b0;", ""),
+    ("change_detector", "moved_of > 16'(of_weighed", "moved_of >= 16'(of_weighed"),
+    ("change_detector", "else if (changed) lost_before <= 1'b1;", ""),
+    ("change_detector", "row_written  <= row_copied;", "row_written  <= place;"),
+    ("change_detector", "totals_pending && !totals_busy", "totals_pending"),
+    ("comparator_array", "if (nears) inverted_now <= inverted_next;", "inverted_now <= 1'b0;"),
+    ("comparator_array", "&& !open && !begun) || begins", ") || begins"),
+    ("comparator_column", "first   <= sample[0];", "first   <= sample[1];"),
+    ("comparator_column", " && !closes", ""),
+    ("datagram_sender", "{now.line[2:0], STRIDE}", "{3'd0, STRIDE}"),
+    ("datagram_sender", "buffer[{bank, place}]", "buffer[{1'b0, place}]"),
+    ("ethernet_board", "if (!runs) waited <= '0;", "if (1'b0) waited <= '0;"),
+    ("ethernet_board", ".D0(txd[k]), .D1(txd[k+4])", ".D0(txd[k+4]), .D1(txd[k])"),
+    ("ethernet_frame", "16'(size) + 16'd28", "16'(size) + 16'd20"),
+    ("ethernet_frame", "at >= size", "at > size"),
+    ("event_fifo", "push && waiting == (PLACES + 1)'(DEPTH - 1)", "push && waiting == (PLACES + 1)'(DEPTH - 2)"),
+    ("event_fifo", "none && !fetched_valid && !ready", "none && !ready"),
+    ("line_select", "unknown || lines > known", "unknown"),
+    ("line_select", "out > in ? out : in", "in"),
+    ("line_sorter", "oldest.x == gathering.x && ", ""),
+    ("line_sorter", "line.lost   <= 1'b0;", ""),
+    ("mux_ctrl", "32'(EARLY + 1);", "32'(EARLY + 2);"),
+    ("mux_ctrl", "read.noise_floor   <= active", "read.noise_floor   <= written"),
+    ("packer_v1", "9'(k == 1 ? MOST - 1 : MOST - 2)", "9'(MOST - 1)"),
+    ("packer_v1", "oldest.frame == now.frame && ", ""),
+    ("packer_v2", "(moved || behind);", "moved;"),
+    ("packer_v2", "8'(gap >> 6) - 8'd1", "8'(gap >> 6)"),
+    ("power_law", "24'd1110689,", "24'd1110690,"),
+    ("power_law", "11'd2047 : ticks[10:0]", "11'd2046 : ticks[10:0]"),
+    ("random_lines", "w[0] ^ w[2] ^ w[3] ^ w[5]", "w[0] ^ w[2] ^ w[3] ^ w[4]"),
+    ("random_lines", "if (first) swapped <= '0;", ""),
+    ("register_file", "changed.record != written.record", "changed.record"),
+    ("register_file", "reserved ? 4'd4 : ", ""),
+    ("status_sender", "{bits, rest} <= {rest, rest[0]};", "{bits, rest} <= totals;"),
+    ("status_sender", "given[k] <= counts[k];", ""),
+    ("synchroniser", "{to, unsettled} <= {unsettled, from}", "{to, unsettled} <= {from, from}"),
+    ("synchroniser", "{to, unsettled} <= {unsettled, from}", "{to, unsettled} <= {!unsettled, from}"),
+    ("time_stamper", "clocks_us == 7'(SHORT - 1)", "clocks_us == 7'(SHORT)"),
+    ("time_stamper", "if (frame_start) of_frame <= now;", "of_frame <= now;"),
+    ("top", "tvalid && tready && tlast", "tvalid && tlast"),
+    ("top", ".ready(ready && oldest.format.version_2 && !busy_v1)", ".ready(ready && oldest.format.version_2)"),
+    ("top", ".frame_sync(active.frame_sync)", ".frame_sync(1'b0)"),
+    ("uart_rx", "valid <= line;", "valid <= 1'b1;"),
+    ("uart_rx", "CLOCKS + CLOCKS / 2 - 1", "CLOCKS - 1"),
+    ("udp_sender", "payload[{filled, place}] <= tdata", "payload[{1'b0, place}] <= tdata"),
+    ("udp_sender", "lengths[filled] <= room ? place + BITS'(1) : place", "lengths[filled] <= place + BITS'(1)"),
+]
+
+
 def plant(fault, to):
     """Write the sources with one edit."""
     file, there, instead = fault
@@ -122,6 +175,14 @@ def test_a_fault_of_version_2_is_seen(fault, tmp_path):
 def test_a_fault_of_afferents_is_seen(fault, tmp_path):
     plant(fault, tmp_path)
     assert any(differs_in_spikes(tmp_path, intensity) for intensity in ("nothing", "difference"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", OF_MODULES, ids=[f"{module}-{k}" for k, (module, _, _) in enumerate(OF_MODULES)])
+def test_a_fault_is_seen_by_the_test_of_its_module(fault, tmp_path):
+    module, there, instead = fault
+    plant((f"taxel_{module}.sv", there, instead), tmp_path)
+    assert any(simulated(module, parameters, tmp_path).returncode == 2 for parameters in MODULES[module])
 
 
 def test_the_sources_without_a_fault_are_not_taken_for_one():
