@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel import _core
-from taxel.recording import Verdict
+from taxel import Verdict, _core
 from taxel.recording.verdict import STATUSES
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
