@@ -19,7 +19,7 @@ from taxel.tare import Tare
 if TYPE_CHECKING:
     from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire
     from taxel.detect import Readout
-    from taxel.recording import BoardChange, Datagrams, Recording, Zeroing
+    from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing
     from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
     from taxel.recording.convert import convert
     from taxel.recording.cut import cut
@@ -54,6 +54,7 @@ __all__ = [
     "SceneError",
     "SpikeTrains",
     "Tare",
+    "Verdict",
     "Zeroing",
     "convert",
     "cut",
@@ -80,7 +81,7 @@ _ROOMS = (
     "wire", "wire_v2",
 )  # fmt: skip
 _RECORDING = (
-    "BoardChange", "Datagrams", "Health", "Recording", "Zeroing", "convert", "cut", "health", "merge",
+    "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",
 )  # fmt: skip
 _ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
 _ELSEWHERE |= {"open": ("taxel.recording", "open_any"), "Readout": ("taxel.detect", "Readout")}

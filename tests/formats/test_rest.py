@@ -205,7 +205,7 @@ def test_the_tail_of_noise_is_not_at_full_scale(seed, tmp_path, capsys) -> None:
     top = values.max()
     at_top = np.count_nonzero(values == top, axis=0)
     assert (np.count_nonzero(at_top >= 3) > 1) == (seed == 19)
-    for name, kept, cut_off in (("noise", values, None), ("cut", np.minimum(4 * values, 2060), 2060)):
+    for name, kept, cut_off in (("noise", values, None), ("cut", np.minimum(4 * values, 2020), 2020)):
         frames = taxel.Frames(kept, np.arange(40_000) * 1000, unit="counts")
         facts = facts_of(frames, tmp_path / f"{name}.npz", capsys)
         assert (facts["full_scale"] or {"value": None})["value"] == cut_off, name

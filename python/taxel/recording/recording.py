@@ -340,7 +340,7 @@ class Recording:
 
     @property
     def verdict(self) -> Verdict:
-        """What was lost at which stage: a line of text, with a status and numbers by cause (`taxel.recording.Verdict`).
+        """What was lost at which stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
 
         That of a part is that of the whole file. The page *What the output means* lists statuses, causes and wordings;
         all else there is to know is in `remarks`.

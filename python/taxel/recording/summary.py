@@ -138,10 +138,10 @@ def _full_scale(frames: Frames) -> dict[str, Any] | None:
     least, top = (float(of.reduce(values, axis=None)) for of in (np.fmin, np.fmax))
     if not np.isfinite(top - least) or (top - least < _LEVELS and not np.any(values % 1)):
         return None
-    below, tail = top, []
+    below, tail = top, list[int]()
     while len(tail) < _BELOW and below > least:
         below = float(np.max(values, where=values < below, initial=least))
-        tail.append(np.count_nonzero(values == below))
+        tail.append(int(np.count_nonzero(values == below)))
     at_top = np.count_nonzero(values == top, axis=0)
     # A taxel that is always there is stuck.
     at_top[(at_top < _AT_TOP) | (at_top == np.count_nonzero(~np.isnan(values), axis=0))] = 0
