@@ -191,7 +191,8 @@ def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
     floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []
     for part in readout.encoder._each() if isinstance(readout, Readout) else ():
         floors += [float(part.noise_floor)] if isinstance(part, ContactArea | Moments) else []
-    count = drifted(source, tare, max(floors)) if tare is not None and floors else 0
+    known = tare is not None and floors and isinstance(source, Events | Frames)
+    count = drifted(source, tare, max(floors)) if known else 0
     what = (
         f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that lifts are missed"
     )

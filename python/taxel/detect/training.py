@@ -18,7 +18,7 @@ from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.ages import ages_of, in_pictures, later_us
+from taxel.detect.ages import ACTS_AFTER_MS, ages_of, in_pictures, later_us, silent_windows
 from taxel.detect.alignment import Alignment, align, aligned_to
 from taxel.detect.examples import Example, array_of, called, checked
 from taxel.detect.followed import FOLLOWED_MS, Followed, follow, only, silence
@@ -361,9 +361,10 @@ class Fitting:
         self._shift_ms = received.latency_ms + self.delay_ms
         trains = [_until(source, targets) for source, targets in zip(self._sources, self._targets, strict=True)]
         self._check_felt(trains)
-        silent = None
-        if followed is not None:
-            grid = learner._on_grid()
+        silent, grid = None, learner._on_grid()
+        if ages is not None and grid.kernel == "exponential":
+            silent = [silent_windows(one, ages, t, grid) for one, t in zip(trains, self._targets, strict=True)]
+        elif followed is not None:
             silent = silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, grid.step_ms)
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
         report(self._what)
@@ -429,7 +430,7 @@ class Fitting:
 
 def _acts_after_ms(neuron: Neuron) -> float:
     """Return how long after a spike a neuron can be trained to fire by it, ms: at once where its potential jumps."""
-    return 1e-3 if neuron.kernel == "exponential" else neuron.step_ms
+    return ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
 
 
 def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
