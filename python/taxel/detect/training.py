@@ -18,7 +18,7 @@ from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.ages import ACTS_AFTER_MS, ages_of, in_pictures, later_us, silent_windows
+from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_pictures, later_us, silent_windows
 from taxel.detect.alignment import Alignment, align, aligned_to
 from taxel.detect.examples import Example, array_of, called, checked
 from taxel.detect.followed import FOLLOWED_MS, Followed, follow, only, silence
@@ -361,11 +361,7 @@ class Fitting:
         self._shift_ms = received.latency_ms + self.delay_ms
         trains = [_until(source, targets) for source, targets in zip(self._sources, self._targets, strict=True)]
         self._check_felt(trains)
-        silent, grid = None, learner._on_grid()
-        if ages is not None and grid.kernel == "exponential":
-            silent = [silent_windows(one, ages, t, grid) for one, t in zip(trains, self._targets, strict=True)]
-        elif followed is not None:
-            silent = silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, grid.step_ms)
+        silent = self._silent(followed, sources, trains, ages, learner._on_grid())
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
         report(self._what)
         try:
@@ -373,6 +369,21 @@ class Fitting:
         except ProblemError as error:
             raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
+
+    def _silent(
+        self,
+        followed: Followed | None,
+        sources: Sequence[SpikeTrains],
+        trains: Sequence[SpikeTrains],
+        ages: Ages | None,
+        neuron: Neuron,
+    ) -> list[NDArray[np.float64]] | None:
+        """Return the windows in which the neuron must be silent; None where it must at any time but at targets."""
+        if ages is not None and neuron.kernel == "exponential":
+            return [silent_windows(one, ages, t, neuron) for one, t in zip(trains, self._targets, strict=True)]
+        if followed is not None:
+            return silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, neuron.step_ms)
+        return None
 
     def _check_felt(self, trains: Sequence[SpikeTrains]) -> None:
         """Refuse an example with targets and without any spike up to them."""
