@@ -18,12 +18,12 @@ from taxel.detect.recipe import LISTS, Recipe
 from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.neuron import Neuron
-from taxel.spikes import SpikeTrains, to_us
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
 __all__ = ["ACTS_AFTER_MS", "Ages", "ages_of", "in_pictures", "later_us", "onsets", "silent_windows"]
 
 #: So long after a spike a neuron is trained to fire whose potential jumps by it, ms.
-ACTS_AFTER_MS = 1e-3
+ACTS_AFTER_MS = to_ms(1.0)
 #: Times that are nearer are the same, ms: stamps are whole us, and since 1970 resolved to a quarter of one.
 _SAME_MS = 5e-4
 #: A neuron that has fired is silent for that share of a picture at least: of stamps that are not regular two pictures
@@ -132,7 +132,7 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
     own = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()] or [dict(recipe.learner)]
     delays = [_delay_ms(one) for one in own if _aged(recipe, one)]
     pictures_ms = max(_picture_ms(one) for one in examples)
-    period_ms = pictures_ms or max((frame_us or 0.0) / 1e3 for frame_us, _ in clocks)
+    period_ms = pictures_ms or max(to_ms(frame_us or 0.0) for frame_us, _ in clocks)
     if not delays or not period_ms or (not pictures_ms and period_ms <= min(delays)):
         return recipe
     early = _EARLY if pictures_ms else 0.0
@@ -142,7 +142,7 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         return ceil(ms / period_ms - 1e-6)
 
     def begin_ms(pictures: int) -> float:
-        return max(0.0, round(1e3 * (pictures - early) * period_ms) / 1e3)
+        return max(0.0, to_ms(round(to_us((pictures - early) * period_ms))))
 
     def point(values: Mapping[str, Any], under: Mapping[str, Any], seen: dict[int, float]) -> dict[str, Any] | None:
         every = {**under, **values}
@@ -194,4 +194,4 @@ def _delay_ms(values: Mapping[str, Any]) -> float:
 def _picture_ms(example: Example) -> float:
     """Return the median distance of the pictures of a (checked) example, ms; 0 of what has no pictures."""
     source = example.source
-    return float(np.median(np.diff(source.t))) / 1e3 if isinstance(source, Frames) and len(source) > 1 else 0.0
+    return to_ms(float(np.median(np.diff(source.t)))) if isinstance(source, Frames) and len(source) > 1 else 0.0
