@@ -392,8 +392,9 @@ class Fitting:
                 where = name if len(trains) > 1 else "the recording"
                 raise ProblemError(
                     f"{self._label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; "
-                    "taxel info shows what was touched; falls = true in a layout file turns readings that fall with "
-                    "pressure"
+                    "either the tare holds a touch, as it ends before the first label, which may be late (give --tare "
+                    "SECONDS), or readings fall with pressure (falls = true in a layout file); taxel info shows what "
+                    "was touched"
                 )
 
     def fits(self, recipe: Recipe) -> bool:
