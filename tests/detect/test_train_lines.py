@@ -139,6 +139,7 @@ def test_a_recording_without_a_spike_is_refused_in_one_line(tmp_path: Path, caps
     assert code == 2
     assert error.startswith("taxel: contact: nothing was felt in the recording up to the last of its 3 events; ")
     assert error.count("\n") == 1
+    assert "the tare holds a touch" in error, "labels that are late let the tare end after a touch began"
 
 
 def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Path, capsys) -> None:

@@ -216,7 +216,7 @@ def test_an_option_that_is_not_known_is_refused(options, said):
         ([[0.0, 5.0]], r"silence of pattern 0 has shape \(2,\): must hold windows"),
         ([[(0.0, 5.0, 6.0)]], r"silence of pattern 0 has shape \(1, 3\)"),
         ([[("a", "b")]], "silence of pattern 0: holds"),
-        (5.0, "silence is 5.0: must be a sequence"),
+        (5.0, "silence is 5: must be a sequence"),
     ],
 )
 def test_windows_that_make_no_sense_are_refused(silence, said):

@@ -128,7 +128,7 @@ def test_a_pitch_that_makes_no_sense_is_refused(value: Any) -> None:
         (lambda: Places(np.zeros(3), np.zeros(4)), "y has shape"),
         (lambda: Places(np.zeros(3), np.zeros(3), unit="inch"), "unit"),
         (lambda: Array(1, 2, places=Places([0.0, np.nan], [0.0, 0.0])), "x of row 0, column 1 is nan: must be finite"),
-        (lambda: Array(1, 2, places=Places([0.0, 1.0], [0.0, 0.0], [1.0, 0.0])), "area of row 0, column 1 is 0.0"),
+        (lambda: Array(1, 2, places=Places([0.0, 1.0], [0.0, 0.0], [1.0, 0.0])), "area of row 0, column 1 is 0"),
     ],
 )
 def test_places_that_make_no_sense_are_refused(make: Callable[[], object], match: str) -> None:

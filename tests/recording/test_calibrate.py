@@ -96,7 +96,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
     ("options", "said"),
     [
         ((), "nothing to calibrate by: give --load, --loads, --table or --law"),
-        (("--load", "0"), "load 1 is 0.0: must be above 0"),
+        (("--load", "0"), "load 1 is 0: must be above 0"),
         (("--load", "3", "--from", "7", "--to", "9"), "--load: nothing was recorded from 7.0 to 9.0 s"),
         (("--load", "3", "--from", "99"), "--load: nothing was recorded from 99.0 s on"),
         (("--load", "3", "--to", "-1"), "--load: nothing was recorded before -1.0 s"),

@@ -97,7 +97,7 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
         (("info", "WALK", "--array", "6 by 6"), "--array 6 by 6: must be rows x columns, as 64x64, or with the pitch"),
         (("convert", "WALK", "nowhere/a.csv"), "nowhere: no such folder"),
         (("convert", "WALK", "a.mcap", "--compression", "gzip"), "compression is 'gzip'"),
-        (("convert", "WALK", "a.csv", "--frames", "-3"), "frames_hz is -3.0"),
+        (("convert", "WALK", "a.csv", "--frames", "-3"), "frames_hz is -3"),
         (("cut", "WALK", "a.mcap", "--from", "99"), "walk.mcap lasts from 0.0001 to 0.0635 s; must be at most its end"),
         (("cut", "WALK", "a.mcap", "--to", "0.0001"), "--to 0.0001: "),
         (("cut", "WALK", "a.csv", "--from", "2", "--to", "1"), "must not end before it begins"),

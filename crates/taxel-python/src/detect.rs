@@ -166,6 +166,7 @@ fn parse_tare(tare: Option<&str>) -> PyResult<Option<Tare>> {
 /// The detections of a readout or a plain rule in a whole recording of events, with its zeroings: t in us, column, row,
 /// rest; and how many of them have an input outside its range in training.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
 fn readout_run_events<'py>(
     py: Python<'py>,
     readout: &str,

@@ -54,7 +54,9 @@ _MOST_REPEATED = 100_000_000
 
 
 def shown(value: object) -> str:
-    """Return the representation of a value for an error: one line, at most 60 characters."""
+    """Return the representation of a value for an error: one line, at most 60 characters; a whole number as typed."""
+    if isinstance(value, float) and value.is_integer():
+        return plain(value)
     try:
         words = " ".join(repr(_beginning(value)).split())
     except Exception:  # a caller's class may raise any error

@@ -93,11 +93,11 @@ def _check_time(recording: Recording, start: float | None, stop: float | None) -
     if start is None and stop is None:
         return
     first, last = (t / 1e6 for t in span_us(recording))
-    lasts = f"{recording.path} lasts from {first} to {last} s"
+    lasts = f"{recording.path} lasts from {plain(first)} to {plain(last)} s"
     if start is not None and start > last:
-        raise ProblemError(f"--from {start}: {lasts}; must be at most its end")
+        raise ProblemError(f"--from {plain(start)}: {lasts}; must be at most its end")
     if stop is not None and stop <= first:
-        raise ProblemError(f"--to {stop}: {lasts}; must be above its beginning")
+        raise ProblemError(f"--to {plain(stop)}: {lasts}; must be above its beginning")
 
 
 def _range(option: str, text: str | None) -> slice | None:

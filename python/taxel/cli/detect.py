@@ -18,7 +18,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_of, try_report
-from taxel.spikes import to_ms
+from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -192,7 +192,9 @@ def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
     floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []
     for part in readout.encoder._each() if isinstance(readout, Readout) else ():
         floors += [float(part.noise_floor)] if isinstance(part, ContactArea | Moments) else []
-    count = drifted(source, tare, max(floors)) if tare is not None and floors else 0
+    if tare is None or not floors or isinstance(source, SpikeTrains):
+        return None
+    count = drifted(source, tare, max(floors))
     what = (
         f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that lifts are missed"
     )

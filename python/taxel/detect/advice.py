@@ -106,7 +106,10 @@ def _advice(
     if loaded >= _TOUCH:
         return Advice("another tare", f"{loaded} taxels read above theirs while nothing touches them")
     if 2 * unfelt > wrong:
-        return Advice("another tare", f"nothing was felt of {counted(unfelt, 'label')}, unless they are wrong")
+        return Advice(
+            "another tare",
+            f"nothing was felt of {counted(unfelt, 'label')}, unless their times are off by more than 50 ms",
+        )
     if rule is not None and 2 * rule.rank[0] <= wrong:
         return _by_rule(made, rule.rank[0], wrong)
     if channels and _for_touch(made):

@@ -18,19 +18,22 @@ from taxel.detect.recipe import LISTS, Recipe
 from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.neuron import Neuron
-from taxel.spikes import SpikeTrains, to_us
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
-__all__ = ["Ages", "ages_of", "in_pictures", "later_us", "onsets"]
+__all__ = ["ACTS_AFTER_MS", "Ages", "ages_of", "in_pictures", "later_us", "onsets", "silent_windows"]
 
+#: So long after a spike a neuron is trained to fire whose potential jumps by it, ms.
+ACTS_AFTER_MS = to_ms(1.0)
 #: Times that are nearer are the same, ms: stamps are whole us, and since 1970 resolved to a quarter of one.
 _SAME_MS = 5e-4
 #: A neuron that has fired is silent for that share of a picture at least: of stamps that are not regular two pictures
 #: may lie in the time of one.
 _SILENT_SHARE = 0.9
-#: A kernel shorter than this share of a picture becomes an exponential one of that length, so that the time from a
-#: stamp to the next point of the grid, ...
+#: A kernel shorter than this share of a picture, which stamps beside the grid would change by a third, ...
+_SHORT_SHARE = 0.05
+#: ... becomes an exponential one as long as this share, ...
 _TAU_SHARE = 0.25
-#: ... whose step is this share of a picture, changes the potential by less than a tenth.
+#: ... with such a step of the grid: from a stamp to the next point of it the potential falls by less than a tenth.
 _STEP_SHARE = 0.02
 #: By which share of a picture an age of pictures begins early.
 _EARLY = 0.5
@@ -87,6 +90,29 @@ def later_us(pattern: SpikeTrains, ages: Ages, felt_ms: NDArray[np.float64], age
     return np.rint(to_us(np.where(same, first - (felt_ms + age_ms), 0.0))).astype(np.int64)
 
 
+def silent_windows(
+    pattern: SpikeTrains, ages: Ages, targets: NDArray[np.float64], neuron: Neuron
+) -> NDArray[np.float64]:
+    """Return windows, one a sample of a touch, in which a neuron must be silent, shape (windows, 2), ms.
+
+    For a potential that jumps at a sample and falls until the next, which exceeds nothing anywhere else. Silence is not
+    required at a target and in the refractory time after it.
+
+    Parameters
+    ----------
+    pattern : SpikeTrains
+    ages : Ages
+        Of the encoder that made it.
+    targets : float64, ascending, ms
+    neuron : Neuron
+        On a grid.
+    """
+    clock = np.sort(np.concatenate([pattern[n] for n in ages.trains]))
+    last = np.append(-np.inf, targets)[np.searchsorted(targets, clock + ACTS_AFTER_MS + _SAME_MS)]
+    clock = clock[clock - last >= neuron.refractory]
+    return np.column_stack([clock, clock + neuron.step_ms]) + _SAME_MS
+
+
 def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Clock]) -> Recipe:
     """Return the recipe with the ages of a touch, and the delays at one, that the pictures of (checked) examples show.
 
@@ -103,10 +129,10 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
     clocks : sequence of Clock
         Of the examples: how long a frame of events lasts.
     """
-    own = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()] or [recipe.learner]
+    own = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()] or [dict(recipe.learner)]
     delays = [_delay_ms(one) for one in own if _aged(recipe, one)]
     pictures_ms = max(_picture_ms(one) for one in examples)
-    period_ms = pictures_ms or max((frame_us or 0.0) / 1e3 for frame_us, _ in clocks)
+    period_ms = pictures_ms or max(to_ms(frame_us or 0.0) for frame_us, _ in clocks)
     if not delays or not period_ms or (not pictures_ms and period_ms <= min(delays)):
         return recipe
     early = _EARLY if pictures_ms else 0.0
@@ -116,7 +142,7 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         return ceil(ms / period_ms - 1e-6)
 
     def begin_ms(pictures: int) -> float:
-        return max(0.0, round(1e3 * (pictures - early) * period_ms) / 1e3)
+        return max(0.0, to_ms(round(to_us((pictures - early) * period_ms))))
 
     def point(values: Mapping[str, Any], under: Mapping[str, Any], seen: dict[int, float]) -> dict[str, Any] | None:
         every = {**under, **values}
@@ -128,7 +154,7 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         used.add(pictures)
         refractory = max(float(every.get("refractory", Neuron().refractory)), _SILENT_SHARE * period_ms)
         made = {**values, "delay_ms": begin_ms(pictures), "refractory": refractory}
-        if pictures_ms and float(every.get("tau", Neuron().tau)) < _TAU_SHARE * period_ms:
+        if pictures_ms and float(every.get("tau", Neuron().tau)) < _SHORT_SHARE * period_ms:
             made |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": _STEP_SHARE * period_ms}
         return made
 
@@ -168,4 +194,4 @@ def _delay_ms(values: Mapping[str, Any]) -> float:
 def _picture_ms(example: Example) -> float:
     """Return the median distance of the pictures of a (checked) example, ms; 0 of what has no pictures."""
     source = example.source
-    return float(np.median(np.diff(source.t))) / 1e3 if isinstance(source, Frames) and len(source) > 1 else 0.0
+    return to_ms(float(np.median(np.diff(source.t)))) if isinstance(source, Frames) and len(source) > 1 else 0.0

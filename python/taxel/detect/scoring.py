@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, floats, instance, numbers, shown
-from taxel._base.messages import counted
+from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.spikes import to_us
@@ -286,7 +286,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
     wrong = ~((widths >= 0) & (widths <= 3_600_000))
     if wrong.any():
         raise ProblemError(
-            f"window_ms is {np.atleast_1d(widths)[np.atleast_1d(wrong)][0]}: must lie between 0 and 3600000"
+            f"window_ms is {plain(np.atleast_1d(widths)[np.atleast_1d(wrong)][0])}: must lie between 0 and 3600000"
         )
     windows[:] = np.rint(to_us(widths))
     return windows

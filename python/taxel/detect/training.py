@@ -18,7 +18,7 @@ from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.ages import ages_of, in_pictures, later_us
+from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_pictures, later_us, silent_windows
 from taxel.detect.alignment import Alignment, align, aligned_to
 from taxel.detect.examples import Example, array_of, called, checked
 from taxel.detect.followed import FOLLOWED_MS, Followed, follow, only, silence
@@ -361,10 +361,7 @@ class Fitting:
         self._shift_ms = received.latency_ms + self.delay_ms
         trains = [_until(source, targets) for source, targets in zip(self._sources, self._targets, strict=True)]
         self._check_felt(trains)
-        silent = None
-        if followed is not None:
-            grid = learner._on_grid()
-            silent = silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, grid.step_ms)
+        silent = self._silent(followed, sources, trains, ages, learner._on_grid())
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
         report(self._what)
         try:
@@ -373,6 +370,21 @@ class Fitting:
             raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
 
+    def _silent(
+        self,
+        followed: Followed | None,
+        sources: Sequence[SpikeTrains],
+        trains: Sequence[SpikeTrains],
+        ages: Ages | None,
+        neuron: Neuron,
+    ) -> list[NDArray[np.float64]] | None:
+        """Return the windows in which the neuron must be silent; None where it must at any time but at targets."""
+        if ages is not None and neuron.kernel == "exponential":
+            return [silent_windows(one, ages, t, neuron) for one, t in zip(trains, self._targets, strict=True)]
+        if followed is not None:
+            return silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, neuron.step_ms)
+        return None
+
     def _check_felt(self, trains: Sequence[SpikeTrains]) -> None:
         """Refuse an example with targets and without any spike up to them."""
         for name, train, times in zip(self._names, trains, self._targets, strict=True):
@@ -380,8 +392,9 @@ class Fitting:
                 where = name if len(trains) > 1 else "the recording"
                 raise ProblemError(
                     f"{self._label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; "
-                    "taxel info shows what was touched; falls = true in a layout file turns readings that fall with "
-                    "pressure"
+                    "either the tare holds a touch, as it ends before the first label, which may be late (give --tare "
+                    "SECONDS), or readings fall with pressure (falls = true in a layout file); taxel info shows what "
+                    "was touched"
                 )
 
     def fits(self, recipe: Recipe) -> bool:
@@ -429,7 +442,7 @@ class Fitting:
 
 def _acts_after_ms(neuron: Neuron) -> float:
     """Return how long after a spike a neuron can be trained to fire by it, ms: at once where its potential jumps."""
-    return 1e-3 if neuron.kernel == "exponential" else neuron.step_ms
+    return ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
 
 
 def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:

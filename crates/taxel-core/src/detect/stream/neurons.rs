@@ -52,13 +52,7 @@ impl Neurons {
     }
 
     /// Advances the neurons to `until_ms`, before which every spike is known; emits what lies at `begin` us or later.
-    pub fn settle(
-        &mut self,
-        until_ms: f64,
-        clock: &FrameClock,
-        begin: i64,
-        out: &mut Vec<Detection>,
-    ) -> Result<()> {
+    pub fn settle(&mut self, until_ms: f64, clock: &FrameClock, begin: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.waiting.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         let certain = self.waiting.partition_point(|(spike, _)| spike.t < until_ms);
         let mut crossings: Vec<Crossing> = Vec::new();
@@ -69,9 +63,7 @@ impl Neurons {
             one.advance(until_ms, k, &mut crossings);
         }
         self.waiting.drain(..certain);
-        let t_of = |crossing: &Crossing| {
-            us(crossing.spike.t - self.neurons[crossing.neuron].offset_ms).round() as i64
-        };
+        let t_of = |crossing: &Crossing| us(crossing.spike.t - self.neurons[crossing.neuron].offset_ms).round() as i64;
         crossings.retain(|crossing| t_of(crossing) >= begin);
         crossings.sort_by(|a, b| a.spike.t.total_cmp(&b.spike.t));
         self.outside += crossings.iter().filter(|crossing| crossing.outside).count() as u64;
