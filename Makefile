@@ -92,9 +92,10 @@ bridge: $(VENV)/.bridge
 demo: build
 	$(BIN)/taxel demo
 
+# Many tests wait for a board's clock, a page or a process: four at a time keep two cores busy.
 test: released $(VENV)/.for-test
 	cargo test --release --workspace --quiet --no-fail-fast
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
+	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 slow: released $(VENV)/.for-test dist bridge
 	cargo test --release --workspace --quiet -- --ignored

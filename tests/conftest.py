@@ -20,6 +20,11 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 collect_ignore_glob = ["data/*", "simulate/press_by_*.py"]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that look at pages: they take longest, and the last one keeps all others waiting."""
+    items.sort(key=lambda item: "chromium" not in getattr(item, "fixturenames", ()))
+
+
 @pytest.fixture(autouse=True, scope="session")
 def no_progress_on_a_slow_machine() -> Iterator[None]:
     """Let commands run long before a line of progress, which tests of stderr do not expect."""

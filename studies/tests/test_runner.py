@@ -60,7 +60,11 @@ def _forget(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)
 
 
-@pytest.mark.parametrize("backend", ["here", "loky", "dask", "ray"])
+@pytest.mark.parametrize(
+    "backend",
+    # A cluster takes ten seconds of processor time to start: the results of one are looked at beside its errors, below.
+    ["here", "loky", *(pytest.param(cluster, marks=pytest.mark.slow) for cluster in ("dask", "ray"))],
+)
 def test_each_task_has_its_result(tmp_path, backend):
     """Dask and Ray start two worker processes on loopback."""
     results = Results(tmp_path / "results.jsonl", "code")

@@ -1,7 +1,8 @@
 """Spoil files of every format, run the commands on them in this process, and say what ended in anything but an answer.
 
-Run as ``python hostile.py KIND SEED FIRST COUNT FOLDER``. A command may succeed, or end with one of taxel's exit codes
-and one line. Memory is bounded by RLIMIT_AS, work by RLIMIT_CPU: seconds of this process, not of the clock on the wall.
+Run as ``python hostile.py KIND[,KIND...] SEED FIRST COUNT FOLDER``. A command may succeed, or end with one of taxel's
+exit codes and one line. Memory is bounded by RLIMIT_AS, work by RLIMIT_CPU: seconds of this process, not of the clock
+on the wall.
 """
 
 from __future__ import annotations
@@ -325,7 +326,7 @@ def work(name: str, seed: int, first: int, count: int, folder: Path) -> list[str
         file = files[int(rng.integers(len(files)))]
         file.write_bytes(spoilt(rng, name, sound[file]))
         # If the process is killed, the last line names the file.
-        print(json.dumps({"at": number}), flush=True)
+        print(json.dumps({"at": f"{name} {number}"}), flush=True)
         if name in formats.FORMATS:
             said = load(name, path)
             wrong += [f"{name} {number}: {said}"] * (said is not None)
@@ -347,8 +348,10 @@ def bounded(count: int) -> None:
 
 
 if __name__ == "__main__":
-    _name, _seed, _first, _count, _folder = sys.argv[1:]
-    bounded(int(_count))
-    for _said in work(_name, int(_seed), int(_first), int(_count), Path(_folder)):
-        print(json.dumps({"wrong": _said}))
+    _names, _seed, _first, _count, _folder = sys.argv[1:]
+    bounded(int(_count) * len(_names.split(",")))
+    for _name in _names.split(","):
+        (_place := Path(_folder) / _name).mkdir()
+        for _said in work(_name, int(_seed), int(_first), int(_count), _place):
+            print(json.dumps({"wrong": _said}))
     print(json.dumps({"done": True}))

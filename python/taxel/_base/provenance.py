@@ -47,6 +47,8 @@ class Sources:
     def __init__(self, roots: Mapping[str, Path], compiled: Mapping[str, str]) -> None:
         self._roots, self._compiled = dict(roots), dict(compiled)
         self._modules: dict[str, _Module | None] = {}
+        #: What each module uses, of those that were followed.
+        self._followed: dict[str, list[str]] = {}
 
     def parts(self, *modules: str) -> dict[str, str]:
         """Return the digest of every part that the results of some modules depend on.
@@ -76,7 +78,9 @@ class Sources:
                 digests[name] = module.digest
                 data = module.data if self._roots[name.split(".")[0]].is_dir() else []
                 digests |= {self._shown(file): _digest(file.read_bytes()) for file in data}
-                open_ += self._used(module)
+                if name not in self._followed:
+                    self._followed[name] = list(self._used(module))
+                open_ += self._followed[name]
         return dict(sorted(digests.items()))
 
     def digest(self, *modules: str) -> str:
@@ -162,30 +166,31 @@ class _Module:
     def __init__(self, name: str, path: Path) -> None:
         self.name, self.path = name, path
         tree = ast.parse(path.read_bytes())
-        for node in ast.walk(tree):
+        nodes = list(ast.walk(tree))
+        for node in nodes:
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and _described(
                 node
             ):
                 del node.body[0]
-        self.digest = _digest("".join(_flat(tree)).encode())
+        self.digest = _digest(_flat(tree).encode())
         #: The origin of each name that an import binds: module, and name in it; includes imports for types.
         self.bound: dict[str, tuple[str, str | None]] = {}
         #: The names that are imported when the module runs.
         self.imported: list[tuple[str, str | None]] = []
-        for node, runs in _imports(tree):
+        for node, runs in _imports(nodes):
             for alias, source, original in _names(node):
                 self.bound[alias] = (source, original)
                 if runs:
                     self.imported.append((source, original))
-        self._tree = tree
+        self._nodes = nodes
         self.defined = {name for node in tree.body for name in _defines(node)}
 
     @cached_property
     def chains(self) -> list[tuple[str, tuple[str, ...]]]:
         """List how each name that an import binds is used: ``learn.ConeX`` is ``("learn", ("ConeX",))``."""
-        bases = {id(node.value) for node in ast.walk(self._tree) if isinstance(node, ast.Attribute)}
+        bases = {id(node.value) for node in self._nodes if isinstance(node, ast.Attribute)}
         uses = []
-        for node in ast.walk(self._tree):
+        for node in self._nodes:
             if isinstance(node, ast.Attribute | ast.Name) and id(node) not in bases:
                 chain: list[str] = []
                 inner: ast.expr = node
@@ -199,7 +204,7 @@ class _Module:
     @cached_property
     def computes_names(self) -> bool:
         """Whether it imports by a computed name."""
-        calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call)]
+        calls = [node for node in self._nodes if isinstance(node, ast.Call)]
         called = [(getattr(call.func, "id", getattr(call.func, "attr", "")), call) for call in calls]
         return any(
             name == "import_module" and not (call.args and isinstance(call.args[0], ast.Constant))
@@ -209,7 +214,7 @@ class _Module:
     @cached_property
     def data(self) -> list[Path]:
         """The data files in its folder, if it reads files there; none in the folders of other packages."""
-        looks = any(isinstance(node, ast.Name) and node.id == "__file__" for node in ast.walk(self._tree))
+        looks = any(isinstance(node, ast.Name) and node.id == "__file__" for node in self._nodes)
         if not looks and "importlib.resources" not in {source for source, _ in self.imported}:
             return []
         folder = self.path.parent
@@ -226,32 +231,25 @@ def _described(node: ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunc
     return isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
 
 
-def _flat(value: object) -> Iterator[str]:
-    """Yield a syntax tree as text that is the same in every version of Python: empty fields are omitted."""
+def _flat(value: object) -> str:
+    """Return a syntax tree as text that is the same in every version of Python: empty fields are omitted."""
     if isinstance(value, ast.AST):
-        yield f"({type(value).__name__}"
-        for name, inner in ast.iter_fields(value):
-            if inner is not None and inner != []:
-                yield f" {name}="
-                yield from _flat(inner)
-        yield ")"
-    elif isinstance(value, list):
-        for inner in value:
-            yield from _flat(inner)
-    else:
-        yield repr(value)
+        fields = [(name, getattr(value, name, None)) for name in value._fields]
+        inside = "".join(f" {name}={_flat(inner)}" for name, inner in fields if inner is not None and inner != [])
+        return f"({type(value).__name__}{inside})"
+    return "".join(map(_flat, value)) if isinstance(value, list) else repr(value)
 
 
-def _imports(tree: ast.Module) -> Iterator[tuple[ast.Import | ast.ImportFrom, bool]]:
+def _imports(nodes: list[ast.AST]) -> Iterator[tuple[ast.Import | ast.ImportFrom, bool]]:
     """Find every import, and whether it is executed when the module runs or is for types only."""
     for_types = {
         id(inner)
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
         for part in node.body
         for inner in ast.walk(part)
     }
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import | ast.ImportFrom):
             yield node, id(node) not in for_types
 
