@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import Pace, begin, offer, settled, vary
+from drivers import Pace, begin, clocks, offer, reset, settled, vary
 from models import Datagram, Version2
 from structs import NUMBERS, pack, unpack
 
@@ -104,11 +104,17 @@ async def datagrams_are_those_of_the_page(dut):
     )
     entries = drawn(300, rows, board, valued, difference)
     await begin(dut, valid=0, leaving=0, states_ready=0, sending=0)
-    cocotb.start_soon(vary(dut.clk, 1500, in_pace, link_pace))
 
     def put(entry):
         dut.entry.value = entry[0]
 
+    # What was gathered before a reset is forgotten.
+    before = drawn(20, rows, Version2(board.stride), valued, difference)
+    source = cocotb.start_soon(offer(dut.clk, dut.valid, dut.taken, put, before, in_pace))
+    await clocks(dut.clk, random.randrange(20, 300))
+    source.cancel()
+    await reset(dut, valid=0)
+    cocotb.start_soon(vary(dut.clk, 1500, in_pace, link_pace))
     source = cocotb.start_soon(offer(dut.clk, dut.valid, dut.taken, put, entries, in_pace))
     came, body, bank, sending, asked, quiet = [], [], None, False, 0, 0
     taken, states = 0, None
