@@ -129,7 +129,6 @@ OF_MODULES = [
     ("time_stamper", "clocks_us == 7'(SHORT - 1)", "clocks_us == 7'(SHORT)"),
     ("time_stamper", "if (frame_start) of_frame <= now;", "of_frame <= now;"),
     ("top", "tvalid && tready && tlast", "tvalid && tlast"),
-    ("top", ".ready(ready && oldest.format.version_2 && !busy_v1)", ".ready(ready && oldest.format.version_2)"),
     ("top", ".frame_sync(active.frame_sync)", ".frame_sync(1'b0)"),
     ("uart_rx", "valid <= line;", "valid <= 1'b1;"),
     ("uart_rx", "CLOCKS + CLOCKS / 2 - 1", "CLOCKS - 1"),

@@ -9,6 +9,7 @@ from ethernet import GAP, payload_of
 from logic import RTL
 from sender import Sender
 
+
 def sent(sender: Sender, payloads: list[bytes]) -> list[tuple[bytes, int]]:
     for payload in payloads:
         sender.send(payload)

@@ -22,7 +22,7 @@ class Pace:
 
 
 async def begin(dut: Any, **inputs: int) -> None:
-    """Start a module's clock, set its inputs, and hold it in reset for some clocks; inputs change as the clock falls."""
+    """Start a module's clock, set its inputs, and hold it in reset for some clocks; inputs change as it falls."""
     Clock(dut.clk, 10, "ns").start()
     await reset(dut, **inputs)
 
@@ -72,9 +72,7 @@ async def offer(
         valid.value = 0
 
 
-async def accept(
-    clk: Any, valid: Any, ready: Any, get: Callable[[], Any], pace: Pace, came: list[Any]
-) -> None:
+async def accept(clk: Any, valid: Any, ready: Any, get: Callable[[], Any], pace: Pace, came: list[Any]) -> None:
     """Accept values, with pauses; what is offered must stand until it is taken."""
     stood = None
     while True:

@@ -1,4 +1,4 @@
-"""Afferents: the spikes of FA-1 as docs/registers.md has them, taxel by taxel, over modes and comparators not returned."""
+"""Afferents: the spikes of FA-1 as docs/registers.md has them, with changes of mode and comparators not returned."""
 
 import random
 from collections import defaultdict
@@ -45,7 +45,9 @@ async def spikes_are_those_of_the_page(dut):
             mode = frame % 40 == 0
             taxels.clear()
         if frame % 10 == 0:
-            rest, jump, decay = random.choice([(33, 983, 51), (400, 100, 255), (0, 9, 9), (65535, 65535, 1), (3, 65535, 255)])
+            rest, jump, decay = random.choice(
+                [(33, 983, 51), (400, 100, 255), (0, 9, 9), (65535, 65535, 1), (3, 65535, 255)]
+            )
             dut.threshold.value = pack("threshold_t", rest=rest, jump=jump, decay=decay)
             far = random.choice([2, 30, 2000])
             for _ in range(6):

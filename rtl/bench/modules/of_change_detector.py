@@ -1,4 +1,4 @@
-"""The change detector: which events, markers and frames' ends a scan gives, and what is repeated; with a queue that is full."""
+"""The change detector: which events, markers and frames' ends a scan gives, and what is repeated, with a full queue."""
 
 import random
 from collections import defaultdict, deque
@@ -20,10 +20,12 @@ def drawn(frames, build):
         if frame % 4 == 0:
             ramp = random.choice([5, 150, 300])
             now = {
-                "ramp": ramp, "noise_floor": random.choice([0, 3, 255]) if ramp > 5 else 0, "lines": random.randrange(build["COLUMNS"]),
-                "threshold": {"rest": random.choice([33, 400]), "jump": random.randrange(2000), "decay": random.randrange(256)},
-                "format": {"version_2": random.getrandbits(1), "wide_values": ramp > 255, "frame_sync": random.getrandbits(1),
-                           "spikes": int(frame > 0 and random.random() < 0.4)},
+                "ramp": ramp, "noise_floor": random.choice([0, 3, 255]) if ramp > 5 else 0,
+                "lines": random.randrange(build["COLUMNS"]),
+                "threshold": {"rest": random.choice([33, 400]), "jump": random.randrange(2000),
+                              "decay": random.randrange(256)},
+                "format": {"version_2": random.getrandbits(1), "wide_values": ramp > 255,
+                           "frame_sync": random.getrandbits(1), "spikes": int(frame > 0 and random.random() < 0.4)},
             }  # fmt: skip
         said = {}
         if ended:
@@ -39,8 +41,9 @@ def drawn(frames, build):
                 read = {
                     "initial_frame": frame == 0, "frame_first": line == lines[0] and step == 0,
                     "frame_last": line == lines[-1] and step == build["STEPS"] - 1, "line": line, "step": step,
-                    "stamp": at // 100 & 0xFFFF, "micros": at, "format": now["format"], "ended": said, "ramp": now["ramp"],
-                    "noise_floor": now["noise_floor"], "threshold": now["threshold"], "markers": markers, "starts": starts,
+                    "stamp": at // 100 & 0xFFFF, "micros": at, "format": now["format"], "ended": said,
+                    "ramp": now["ramp"], "noise_floor": now["noise_floor"], "threshold": now["threshold"],
+                    "markers": markers, "starts": starts,
                 }  # fmt: skip
                 counts = []
                 for channel in range(build["CHANNELS"]):
@@ -70,7 +73,7 @@ class Model:
         self.states, self.totals = [], []  # that have to be repeated
 
     def entry(self, **fields):
-        """Take the next thing that was seen: an entry with these fields, or one that found no room; return whether it did."""
+        """Take what was seen next: an entry with these fields, or one that found no room; return which."""
         clock, seen, _ = self.seen.popleft()
         if seen is None:
             return False
@@ -81,7 +84,10 @@ class Model:
         return True
 
     def times(self, form, read):
-        return {"format": unpack("format_t", pack("format_t", **form)), "at": read["micros"] if form["version_2"] else read["stamp"]}
+        return {
+            "format": unpack("format_t", pack("format_t", **form)),
+            "at": read["micros"] if form["version_2"] else read["stamp"],
+        }
 
     def frame_end(self, read):
         """The end of the frame before, with what is repeated; a full queue leaves it out."""
@@ -94,7 +100,7 @@ class Model:
         else:
             states = self.line_pending
         # It is seen, or left out.
-        clock, seen, busy = self.seen[0] if self.seen else (0, None, (False, False))
+        _, seen, busy = self.seen[0] if self.seen else (0, None, (False, False))
         if seen is None or seen.kind != FRAME:
             assert self.may_be_full
             return
@@ -119,9 +125,13 @@ class Model:
                 self.frame_end(read)
         if first:
             for k in range(read["markers"]):
-                self.entry(kind=MARKER, more=read["starts"] >> k & 1, x=0, y=0, value=0, **self.times(ended["format"], read))
+                self.entry(
+                    kind=MARKER, more=read["starts"] >> k & 1, x=0, y=0, value=0, **self.times(ended["format"], read)
+                )
             flush = build["HOLDS"] and after_sent and ended["format"]["version_2"] and ended["changed"]
-            if flush and not (self.may_be_full and not (self.seen and self.seen[0][1] and self.seen[0][1].kind == FLUSH)):
+            if flush and not (
+                self.may_be_full and not (self.seen and self.seen[0][1] and self.seen[0][1].kind == FLUSH)
+            ):
                 assert self.entry(kind=FLUSH, **self.times(ended["format"], read))
         if not form["spikes"]:
             self.afferents.clear()
@@ -212,7 +222,7 @@ async def entries_are_those_of_the_page(dut):
             clock += 1
             await FallingEdge(dut.clk)
 
-    lost = repeats = 0
+    lost = 0
     for read, counts in reads:
         if read["frame_first"]:
             often_full = random.choice([0, 0, 0.1, 0.5])

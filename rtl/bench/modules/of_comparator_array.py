@@ -64,7 +64,9 @@ async def each_read_has_a_ramp_and_is_reported(dut):
         # A next read may begin with its step: the ramp has to fall before it.
         most = min(3 * read - 5, 3 * period - 5)
         length = random.choice([1, 2, 3, most, random.randrange(1, most + 1)])
-        ticks = [random.choice([0, length - 1, length, NOT_RETURNED, random.randrange(length + 9)]) for _ in range(channels)]
+        ticks = [
+            random.choice([0, length - 1, length, NOT_RETURNED, random.randrange(length + 9)]) for _ in range(channels)
+        ]
         inverted = random.random() < 0.3
         reads.append((ticks, inverted))
         expected.append((ticks, length))

@@ -1,4 +1,4 @@
-"""The sender of datagrams of version 2: header, body, promise and CRC-32C, byte by byte, while the next body is written."""
+"""The sender of version 2: header, body, promise and CRC-32C, byte by byte, while the next body is written."""
 
 import random
 
@@ -7,6 +7,7 @@ from cocotb.triggers import FallingEdge
 from drivers import Pace, accept, begin, clocks, datagrams, reset, settled, vary
 from models import Datagram
 from structs import pack
+
 
 @cocotb.test()
 async def bytes_are_those_of_the_page(dut):

@@ -6,8 +6,9 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, RisingEdge, Timer, ValueChange
 from drivers import clocks, same
-from ethernet import payload_of
 from models import NOT_RETURNED, Chain, Scan, datagrams_1, words_1
+
+from ethernet import payload_of
 
 #: A tick, ps: half a clock of the converter.
 TICK = 3333

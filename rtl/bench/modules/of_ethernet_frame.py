@@ -5,6 +5,7 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge
 from drivers import begin, reset, settled
+
 from ethernet import GAP, payload_of
 
 #: The module's addresses and ports, where none are given.
@@ -16,16 +17,16 @@ async def payloads_become_frames(dut):
     await begin(dut, waits=0)
     waiting = [bytes(random.choices(range(256), k=n)) for n in [*range(1, 60), 255, 256, 1472] * 2]
     random.shuffle(waiting)
-    expected, frame, frames, gap, gaps, shown = list(waiting), bytearray(), [], -1000, [], None
+    expected, frame, frames, gap, gaps, shown, taken = list(waiting), bytearray(), [], -1000, [], None, None
     byte, quiet = 0, 0
     while quiet < 2000:
-        if random.random() < 0.00005:
+        if random.random() < 0.0003:
             # A reset breaks the frame that is being sent off.
             await reset(dut, waits=0)
-            if frame and shown is not None:
+            if shown is not None:
                 waiting.insert(0, shown)
-            if frame and shown is None:
-                expected.remove(lost)
+            elif frame:
+                expected.remove(taken)
             shown, gap = None, -1000
             frame.clear()
         if shown is None and waiting and random.random() < random.choice([0.01, 1]):
@@ -38,7 +39,7 @@ async def payloads_become_frames(dut):
         at = int(dut.at.value)
         byte = shown[at] if shown and at < len(shown) else random.randrange(256)
         if int(dut.taken.value):
-            lost, shown = shown, None
+            taken, shown = shown, None
         if int(dut.enable.value):
             frame.append(int(dut.txd.value))
             if len(frame) == 1 and gap >= 0:

@@ -4,7 +4,7 @@ import random
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import Pace, begin, offer, settled, vary
+from drivers import Pace, begin, clocks, offer, reset, settled, vary
 from structs import NUMBERS, pack, unpack
 
 EVENT, MARKER, FRAME = (NUMBERS[f"ENTRY_{name}"] for name in ("EVENT", "MARKER", "FRAME"))
@@ -12,15 +12,16 @@ EVENT, MARKER, FRAME = (NUMBERS[f"ENTRY_{name}"] for name in ("EVENT", "MARKER",
 
 def drawn(lines, rows):
     """Return entries as they come, and in the order in which they have to go."""
-    entries, expected, at = [], [], 0
+    entries, expected, at, x = [], [], 0, 0
     for _ in range(lines):
         at += random.randrange(3) * 50
-        synchronous, x = random.random() < 0.8, random.randrange(128)
+        synchronous, x = random.random() < 0.8, (x + random.randrange(1, 128)) % 128
         form = {"version_2": 1, "frame_sync": synchronous, "spikes": random.getrandbits(1)}
-        line = []
-        for y in random.sample(range(rows), min(rows, random.choice([0, 1, 1, 2, 5, rows]))):
-            line.append({"kind": EVENT, "format": form, "at": at, "x": x, "y": y, "more": random.getrandbits(1),
-                         "value": random.randrange(1 << 16), "lost": random.random() < 0.1})  # fmt: skip
+        line = [
+            {"kind": EVENT, "format": form, "at": at, "x": x, "y": y, "more": random.getrandbits(1),
+             "value": random.randrange(1 << 16), "lost": random.random() < 0.1}
+            for y in random.sample(range(rows), min(rows, random.choice([0, 1, 1, 2, 5, rows])))
+        ]  # fmt: skip
         entries += line
         if synchronous and line:
             lost = any(event["lost"] for event in line)
@@ -31,8 +32,6 @@ def drawn(lines, rows):
         if random.random() < 0.3 or not line:
             entries.append(other)
             expected.append(other)
-        else:
-            at += 1
     return [pack("event_t", **entry) for entry in entries], [pack("event_t", **entry) for entry in expected]
 
 
@@ -41,12 +40,17 @@ async def events_of_a_line_go_by_rows(dut):
     rows = int(dut.ROWS.value)
     in_pace, out_pace = Pace(), Pace()
     await begin(dut, ready=0, leaving=0, taken=0)
-    entries, expected = drawn(500, rows)
-    cocotb.start_soon(vary(dut.clk, 2000, in_pace, out_pace))
 
     def put(entry):
         dut.oldest.value = entry
 
+    # What was gathered before a reset is forgotten.
+    before = cocotb.start_soon(offer(dut.clk, dut.ready, dut.pop, put, drawn(50, rows)[0], in_pace))
+    await clocks(dut.clk, random.randrange(20, 200))
+    before.cancel()
+    await reset(dut, ready=0)
+    entries, expected = drawn(500, rows)
+    cocotb.start_soon(vary(dut.clk, 2000, in_pace, out_pace))
     source = cocotb.start_soon(offer(dut.clk, dut.ready, dut.pop, put, entries, in_pace))
     came, since, quiet = [], 3, 0
     while quiet < 100:

@@ -1,12 +1,13 @@
 """The scan: each clock of frames with random registers, and what is said of each step that is read."""
 
 import random
+from types import SimpleNamespace
 
 import cocotb
 from cocotb.triggers import FallingEdge
 from drivers import begin, reset, settled
 from models import Chain, Lines
-from structs import NUMBERS, pack, unpack
+from structs import pack, unpack
 
 #: Clocks from where the registers are taken to the frame's edge.
 EARLY = 16
@@ -20,8 +21,9 @@ def drawn(columns, steps):
     return {
         "random_lines": random.getrandbits(1), "mechanoreceptor": random.getrandbits(1),
         "invert_comparator": random.getrandbits(1), "frame_sync": random.getrandbits(1),
-        "wire_version": random.getrandbits(1), "threshold_jump": random.getrandbits(16), "threshold_rest": random.getrandbits(16),
-        "threshold_decay": random.getrandbits(8), "noise_floor": random.getrandbits(8),
+        "wire_version": random.getrandbits(1), "threshold_jump": random.getrandbits(16),
+        "threshold_rest": random.getrandbits(16), "threshold_decay": random.getrandbits(8),
+        "noise_floor": random.getrandbits(8),
         "line_period": line_read + random.choice([0, random.randrange(40)]), "line_read": line_read,
         "step_period": step, "step_read": read, "ramp": random.choice([150, 255, 256, 60]),
         "lines": random.randrange(columns), "record": random.getrandbits(1),
@@ -31,7 +33,12 @@ def drawn(columns, steps):
 def form(r):
     """Return how a frame with these registers is sent."""
     wide = r["mechanoreceptor"] or r["ramp"] > 255
-    return {"version_2": r["wire_version"], "wide_values": wide, "frame_sync": r["frame_sync"], "spikes": r["mechanoreceptor"]}
+    return {
+        "version_2": r["wire_version"],
+        "wide_values": wide,
+        "frame_sync": r["frame_sync"],
+        "spikes": r["mechanoreceptor"],
+    }
 
 
 @cocotb.test()
@@ -42,13 +49,13 @@ async def every_clock_of_the_scan(dut):
     await begin(dut, written=pack("registers_t", **held), markers=0, starts=0)
     model, chain = Lines(), Chain([1] * columns)
     committed = r = ended = expected_read = None
-    clock = taken_at = read_left = 0
+    taken_at = 0
     frame, t, order = -1, 0, []
     frames = settled_reads = 0
-    for _ in range(15_000):
+    for clock in range(15_000):
         if random.random() < 0.0003:
             await reset(dut)
-            model, committed, r, frame, expected_read, read_left = Lines(), None, None, -1, None, 0
+            model, committed, r, frame, expected_read = Lines(), None, None, -1, None
         if random.random() < 0.01:
             held = drawn(columns, steps)
             dut.written.value = pack("registers_t", **held)
@@ -79,7 +86,9 @@ async def every_clock_of_the_scan(dut):
             before = ended if t == 0 and ended else r
             gone = before["line_period"] if u == 0 else u
             if frame > 0 or t > 0:
-                assert int(dut.step_end.value) == (gone in range(before["step_period"], steps * before["step_period"] + 1, before["step_period"])), (t, u)
+                assert int(dut.step_end.value) == (
+                    gone in range(before["step_period"], steps * before["step_period"] + 1, before["step_period"])
+                ), (t, u)
             if t > 1:
                 line_read = r["line_read"]
                 assert int(dut.reading.value) == (0 < u <= line_read or (u == 0 and line_read == r["line_period"]))
@@ -93,11 +102,14 @@ async def every_clock_of_the_scan(dut):
             assert int(dut.active.value) == active
             if starts_now:
                 expected_read = {
-                    "initial_frame": frame == 0, "frame_first": t == 0, "frame_last": k == r["lines"] and step == steps - 1,
-                    "line": order[k], "step": step, "stamp": values["stamp"], "micros": values["micros"],
-                    "format": unpack("format_t", pack("format_t", **form(r))), "ramp": r["ramp"], "noise_floor": r["noise_floor"],
-                    "markers": waiting[0], "starts": waiting[1],
-                    "threshold": unpack("threshold_t", pack("threshold_t", rest=r["threshold_rest"], jump=r["threshold_jump"], decay=r["threshold_decay"])),
+                    "initial_frame": frame == 0, "frame_first": t == 0,
+                    "frame_last": k == r["lines"] and step == steps - 1, "line": order[k], "step": step,
+                    "stamp": values["stamp"], "micros": values["micros"],
+                    "format": unpack("format_t", pack("format_t", **form(r))), "ramp": r["ramp"],
+                    "noise_floor": r["noise_floor"], "markers": waiting[0], "starts": waiting[1],
+                    "threshold": SimpleNamespace(
+                        rest=r["threshold_rest"], jump=r["threshold_jump"], decay=r["threshold_decay"]
+                    ),
                 }  # fmt: skip
                 if t == 0 and ended:
                     said = {"initial_frame": frame == 1, "format": form(ended), "micros": values["ended_micros"],
@@ -111,7 +123,6 @@ async def every_clock_of_the_scan(dut):
             t += 1
         if int(dut.markers_taken.value):
             committed, taken_at = (dict(held), (markers, starts)), clock
-        clock += 1
         await FallingEdge(dut.clk)
     assert frames > 30
     assert settled_reads > 50

@@ -1,4 +1,4 @@
-"""The packer of version 1: the words of docs/wire.md, in datagrams that end with their frame or where there is no room."""
+"""The packer of version 1: words of docs/wire.md, in datagrams that end with their frame or where there is no room."""
 
 import random
 from collections import deque
@@ -23,7 +23,9 @@ def drawn(frames, valued):
             form = {"spikes": spikes, "frame_sync": 1}
             if marker:
                 x = y = 0
-            entries.append((frame, pack("event_t", kind=kind, format=form, frame=frame, at=time, x=x, y=y, more=more, value=value)))
+            entries.append(
+                (frame, pack("event_t", kind=kind, format=form, frame=frame, at=time, x=x, y=y, more=more, value=value))
+            )
             with_value = (valued or spikes) and not marker
             words.append(words_1(x, y, more, time, value if with_value else None, marker=marker))
         expected.append(words)
@@ -40,6 +42,7 @@ async def events_become_words_in_datagrams(dut):
     expected = [datagram for words in expected for datagram in datagrams_1(words, most)]
     entries = deque(entries)
     cocotb.start_soon(vary(dut.clk, 400, push_pace, ready_pace, link_pace))
+
     def byte():
         return int(dut.tdata.value), int(dut.tlast.value)
 

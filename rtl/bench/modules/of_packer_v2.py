@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import Pace, begin, offer, settled, vary
+from drivers import Pace, begin, clocks, offer, reset, settled, vary
 from models import Datagram, Version2
 from structs import NUMBERS, pack, unpack
 
@@ -28,13 +28,24 @@ def drawn(frames, rows, board, valued, difference):
                 entries.append((pack("event_t", kind=FLUSH, format=form, at=at), None, None))
                 board.close(at)
             spikes, wide, length = random.getrandbits(1), random.getrandbits(1), random.choice([30, 200, 9000, 70_000])
-            form = {"version_2": 1, "frame_sync": random.getrandbits(1), "spikes": spikes, "wide_values": wide or spikes}
+            form = {
+                "version_2": 1,
+                "frame_sync": random.getrandbits(1),
+                "spikes": spikes,
+                "wide_values": wide or spikes,
+            }
             often = random.choice([0, 0.1, 1])
         sent = {"kind": kind(), "frame_sync": form["frame_sync"], "differences": int(difference and not spikes)}
         for x in random.sample(range(128), random.choice([1, 3])) if random.random() < often else ():
             time = at if form["frame_sync"] else at + random.randrange(length)
             for y in sorted(random.sample(range(rows), min(rows, random.choice([1, 2, 9])))):
-                event = {"x": x, "y": y, "at": time, "more": random.getrandbits(1), "value": random.choice([7, 255, 256, 65535])}
+                event = {
+                    "x": x,
+                    "y": y,
+                    "at": time,
+                    "more": random.getrandbits(1),
+                    "value": random.choice([7, 255, 256, 65535]),
+                }
                 lost = random.random() < 0.05
                 board.lost |= lost
                 board.event(**event, **sent)
@@ -48,9 +59,29 @@ def drawn(frames, rows, board, valued, difference):
         if random.random() < 0.1:
             totals = {name: count + random.randrange(1 << 40) for name, count in totals.items()}
             counts = totals
-        fields = dict(zip(("x", "y", "more", "value"), (length >> 24 & 127, length >> 17 & 127, length >> 16 & 1, length & 65535), strict=True))
+        fields = dict(
+            zip(
+                ("x", "y", "more", "value"),
+                (length >> 24 & 127, length >> 17 & 127, length >> 16 & 1, length & 65535),
+                strict=True,
+            )
+        )
         also = states is not None or counts is not None
-        entries.append((pack("event_t", kind=FRAME, format=form, at=at, states=states is not None, totals=counts is not None, **fields), states, counts))
+        entries.append(
+            (
+                pack(
+                    "event_t",
+                    kind=FRAME,
+                    format=form,
+                    at=at,
+                    states=states is not None,
+                    totals=counts is not None,
+                    **fields,
+                ),
+                states,
+                counts,
+            )
+        )
         board.frame_end(at, length, also, **sent)
         if states:
             board.states(at, *states, **sent | {"kind": 1 if sent["kind"] == 1 else 2})
@@ -68,14 +99,22 @@ def drawn(frames, rows, board, valued, difference):
 async def datagrams_are_those_of_the_page(dut):
     rows, valued, difference = int(dut.ROWS.value), int(dut.VALUED.value), int(dut.DIFFERENCE.value)
     in_pace, link_pace = Pace(), Pace()
-    board = Version2(max(rows - 1, 0).bit_length(), 2 * int(dut.MOST.value), int(dut.HOLD_US.value), int(dut.HEARTBEAT_US.value))
+    board = Version2(
+        max(rows - 1, 0).bit_length(), 2 * int(dut.MOST.value), int(dut.HOLD_US.value), int(dut.HEARTBEAT_US.value)
+    )
     entries = drawn(300, rows, board, valued, difference)
     await begin(dut, valid=0, leaving=0, states_ready=0, sending=0)
-    cocotb.start_soon(vary(dut.clk, 1500, in_pace, link_pace))
 
     def put(entry):
         dut.entry.value = entry[0]
 
+    # What was gathered before a reset is forgotten.
+    before = drawn(20, rows, Version2(board.stride), valued, difference)
+    source = cocotb.start_soon(offer(dut.clk, dut.valid, dut.taken, put, before, in_pace))
+    await clocks(dut.clk, random.randrange(20, 300))
+    source.cancel()
+    await reset(dut, valid=0)
+    cocotb.start_soon(vary(dut.clk, 1500, in_pace, link_pace))
     source = cocotb.start_soon(offer(dut.clk, dut.valid, dut.taken, put, entries, in_pace))
     came, body, bank, sending, asked, quiet = [], [], None, False, 0, 0
     taken, states = 0, None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import begin, reset, settled
+from drivers import begin, reset
 from structs import NUMBERS, pack, unpack
 
 TABLE = tomllib.loads((Path(__file__).parents[3] / "registers.toml").read_text())

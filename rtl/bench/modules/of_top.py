@@ -121,7 +121,9 @@ async def datagrams_and_lines_are_those_of_the_page(dut):
             if number == 7:
                 marker = value >> 16
             if answer is None:
-                wire, threshold = ((value >> 4 & 1) + 1, THETA if value >> 1 & 1 else None) if number == 0 else (wire, threshold)
+                wire, threshold = (
+                    ((value >> 4 & 1) + 1, THETA if value >> 1 & 1 else None) if number == 0 else (wire, threshold)
+                )
                 floor = value >> 8 & 255 if number == 5 else floor
                 ramp = value & 0xFFFF if number == 4 else ramp
         # It goes before its frame's events.
@@ -129,10 +131,10 @@ async def datagrams_and_lines_are_those_of_the_page(dut):
             board.marker(at, marker, **form)
         words = [words_1(0, 0, marker, stamp, marker=True)] if marker is not None and wire == 1 else []
         form["kind"] = 2 if threshold else 1
-        for taxel in ticks:
+        for taxel, tick in ticks.items():
             if random.random() < 0.3 and frame < FRAMES - 14:
                 ticks[taxel] = random.choice([0, ramp, random.randrange(ramp + 9), NOT_RETURNED])
-            elif ticks[taxel] == NOT_RETURNED:
+            elif tick == NOT_RETURNED:
                 ticks[taxel] = 0
         found = scan.frame(ticks, ramp, floor, threshold)
         events += len(found)
@@ -146,7 +148,9 @@ async def datagrams_and_lines_are_those_of_the_page(dut):
                 board.event(x, y, at, more, value, **form)
             end = (frame + 1) * length // 100
             board.frame_end(end, length // 100, False, **form)
-            expected += [datagram.encoded(board.stride, 0, session) for datagram in board.sent[sent - (marker is not None) :]]
+            expected += [
+                datagram.encoded(board.stride, 0, session) for datagram in board.sent[sent - (marker is not None) :]
+            ]
         link.often = random.choice([0.6, 1.0])
         to_send.extend(command(*WRITES[frame][:2]) if frame in WRITES else b"")
     lines = serial.decode().splitlines()

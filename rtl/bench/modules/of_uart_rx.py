@@ -1,4 +1,4 @@
-"""The serial line's receiver: bytes whose bits are up to 2.7 % too long or short, at any phase; none without stop bit."""
+"""The serial line's receiver: bytes of any phase, with bits up to 2.7 % too long or short; none without a stop bit."""
 
 import random
 

@@ -6,6 +6,7 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, Timer
 from drivers import Pace, begin, clocks, offer, reset, vary
+
 from ethernet import GAP, payload_of
 
 
@@ -52,7 +53,10 @@ async def payloads_become_frames(dut):
             await clocks(dut.clk, 60)
             frames.clear()
             gaps.clear()
-        lengths = [random.choice([1, 2, 17, 18, 19, random.randrange(1, most + 1), most, most + 1, most + 9]) for _ in range(25)]
+        lengths = [
+            random.choice([1, 2, 17, 18, 19, random.randrange(1, most + 1), most, most + 1, most + 9])
+            for _ in range(25)
+        ]
         payloads = [bytes(random.choices(range(256), k=length)) for length in lengths]
         varying = cocotb.start_soon(vary(dut.clk, 800, pace))
         stream = [(byte, int(k == len(payload) - 1)) for payload in payloads for k, byte in enumerate(payload)]
