@@ -78,7 +78,8 @@ module taxel_packer_v2
   logic [4:0] word, word_ahead;
   logic [15:0] total;  // the unit of totals that is next
   logic words_over, rows_over;
-  logic fetching;
+  logic [1:0] fetching;    // clocks until it stands
+  logic [15:0] repeated;   // in a register, as memory answers late
 
   // Units that wait to be written, the first in the lowest bits.
   logic [6:0][15:0] waiting;
@@ -177,6 +178,7 @@ module taxel_packer_v2
     silent     <= quiet >= micros_t'(HEARTBEAT_US);
     restless   <= any && since_last <= RESTLESS;
     ripe       <= HOLD_US == 0 || since + micros_t'(length_of(now)) > micros_t'(HOLD_US);
+    repeated   <= value_repeated;
     for (int k = 0; k < 8; k++) fits[k] <= units <= 10'(MOST - k);
     rows_over <= 32'(row) == ROWS;
     place <= units;
@@ -313,7 +315,7 @@ module taxel_packer_v2
         words_over <= 1'b0;
         rows_over  <= 1'b0;
         total      <= all_totals[15:0];
-        fetching <= 1'b1;
+        fetching <= 2'b11;
         if (now.kind == ENTRY_MARKER) begin
           waiting  <= {48'd0, 16'd0, now.more ? 16'd1 : 16'd2, 16'd0, 16'd0};
           left     <= 3'd4;
@@ -338,8 +340,8 @@ module taxel_packer_v2
         end
       end
       REPEAT: begin
-        // A value comes a clock after its row is asked for.
-        fetching <= 1'b0;
+        // A value comes a clock after its row is asked for, and is used another one later.
+        fetching <= fetching >> 1;
         datagram.kind        <= narrow ? 4'd6 : 4'd7;
         datagram.differences <= 1'b0;
         datagram.line        <= repeated_line;
@@ -351,13 +353,13 @@ module taxel_packer_v2
             states_sent <= 1'b1;
             state       <= NEXT;
           end
-        end else if (!fetching) begin
+        end else if (fetching == 0) begin
           waiting[1] <= '0;
-          waiting[0] <= narrow ? {8'd0, value_repeated > 16'd255 ? 8'd255 : value_repeated[7:0]} : value_repeated;
+          waiting[0] <= narrow ? {8'd0, repeated > 16'd255 ? 8'd255 : repeated[7:0]} : repeated;
           left       <= narrow ? 3'd1 : 3'd2;
           row        <= row + 8'd1;
           after      <= REPEAT;
-          fetching   <= 1'b1;
+          fetching   <= 2'b01;
           state      <= WRITE;
         end
       end
