@@ -456,8 +456,8 @@ def test_channels_have_a_curve_each(tmp_path, column):
             of = head(picture)[0]
             curves = section(picture, 7, "<u2").reshape(-1, 7)
             assert len(curves) == of["count"] > 100
-            for column, curve in enumerate(curves, of["first"]):
-                ends = [min(end, t_us) for end in parts_of(column, column_us)]
+            for number, curve in enumerate(curves, of["first"]):
+                ends = [min(end, t_us) for end in parts_of(number, column_us)]
                 at = np.searchsorted(frames.t, ends, side="right") - 1
                 np.testing.assert_array_equal(curve * about["pictures"]["step"], values[at, 0].max(axis=0))
 
