@@ -229,7 +229,7 @@ def _in_its_unit(recording: Recording) -> Frames:
 
 
 def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, bool, list[int]]:
-    """Return the rest's source, that of each taxel, ticks by the unit, whether values fall, and the taxels that flicker."""
+    """Return the rest's source, that of each taxel, ticks by the unit, whether values fall, and what flickers."""
     rest = of_pictures(frames)
     source, flickers = {"unit": "given"}.get(rest.source, rest.source), np.flatnonzero(flickering(frames)).tolist()
     return source, rest.values, ticks_by_unit(frames), rest.falls, flickers
