@@ -27,7 +27,8 @@ check:
 # Of the studies, a distribution of their own in this repository, that is what they need beside taxel.
 wanted = $(BIN)/python -c 'import sys, tomllib; p, s = (tomllib.load(open(f, "rb"))["project"] for f in ("pyproject.toml", "studies/pyproject.toml")); extras = p["optional-dependencies"] | s["optional-dependencies"] | {"studies": s["dependencies"]}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), p["dependencies"]) if not x.startswith("taxel")))'
 # Python compiles a module when it is first imported; compiling all of them at once takes ten seconds of the first minutes.
-install = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+# Where it may not store what it compiled, each start would compile them all again.
+install = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile)
 
 $(VENV)/.installed: pyproject.toml studies/pyproject.toml | check
 	@echo "taxel: installing what it needs into $(VENV)"

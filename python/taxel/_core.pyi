@@ -619,9 +619,10 @@ class ConeXProblem:
 # where it is known from and ticks by the unit; unit; time from one picture to the next if they are numbered (us);
 # notes and detections as JSON; verdict; the trial, and all trials of the file if there are several; how long the rest
 # of the file takes (s).
+_Rest = tuple[str, NDArray[np.float64], float, bool, list[int]]
 _Pictures = tuple[
     _Array,
-    list[tuple[str, int, int, int, NDArray[np.int64], NDArray[np.float32], tuple[str, NDArray[np.float64], float]]],
+    list[tuple[str, int, int, int, NDArray[np.int64], NDArray[np.float32], _Rest]],
     str,
     int | None,
     str,

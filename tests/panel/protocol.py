@@ -94,6 +94,12 @@ def section(picture, k, dtype):
     return np.frombuffer(picture, dtype, count=size // np.dtype(dtype).itemsize, offset=start)
 
 
+def parts_of(column, column_us):
+    """The ends of the parts of a column of time, us: of 4 ms, or of a narrower column itself."""
+    part_us = min(column_us, 4000)
+    return range(column * column_us + part_us - 1, (column + 1) * column_us, part_us)
+
+
 def word(t_us, x, y, ticks, more=True):
     """A change and its intensity, version 1 of the wire (docs/wire.md)."""
     t = t_us // 100 % 65_536

@@ -236,3 +236,52 @@ def test_a_label_of_numbered_pictures_is_at_a_picture_and_not_at_a_second(chromi
         table = tmp_path / "mat.notes.csv"
         until(lambda: [row["t_us"] for row in csv.DictReader(table.open())] == ["25"], "its number is saved")
         until(lambda: page.locator("#label-list li input").nth(1).input_value() == "25", "and shown")
+
+
+def test_values_that_fall_are_said_above_the_maps_with_what_to_do(chromium: Any, tmp_path: Path) -> None:
+    random = np.random.default_rng(4)
+    values = 900 + random.normal(0, 2, (600, 8, 8))
+    for begin in (200, 400):
+        values[begin : begin + 60, 2:5, 2:5] -= 300
+    taxel.convert(
+        Frames(np.round(values), np.arange(600) * 10_000, unit="counts", array=Array(8, 8)), tmp_path / "a.npz"
+    )
+    with shown(chromium, tmp_path / "a.npz") as page:
+        shows(page, "silence", r"^The values fall from their rest.* “falls = true” into a\.layout\.toml beside the rec")
+    (tmp_path / "a.layout.toml").write_text("falls = true\n")
+    with shown(chromium, tmp_path / "a.npz") as page:
+        until(lambda: 2 <= clock(page) < 2.6, "the first touch")
+        assert page.locator("#silence").is_hidden()
+
+
+def test_why_a_file_was_not_opened_stays_in_sight(chromium: Any, tmp_path: Path) -> None:
+    (tmp_path / "plain.csv").write_text("0,1,0,2\n0,2,0,1\n")
+    with (
+        running("view", "plain.csv", "--no-open", folder=tmp_path) as server,
+        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
+    ):
+        shows(page, "silence", r"^plain\.csv, line 1: .* a layout file beside it, plain\.layout\.toml")
+        page.locator("#notice-close").click()
+        assert page.locator("#silence").is_visible()
+        shows(page, "state-word", "^No recording$")
+
+
+def test_a_taxel_that_flickers_sets_no_colours_and_is_marked(chromium: Any, tmp_path: Path) -> None:
+    values = np.random.default_rng(6).integers(0, 3, (600, 8, 8))
+    values[200:240, 2:5, 2:5] += 60
+    values[7::30, 6, 5] = 4000
+    taxel.convert(Frames(values, np.arange(600) * 20_000, unit="counts", array=Array(8, 8)), tmp_path / "mat.npz")
+    with shown(chromium, tmp_path / "mat.npz") as page:
+        until(lambda: 4 <= clock(page) < 4.8, "the first touch")
+        shows(page, "pressure-top", "^6[0-9] counts$")
+        shows(page, "rest-from", "1 flickering taxel left out$")
+        assert page.locator("#pressure-marks .noisy").get_attribute("title") == "noisy: row 6, column 5"
+
+
+def test_notes_have_the_room_of_their_tab(chromium: Any, tmp_path: Path) -> None:
+    times = np.arange(40) * 20_000
+    taxel.convert(Frames(np.ones((40, 4, 4)), times, unit="N", array=Array(4, 4)), tmp_path / "mat.npz")
+    (tmp_path / "labels.csv").write_text("recording,label,t_us\n" + "".join(f"mat,contact,{t}\n" for t in times[:12]))
+    with shown(chromium, tmp_path / "mat.npz") as page:
+        last = page.locator("#note-list li").nth(11)
+        assert last.evaluate(LOW) < page.locator(".detections-block").bounding_box()["y"], "without scrolling"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats.making import write_gaitpdb, write_icub, write_pedar, write_tekscan
-from panel.protocol import Client, head, section
+from panel.protocol import Client, head, parts_of, section
 
 import taxel
 from taxel import Array, Frames, Places
@@ -348,6 +348,23 @@ def test_a_press_that_is_held_sets_the_rest_of_a_falling_sensor_nowhere_anew(tmp
     assert np.count_nonzero(over.values[[100, 1300, 2500]] > floor) <= 3 * 16
 
 
+@pytest.mark.parametrize("unit", ["raw", "kPa"])
+def test_a_taxel_that_flickers_is_in_no_sum_and_not_the_first_touch(tmp_path, unit):
+    rng, t = np.random.default_rng(12), np.arange(600) * 20_000
+    values = rng.integers(0, 3, (600, 8, 8)).astype(float)
+    values[200:240, 2:5, 2:5] += 60
+    values[7::30, 6, 5] = 4000
+    taxel.convert(Frames(values, t, unit=unit, array=Array(8, 8)), tmp_path / "mat.npz")
+    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
+        about = opened(page, "mat.npz")
+        assert about["pictures"]["flickering"] == [[5, 6]]
+        assert 4_000_000 <= about["touch_us"] < 4_800_000
+        assert max_and_column(page, about)[0] < 700
+        flickers, _ = values_at(page, about, int(t[7]))
+        assert flickers[6, 5] == 4000, "its value is shown as it is"
+        assert above_rest_of(page, about, int(t[7]))[6 * 8 + 5] == 0
+
+
 def max_and_column(page, about):
     """Return the greatest sum of the overview, in the unit of the file, and its column."""
     page.send(type="overview")
@@ -439,9 +456,10 @@ def test_channels_have_a_curve_each(tmp_path, column):
             of = head(picture)[0]
             curves = section(picture, 7, "<u2").reshape(-1, 7)
             assert len(curves) == of["count"] > 100
-            ends = np.minimum((of["first"] + 1 + np.arange(of["count"])) * column_us - 1, t_us)
-            at = np.searchsorted(frames.t, ends, side="right") - 1
-            np.testing.assert_array_equal(curves * about["pictures"]["step"], values[at, 0])
+            for number, curve in enumerate(curves, of["first"]):
+                ends = [min(end, t_us) for end in parts_of(number, column_us)]
+                at = np.searchsorted(frames.t, ends, side="right") - 1
+                np.testing.assert_array_equal(curve * about["pictures"]["step"], values[at, 0].max(axis=0))
 
 
 def test_only_channels_have_a_curve_each(tmp_path):

@@ -519,6 +519,12 @@ mod tests {
         Change { t, taxel, ticks, up: true, repaired: false }
     }
 
+    fn raster(columns: &TimeColumns, column: i64) -> Vec<u8> {
+        let mut rows = vec![0; columns.rows()];
+        columns.add_raster(column..column + 1, &mut rows);
+        rows
+    }
+
     #[test]
     fn a_state_from_a_keyframe_equals_one_from_the_beginning() {
         [COLUMN_US, 500].into_iter().for_each(from_a_keyframe);
@@ -564,10 +570,7 @@ mod tests {
             whole.update_curve();
             let (one, other) = (fresh.time_columns(), whole.time_columns());
             for column in (begun + 30).max(now - SPAN)..=now {
-                let (mut a, mut b) = (vec![], vec![]);
-                one.raster(column, &mut a);
-                other.raster(column, &mut b);
-                assert_eq!(a, b, "column {column}");
+                assert_eq!(raster(one, column), raster(other, column), "column {column}");
                 assert_eq!(format!("{:?}", one.curve(column)), format!("{:?}", other.curve(column)), "column {column}");
             }
         }
@@ -665,10 +668,7 @@ mod tests {
         assert_eq!(stalled.restarts(), 1);
         assert_eq!(stalled.time_columns().reach(), once.time_columns().reach());
         for column in 0..=column_of(81_000, COLUMN_US) {
-            let (mut a, mut b) = (vec![], vec![]);
-            once.time_columns().raster(column, &mut a);
-            stalled.time_columns().raster(column, &mut b);
-            assert_eq!(a, b, "column {column}");
+            assert_eq!(raster(once.time_columns(), column), raster(stalled.time_columns(), column), "column {column}");
             let curves = [once.time_columns().curve(column), stalled.time_columns().curve(column)];
             assert_eq!(format!("{:?}", curves[0]), format!("{:?}", curves[1]), "column {column}");
         }

@@ -140,6 +140,7 @@ impl Indexed {
                     "pictures": {
                         "count": index.pictures, "unit": file.unit, "step": index.step, "zero": index.zero, "floor": index.floor,
                         "newtons": index.newtons, "picture_us": file.picture_us, "sources": places.collect::<Vec<_>>(),
+                        "flickering": index.flickering().collect::<Vec<_>>(),
                         "trial": file.trial, "trials": file.trials, "left_s": file.left_s,
                     },
                 });

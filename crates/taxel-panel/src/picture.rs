@@ -1,12 +1,14 @@
 //! A picture in the bytes that clients receive: docs/panel-protocol.md, *Pictures*.
 
+use std::ops::Range;
+
 use taxel_live::recording::now_ns;
 
 use super::array_state::{ArrayState, RestSource};
 use super::encoded_spikes::EncodedSpikes;
 use super::player::Player;
 use super::taxel_history::TaxelHistory;
-use super::time_columns::{COLUMN_US, Curve, SPAN, TimeColumns, column_of};
+use super::time_columns::{COLUMN_US, Curve, NOTHING, SPAN, TimeColumns, column_of};
 
 /// Bytes of the header.
 const HEADER: usize = 128;
@@ -72,38 +74,33 @@ impl<'a> ShownColumns<'a> {
         first.div_euclid(self.factor)
     }
 
-    fn store(&self, column: i64) -> &TimeColumns {
-        match self.whole {
-            Some(whole) if column < self.first_own => whole,
-            _ => self.own,
-        }
+    /// The stored columns of a shown one: those of the whole recording, then the view's own.
+    fn parts(&self, column: i64) -> [(&TimeColumns, Range<i64>); 2] {
+        let parts = column * self.factor..((column + 1) * self.factor).min(self.last + 1);
+        let own = self.first_own.clamp(parts.start, parts.end.max(parts.start));
+        [(self.whole.unwrap_or(self.own), parts.start..own), (self.own, own..parts.end)]
     }
 
     fn raster(&self, column: i64, out: &mut Vec<u8>) {
-        if self.factor == 1 {
-            return self.store(column).raster(column, out);
-        }
         let begin = out.len();
         out.resize(begin + self.own.rows(), 0);
-        let parts = column * self.factor..((column + 1) * self.factor).min(self.last + 1);
-        let own = self.first_own.clamp(parts.start, parts.end.max(parts.start));
-        self.store(parts.start).add_raster(parts.start..own, &mut out[begin..]);
-        self.own.add_raster(own..parts.end, &mut out[begin..]);
-    }
-
-    /// The last stored column of a shown one.
-    fn end(&self, column: i64) -> i64 {
-        ((column + 1) * self.factor - 1).min(self.last)
+        for (store, columns) in self.parts(column) {
+            store.add_raster(columns, &mut out[begin..]);
+        }
     }
 
     fn curve(&self, column: i64) -> Curve {
-        let end = self.end(column);
-        self.store(end).curve(end)
+        let parts = self.parts(column).into_iter().filter(|(_, columns)| !columns.is_empty());
+        let greatest = |most: Curve, one: Curve| if one.sum > most.sum { one } else { most };
+        parts.map(|(store, columns)| store.greatest(columns)).reduce(greatest).unwrap_or(NOTHING)
     }
 
     fn channels(&self, column: i64, out: &mut Vec<u8>) {
-        let end = self.end(column);
-        self.store(end).channels(end, out);
+        let begin = out.len();
+        out.resize(begin + 2 * self.own.channel_count(), 0);
+        for (store, columns) in self.parts(column) {
+            store.raise_channels(columns, &mut out[begin..]);
+        }
     }
 }
 

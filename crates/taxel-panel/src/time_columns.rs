@@ -244,12 +244,32 @@ impl TimeColumns {
         Some(&self.blocks[place].1.channels[k * channels..(k + 1) * channels])
     }
 
-    /// Appends the values of all channels at the end of a column, 16 bits each, little-endian.
-    pub fn channels(&self, column: i64, out: &mut Vec<u8>) {
-        match self.channels_at(column) {
-            Some(values) => out.extend(values.iter().flat_map(|value| value.to_le_bytes())),
-            None => out.resize(out.len() + 2 * self.shape.channels, 0),
+    /// Raises channels in `out`, 16 bits each, little-endian, to the greatest value of each in columns.
+    pub fn raise_channels(&self, columns: Range<i64>, out: &mut [u8]) {
+        for values in self.differing(columns).filter_map(|column| self.channels_at(column)) {
+            for (cell, &value) in out.as_chunks_mut().0.iter_mut().zip(values) {
+                *cell = value.max(u16::from_le_bytes(*cell)).to_le_bytes();
+            }
         }
+    }
+
+    /// The curves where the force is greatest in columns.
+    #[must_use]
+    pub fn greatest(&self, columns: Range<i64>) -> Curve {
+        let greatest = |most: Curve, column| match self.curve(column) {
+            curve if curve.sum > most.sum => curve,
+            _ => most,
+        };
+        let first = self.curve(columns.start);
+        self.differing(columns).fold(first, greatest)
+    }
+
+    /// The first of columns, and those that a block stores: all others are as the one before.
+    fn differing(&self, columns: Range<i64>) -> impl Iterator<Item = i64> {
+        let Range { start, end } = columns;
+        let from = self.blocks.partition_point(|(key, _)| (key + 1) * BLOCK <= start + 1);
+        let stored = self.blocks.range(from..).map(|(key, _)| key * BLOCK).take_while(move |&first| first < end);
+        (start..end.min(start + 1)).chain(stored.flat_map(move |first| first.max(start + 1)..end.min(first + BLOCK)))
     }
 
     /// The curves at the end of a column.
@@ -315,15 +335,6 @@ impl TimeColumns {
                 let (ups, downs) = ((*sum & 15) + (cell & 15), (*sum >> 4) + (cell >> 4));
                 *sum = ups.min(15) | downs.min(15) << 4;
             }
-        }
-    }
-
-    /// Appends the raster of a column, one byte per row.
-    pub fn raster(&self, column: i64, out: &mut Vec<u8>) {
-        let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
-        match self.place(key).map(|place| &self.blocks[place].1) {
-            Ok(block) => out.extend_from_slice(&block.raster[k * self.shape.rows..(k + 1) * self.shape.rows]),
-            Err(_) => out.resize(out.len() + self.shape.rows, 0),
         }
     }
 }

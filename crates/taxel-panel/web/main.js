@@ -85,6 +85,8 @@ let registers = null;
 let zeroed = [];
 /** The recording that is being opened. @type {string | null} */
 let opening = null;
+/** Why the last one was not opened. */
+let refused = "";
 /** Whether the server is connected, and why not. */
 let connection = { connected: false, why: "" };
 /** @type {import("./protocol.js").Recordings | null} */
@@ -114,7 +116,7 @@ function showConnection(state, why) {
 }
 
 function writeState() {
-  showState(connection, player.transport, hello, opened, recorder.status, counters, opening);
+  showState(connection, player.transport, hello, opened, recorder.status, counters, opening, refused);
   writePace(opened ? opened.pace : (counters?.pace ?? null));
 }
 
@@ -340,10 +342,12 @@ function greet(message) {
 /** Asks for a recording, or for a trial of it; says so while it is read. @param {string} name @param {string} [trial] */
 async function ask(name, trial) {
   opening = name;
+  refused = "";
   writeState();
   try {
     await server.request({ type: "open", name, ...(trial === undefined ? {} : { trial }) });
   } catch (error) {
+    refused = error instanceof Error ? error.message : String(error);
     failed(error);
   }
   if (opening === name) opening = null;
@@ -384,7 +388,9 @@ function open(message) {
   }
   training.choose(message.name);
   board.array = message.array;
-  maps.health = null;
+  const noisy = message.pictures?.flickering ?? [];
+  maps.flickering = noisy.length;
+  maps.health = noisy.length ? { dead: [], stuck: [], noisy } : null;
   showZeroed();
   part("files", HTMLSelectElement).value = message.name;
   labels.choose(message.name, message.pictures?.trial);

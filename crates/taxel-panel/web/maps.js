@@ -78,7 +78,6 @@ const REST_OF_PICTURES = {
   quiet: "above the rest of a quiet stretch",
   none: "rest not known: values as they are",
 };
-const FALLS = "values fall from their rest: if less means more pressure, say falls = true in a layout file";
 
 /** The maps, their colours, the crosshair and the marks of unwell taxels. */
 export class Maps {
@@ -98,12 +97,14 @@ export class Maps {
     this.floor = 0;
     /** @type {[number, number] | null} */
     this.taxel = null;
-    /** @type {Health | null} */
+    /** @type {Pick<Health, "dead" | "stuck" | "noisy"> | null} */
     this.health = null;
     /** Unit of the values, size of a tick in it, and ticks of the value 0; `pictures` have no events. */
     this.values = { unit: "ticks", step: 1, zero: 0, pictures: false };
     /** The sources that stand side by side, of pictures. @type {PictureSource[]} */
     this.sources = [];
+    /** How many taxels of pictures flicker, and never count as above rest. */
+    this.flickering = 0;
     /** Taxels whose rest a person set. @type {Zeroing[]} */
     this.zeroed = [];
     /** @type {Picture | null} */
@@ -259,9 +260,9 @@ export class Maps {
   restFrom() {
     if (!this.picture) return "";
     if (!this.values.pictures) return REST_FROM[this.picture.restFrom];
-    const every = this.sources.map(({ name, rest, falls }) => ({ name, text: falls ? FALLS : REST_OF_PICTURES[rest] }));
-    const all = new Set(every.map(({ text }) => text));
-    return all.size === 1 ? every[0].text : every.map(({ name, text }) => `${name}: ${text}`).join("; ");
+    const all = new Set(this.sources.map(({ rest }) => REST_OF_PICTURES[rest]));
+    const from = all.size === 1 ? [...all] : this.sources.map(({ name, rest }) => `${name}: ${REST_OF_PICTURES[rest]}`);
+    return [...from, ...(this.flickering ? [`${counted(this.flickering, "flickering taxel")} left out`] : [])].join("; ");
   }
 
   /** @returns {string} the taxel under the crosshair; of a board its traces, too */

@@ -30,7 +30,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "recordings", folder: string, files: FileInfo[], readouts: string[] }} Recordings
  * @typedef {{ name: string, left: number, rows: number, columns: number, rest: "given" | "quiet" | "none", falls: boolean }} PictureSource
  * @typedef {{ count: number, unit: string, step: number, zero: number, floor: number, newtons: number | null, picture_us: number | null,
- *   sources: PictureSource[], trial: string | null, trials: string[], left_s: number | null }} Pictures
+ *   sources: PictureSource[], flickering: Taxel[], trial: string | null, trials: string[], left_s: number | null }} Pictures
  * @typedef {{ t_us: number | null, text: string, source: string }} RecordedNote
  * @typedef {{ type: "loading", name: string, share: number }} Loading
  * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null,

@@ -30,6 +30,15 @@ function silence(counters, place) {
   return arrival.state === "quiet" ? { word: "Quiet", text: `Quiet: nothing ${since}.` } : null;
 }
 
+/** Values that fall from their rest show nothing. @param {Opened | null} opened @returns {string} what to do about it */
+function fall(opened) {
+  const sources = opened?.pictures?.sources ?? [];
+  const falling = sources.filter(({ falls }) => falls).map(({ name }) => name);
+  if (!opened || !falling.length) return "";
+  const which = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
+  return `The values${which} fall from their rest, so that no pressure is shown. If less means more pressure, write the line “falls = true” into ${opened.name.replace(/\.[^.]+$/, "")}.layout.toml beside the recording, and start taxel view again.`;
+}
+
 /**
  * Writes them.
  * @param {{ connected: boolean, why: string }} connection
@@ -39,8 +48,9 @@ function silence(counters, place) {
  * @param {Recorder | null} recorder
  * @param {Counters | null} counters
  * @param {string | null} opening the recording that is being read
+ * @param {string} refused why the last one was not opened
  */
-export function showState({ connected, why }, { source, state }, hello, opened, recorder, counters, opening) {
+export function showState({ connected, why }, { source, state }, hello, opened, recorder, counters, opening, refused) {
   const recording = recorder?.state === "recording" ? recorder : null;
   const silent = connected && source === null && hello?.live ? silence(counters, hello.udp ? `UDP ${hello.udp}` : "the bridge's address") : null;
   const [kind, word] = !connected
@@ -57,9 +67,10 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   pill.dataset.kind = recording && kind !== "lost" ? "rec" : kind;
   write(part("state-word", HTMLElement), recording && kind !== "lost" ? `${word === "Live" ? "" : `${word}, `}Recording ${recording.file ?? ""}` : word);
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
+  const nothing = connected && source === null && !hello?.live;
   const banner = part("silence", HTMLElement);
-  banner.hidden = !silent && !doubt;
-  write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`].filter(Boolean).join(" "));
+  write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && fall(opened)].filter(Boolean).join(" "));
+  banner.hidden = !banner.textContent;
   const array = opened?.array ?? hello?.array;
   const shape = array ? `${array.rows} × ${array.columns}` : "";
   const place = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? `${source} · ${opened?.verdict ?? ""}` : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";

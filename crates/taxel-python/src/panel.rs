@@ -187,9 +187,9 @@ impl RequestHandler for PythonHandler {
 /// A source of pictures: name, first column, rows, columns, times (us), values, rest.
 type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>, RestIn<'py>);
 
-/// The rest of a source: where it is known from, that of each cell (NaN where unknown), ticks by the unit, and
-/// whether values fall from it.
-type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, bool);
+/// The rest of a source: where it is known from, that of each cell (NaN where unknown), ticks by the unit, whether values
+/// fall from it, and the cells that flicker.
+type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, bool, Vec<usize>);
 
 /// Pictures as Python has read them: the array of all sources, the sources; unit, time from one picture to the next if they
 /// are numbered (us), notes (time, text, source) and detections (label, time, known) as JSON, the verdict, the trial and all
@@ -216,11 +216,12 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
     };
     let file = PictureFile { unit, picture_us, remarks, note_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
-    for (name, left, rows, columns, t, values, (rest, rests, ticks_by_unit, falls)) in &sources {
+    for (name, left, rows, columns, t, values, (rest, rests, ticks_by_unit, falls, flickering)) in &sources {
         let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", rests)?);
         let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
         let cells = usize::from(*rows) * usize::from(*columns);
-        if !inside || values.len() != t.len() * cells || rests.len() != cells {
+        let each = rests.len() == cells && flickering.iter().all(|&cell| cell < cells);
+        if !inside || values.len() != t.len() * cells || !each {
             return Err(ProblemError::new_err(format!("source {name}: does not fit the array")));
         }
         let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
@@ -230,6 +231,7 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
             values: rests.iter().map(known).collect(),
             ticks_by_unit: *ticks_by_unit,
             falls: *falls,
+            flickering: flickering.clone(),
         };
         let place = PicturePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
         placed.push(PictureSource { place, t: t.to_vec(), values, rest });

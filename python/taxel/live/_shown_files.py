@@ -24,7 +24,7 @@ from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.health import health
 from taxel.recording.opening import is_recording, open_joined
-from taxel.recording.rest import of_pictures, ticks_by_unit
+from taxel.recording.rest import flickering, of_pictures, ticks_by_unit
 
 __all__ = ["Opening", "ReadPictures", "ShownFiles", "side_by_side"]
 
@@ -228,10 +228,11 @@ def _in_its_unit(recording: Recording) -> Frames:
     return recording.frames() if recording.calibration is None else recording.calibrated()
 
 
-def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, bool]:
-    """Return where the rest of pictures is from, that of each taxel, ticks by their unit, and whether they fall."""
+def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, bool, list[int]]:
+    """Return the rest's source, that of each taxel, ticks by the unit, whether values fall, and what flickers."""
     rest = of_pictures(frames)
-    return {"unit": "given"}.get(rest.source, rest.source), rest.values, ticks_by_unit(frames), rest.falls
+    source, flickers = {"unit": "given"}.get(rest.source, rest.source), np.flatnonzero(flickering(frames)).tolist()
+    return source, rest.values, ticks_by_unit(frames), rest.falls, flickers
 
 
 def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:

@@ -59,6 +59,8 @@ pub struct PictureRest {
     pub ticks_by_unit: f64,
     /// Whether values fall from that of a quiet stretch: less may mean more pressure.
     pub falls: bool,
+    /// The cells that flicker: no value of theirs counts as above rest.
+    pub flickering: Vec<usize>,
 }
 
 /// The pictures of a source as they are given.
@@ -78,7 +80,7 @@ impl PictureSource<'_> {
     /// The rest of the cells in steps, each from the picture of this number on: once where it is fixed, else where it moved.
     #[allow(clippy::cast_possible_truncation)]
     fn rests(&self, steps: Steps) -> Vec<(usize, Vec<u16>)> {
-        let PictureRest { source, values, ticks_by_unit, falls } = &self.rest;
+        let PictureRest { source, values, ticks_by_unit, falls, .. } = &self.rest;
         let fixed = |values: &[f64]| values.iter().map(|&value| steps.of_rest(value)).collect();
         match source {
             RestSource::None => return vec![(0, vec![steps.zero; values.len()])],
@@ -126,15 +128,20 @@ struct Source {
     ticks: Vec<u16>,
     rest_source: RestSource,
     falls: bool,
+    flickering: Vec<usize>,
     /// The rest of its cells, each from the picture of this number on; there is one at least.
     rests: Vec<(usize, Vec<u16>)>,
 }
 
 impl Source {
     fn new(from: PictureSource<'_>, steps: Steps) -> Self {
-        let (ticks, rests) = (steps.ticks(from.values), from.rests(steps));
-        let PictureRest { source: rest_source, falls, .. } = from.rest;
-        Self { place: from.place, t: from.t, ticks, rest_source, falls, rests }
+        let (ticks, mut rests) = (steps.ticks(from.values), from.rests(steps));
+        let PictureRest { source: rest_source, falls, flickering, .. } = from.rest;
+        for (_, rest) in &mut rests {
+            // No value is above the greatest; a taxel without a rest would get that of its first value.
+            flickering.iter().for_each(|&cell| rest[cell] = UNKNOWN - 1);
+        }
+        Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, rests }
     }
 
     /// The rest of its cells at a picture; before the first one, that of the first.
@@ -284,6 +291,17 @@ impl PictureIndex {
     /// The places of its sources, where the rest of each comes from, and whether its values fall from it.
     pub fn places(&self) -> impl Iterator<Item = (&PicturePlace, RestSource, bool)> {
         self.sources.iter().map(|source| (&source.place, source.rest_source, source.falls))
+    }
+
+    /// Column and row of the taxels that flicker, which never count as above rest.
+    pub fn flickering(&self) -> impl Iterator<Item = (usize, usize)> {
+        let columns = usize::from(self.array.columns);
+        let of = move |source: &Source| {
+            let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
+            let places = source.flickering.iter().map(|&cell| (taxels[cell] % columns, taxels[cell] / columns));
+            places.collect::<Vec<_>>()
+        };
+        self.sources.iter().flat_map(of)
     }
 
     /// Time of the last picture up to a time, us.
@@ -565,7 +583,13 @@ mod tests {
 
     fn index(left: &(Vec<i64>, Vec<f32>), right: &(Vec<i64>, Vec<f32>)) -> Arc<PictureIndex> {
         let array = Array::new(2, 7, 1.0, "feet").unwrap();
-        let rest = PictureRest { source: RestSource::None, values: vec![0.0; 6], ticks_by_unit: 1.0, falls: false };
+        let rest = PictureRest {
+            source: RestSource::None,
+            values: vec![0.0; 6],
+            ticks_by_unit: 1.0,
+            falls: false,
+            flickering: vec![],
+        };
         let source = |place, (t, values): &'_ (Vec<i64>, Vec<f32>)| (place, t.clone(), values.clone());
         let all = [source(place("left", 0), left), source(place("right", 4), right)];
         let sources = all.iter().map(|(place, t, values)| PictureSource {
