@@ -260,7 +260,7 @@ def test_why_a_file_was_not_opened_stays_in_sight(chromium: Any, tmp_path: Path)
         running("view", "plain.csv", "--no-open", folder=tmp_path) as server,
         opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
     ):
-        shows(page, "silence", r"^plain\.csv, line 1: .* a layout file beside it, plain\.layout\.toml")
+        shows(page, "silence", r"plain\.csv, line 1: .* a layout file beside it, plain\.layout\.toml")
         page.locator("#notice-close").click()
         assert page.locator("#silence").is_visible()
         shows(page, "state-word", "^No recording$")
