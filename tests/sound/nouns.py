@@ -87,6 +87,10 @@ SOUND: dict[str, Sound] = {
         {"recording": "walk.mcap", "trial": "walk 1", "source": "left"},
     ),
     "taxel.Labels.of": lambda: (taxel.Labels("here_labels.csv").of, {"recording": taxel.open("here_events.npz")}),
+    "taxel.Verdict": plain(taxel.Verdict, line="nothing lost"),
+    "taxel.Verdict.from_dict": plain(
+        taxel.Verdict.from_dict, held={"status": "lost", "text": "LOST: 2 datagrams", "lost": {"lost_on_the_way": 2}}
+    ),
     "taxel.Clock.host_ns": method(CLOCK, "host_ns", board_us=[500]),
     "taxel.Clock.board_us_at": method(CLOCK, "board_us_at", host_ns=[500_000]),
 }

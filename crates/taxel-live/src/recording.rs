@@ -21,26 +21,23 @@ mod stream;
 mod topic;
 mod verdict;
 
-use std::collections::BTreeMap;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
-use taxel_core::wire::{self, Registers};
+use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
-
-use crate::bridged::Bridged;
 
 pub use event_pictures::EventPictures;
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
-pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks, begin_with};
+pub use mcap_reader::{Datagrams, Decoded, Message, Place, Reader, Remarks, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
 pub use pictures::{Encoding, PictureSource, Pictures};
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
-pub(crate) use verdict::JUMPS;
-use verdict::{BOARD_DROPPED, BOARD_RESET, REPAIRED, REPEATED};
-pub use verdict::{Basis, Condition, Found, NOTHING_LOST, Status, Verdict};
+pub use verdict::{
+    Basis, Condition, Counts, Ending, Found, NOTHING_LOST, Rebuilt, Status, Verdict, damage, damage_of_version_2,
+};
 
 /// Longest time that a datagram waits until its chunk is closed and passed to the operating system.
 ///
@@ -151,31 +148,6 @@ impl std::str::FromStr for Compression {
     }
 }
 
-/// Counts of datagrams and bytes, by what happened to them; the sums of the causes equal the totals.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Counts {
-    /// Datagrams received from the socket.
-    pub received: u64,
-    /// Datagrams in this recording.
-    pub recorded: u64,
-    /// What the kernel dropped because its receive buffer was full: datagrams, or with `UDP_GRO` trains of them.
-    pub dropped_by_kernel: u64,
-    /// Datagrams that taxel dropped because its own queue was full.
-    pub dropped_by_queue: u64,
-    /// What the decoder could not use of the bytes received, by cause; see [`damage`].
-    pub decoder: BTreeMap<String, u64>,
-    /// What was lost between the computer that received the datagrams and this one, if they are different.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bridged: Option<Box<Bridged>>,
-    /// For version 2: datagrams that the board sent and that never arrived intact.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub missing: Option<u64>,
-    /// The verdict of the recording that this one was converted from.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub converted: Option<Verdict>,
-}
-
 impl Header {
     /// Checks the properties that a file states.
     pub(crate) fn check(&self) -> taxel_core::Result<()> {
@@ -267,47 +239,6 @@ fn check_name(name: &str) -> taxel_core::Result<()> {
         return Err(problem!("source {name:?}: a name is of letters, digits, _ and -, at most 64"));
     }
     Ok(())
-}
-
-impl Counts {
-    /// The verdict: nothing lost after arrival, or what was lost where.
-    #[must_use]
-    pub fn verdict(&self) -> Verdict {
-        Verdict::of_counts(self, NOTHING_LOST)
-    }
-}
-
-/// What a decoder could not use, by cause, as recordings store it; `jumps` are those of [`wire::Ahead`].
-#[must_use]
-pub fn damage(counts: &wire::Counts, jumps: u64) -> BTreeMap<String, u64> {
-    [
-        ("bytes_skipped", counts.skipped),
-        ("short_events", counts.short),
-        ("contradictory_kinds", counts.contradictory),
-        ("outside_the_array", counts.outside),
-        ("unpaired_intensities", counts.unpaired),
-        ("events_out_of_order", counts.back),
-        (JUMPS, jumps),
-    ]
-    .map(|(cause, n)| (cause.to_owned(), n))
-    .into()
-}
-
-/// The same for version 2, if the board sends it; and the number of its missing datagrams.
-#[must_use]
-pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String, u64>, u64)> {
-    let causes = [
-        ("datagrams_damaged", counts.checksum + counts.short + counts.foreign),
-        (REPEATED, counts.repeated + counts.old),
-        ("taxels_outside_the_array", counts.outside),
-        ("datagrams_of_an_unknown_kind", counts.unknown_kind),
-        ("malformed_bodies", counts.malformed),
-        (BOARD_DROPPED, counts.dropped),
-        (BOARD_RESET, counts.resets),
-        (REPAIRED, counts.repaired),
-        ("differences_from_an_unknown_value", counts.unknown_value),
-    ];
-    (counts.datagrams > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))
 }
 
 /// A note written during a recording.

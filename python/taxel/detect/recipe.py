@@ -323,7 +323,7 @@ class Recipe:
                 )
         values = recipes.read(recipe)
         several_of = values.get("encoders")
-        for key in changes or ():
+        for key in changes if isinstance(changes, Mapping) else ():
             if key.startswith("encoder.") and isinstance(several_of, Mapping):
                 raise ProblemError(
                     f"{key}: recipe {recipe} has several encoders: change encoders.NAME{key[7:]}, where NAME is one of "

@@ -150,6 +150,17 @@ class Verdict(str):
 
 def _stated(held: Any) -> dict[str, Any]:
     """Return a verdict from `to_dict` as the compiled part states it."""
-    if not isinstance(held, Mapping) or not isinstance(held.get("parts", {}), Mapping):
+    own = held if isinstance(held, Mapping) else {}
+    numbers, parts, doubtful = ([*(own.get(name, {}) for name in _NUMBERS)], own.get("parts", {}), "doubtful_after_us")
+    counts = [count for each in numbers if isinstance(each, Mapping) for count in each.values()]
+    if (
+        own.get("status") not in STATUSES
+        or not isinstance(own.get("text"), str)
+        or not all(isinstance(each, Mapping) for each in (*numbers, parts))
+        or not all(isinstance(count, int) and 0 <= count < 2**64 for count in counts)
+        or not isinstance(own.get(doubtful), int | None)
+    ):
         raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
-    return {**held, "parts": [(name, _stated(part)) for name, part in held.get("parts", {}).items()]}
+    made = {"status": own["status"], "text": own["text"], doubtful: own.get(doubtful)}
+    made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
+    return made | {"parts": [(str(name), _stated(part)) for name, part in parts.items()]}

@@ -5,7 +5,6 @@
 //! an invalid record the walk continues at the next valid chunk; the bytes between are counted.
 
 mod blocks;
-mod condition;
 mod message;
 mod remarks;
 mod walk;
@@ -20,11 +19,10 @@ use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Events, Stop, problem};
 
 use super::stream::Sampling;
-use super::{BoardChange, Change, Counts, Found, Header, Pictures, Samples, Topic, limits};
+use super::{BoardChange, Change, Counts, Ending, Found, Header, Pictures, Rebuilt, Samples, Topic, limits};
 use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
-pub use condition::{Ending, Rebuilt};
 pub use message::Message;
 pub use remarks::{Remarks, begin_with};
 use walk::Walk;

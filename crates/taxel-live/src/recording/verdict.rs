@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use taxel_core::wire::SenderDecoder;
+use taxel_core::wire::{self, SenderDecoder};
 
-use super::{Counts, Ending, Rebuilt, damage, damage_of_version_2};
+use crate::bridged::Bridged;
 
 /// The wording of version 1 when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
@@ -93,6 +93,60 @@ impl From<Stored> for Verdict {
     }
 }
 
+/// Counts of datagrams and bytes, by what happened to them; the sums of the causes equal the totals.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Counts {
+    /// Datagrams received from the socket.
+    pub received: u64,
+    /// Datagrams in this recording.
+    pub recorded: u64,
+    /// What the kernel dropped because its receive buffer was full: datagrams, or with `UDP_GRO` trains of them.
+    pub dropped_by_kernel: u64,
+    /// Datagrams that taxel dropped because its own queue was full.
+    pub dropped_by_queue: u64,
+    /// What the decoder could not use of the bytes received, by cause; see [`damage`].
+    pub decoder: BTreeMap<String, u64>,
+    /// What was lost between the computer that received the datagrams and this one, if they are different.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bridged: Option<Box<Bridged>>,
+    /// For version 2: datagrams that the board sent and that never arrived intact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<u64>,
+    /// The verdict of the recording that this one was converted from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub converted: Option<Verdict>,
+}
+
+/// How a recording ended, as the file states.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Ending {
+    /// As planned.
+    Finished {
+        /// Counts of what was received and lost.
+        counts: Counts,
+    },
+    /// Stopped because writing failed, with the operating system's error.
+    Stopped(String),
+}
+
+/// The parts of a damaged file that were skipped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Rebuilt {
+    /// Whether the end of the file is missing: writing was killed, or the file was truncated.
+    pub unfinished: bool,
+    /// Number of bytes of an incomplete record at the end of the file.
+    pub torn_bytes: u64,
+    /// Number of places where the walk met an invalid record and resynchronised.
+    pub gaps: u64,
+    /// Number of bytes skipped there.
+    pub skipped_bytes: u64,
+    /// Number of chunks that were skipped because the unpacked size that they state exceeds the limit.
+    pub large_chunks: u64,
+}
+
 /// What a verdict is made from.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -156,6 +210,47 @@ impl Found {
         });
         Self { damage: causes, missing, doubtful_after_us: sender.ahead().after.map(|t| t + origin_us) }
     }
+}
+
+impl Counts {
+    /// The verdict: nothing lost after arrival, or what was lost where.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        Verdict::of_counts(self, NOTHING_LOST)
+    }
+}
+
+/// What a decoder could not use, by cause, as recordings store it; `jumps` are those of [`wire::Ahead`].
+#[must_use]
+pub fn damage(counts: &wire::Counts, jumps: u64) -> BTreeMap<String, u64> {
+    [
+        ("bytes_skipped", counts.skipped),
+        ("short_events", counts.short),
+        ("contradictory_kinds", counts.contradictory),
+        ("outside_the_array", counts.outside),
+        ("unpaired_intensities", counts.unpaired),
+        ("events_out_of_order", counts.back),
+        (JUMPS, jumps),
+    ]
+    .map(|(cause, n)| (cause.to_owned(), n))
+    .into()
+}
+
+/// The same for version 2, if the board sends it; and the number of its missing datagrams.
+#[must_use]
+pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String, u64>, u64)> {
+    let causes = [
+        ("datagrams_damaged", counts.checksum + counts.short + counts.foreign),
+        (REPEATED, counts.repeated + counts.old),
+        ("taxels_outside_the_array", counts.outside),
+        ("datagrams_of_an_unknown_kind", counts.unknown_kind),
+        ("malformed_bodies", counts.malformed),
+        (BOARD_DROPPED, counts.dropped),
+        (BOARD_RESET, counts.resets),
+        (REPAIRED, counts.repaired),
+        ("differences_from_an_unknown_value", counts.unknown_value),
+    ];
+    (counts.datagrams > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))
 }
 
 impl Verdict {

@@ -75,7 +75,7 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     Examples
     --------
     >>> chosen(Frames([[[0.0] * 6] * 6], [0], unit="V"), ["soft", "hard"])
-    ('touch', 'a grid of 6 x 6 taxels')
+    ('touch', 'kinds of touch on a grid of 6 x 6 taxels')
     """
     every = {name: read(name) for name in names()}
     of = {kind: name for name, values in every.items() for kind in values.get("fits", ())}

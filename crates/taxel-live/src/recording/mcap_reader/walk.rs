@@ -9,9 +9,8 @@ use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 
 use super::blocks::{Block, texts_fit};
-use super::condition::{Ending, Rebuilt};
 use crate::recording::metadata::{BEGIN, END};
-use crate::recording::{Counts, Header, limits};
+use crate::recording::{Counts, Ending, Header, Rebuilt, limits};
 use crate::{Error, Result};
 
 /// Size of a record's opcode and length, bytes.
