@@ -31,6 +31,10 @@ class Verdict(str):
     line : str
         A line that an earlier version wrote: only its status is known, and no numbers.
 
+    Raises
+    ------
+    ProblemError : a line that is no text
+
     Attributes
     ----------
     status : {"complete", "complete after arrival", "unknown", "damaged", "unfinished", "lost", "nothing arrived"}
