@@ -120,7 +120,7 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
     pictures, and points to try whose delays are then those of a point before are left out. As stamps are not regular,
     each age begins half a picture early, and the age of a delay ends a picture later. Of events, whose state is known
     at any time, all that holds only where a frame lasts longer than a delay, and ages begin in time. Of several
-    examples the longest picture counts.
+    examples the longest picture counts. A recipe that names no neurons is trained as it is, and its delays are ages.
 
     Parameters
     ----------
@@ -129,7 +129,9 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
     clocks : sequence of Clock
         Of the examples: how long a frame of events lasts.
     """
-    own = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()] or [dict(recipe.learner)]
+    if not recipe.neurons:
+        return recipe
+    own = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()]
     delays = [_delay_ms(one) for one in own if _aged(recipe, one)]
     pictures_ms = max(_picture_ms(one) for one in examples)
     period_ms = pictures_ms or max(to_ms(frame_us or 0.0) for frame_us, _ in clocks)
@@ -176,10 +178,9 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         return copy(part).set_params(ages_ms=[begin_ms(pictures) for pictures in sorted(counts)])
 
     neurons = {label: neuron(values) for label, values in recipe.neurons.items()}
-    learner = recipe.learner if neurons else neuron(recipe.learner)
     whole = recipe.encoder
     parts = {name: encoder(part) for name, part in whole.parts.items()} if isinstance(whole, Composite) else {}
-    return replace(recipe, encoder=Composite(parts) if parts else encoder(whole), learner=learner, neurons=neurons)
+    return replace(recipe, encoder=Composite(parts) if parts else encoder(whole), neurons=neurons)
 
 
 def _aged(recipe: Recipe, values: Mapping[str, Any]) -> bool:
