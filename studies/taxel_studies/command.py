@@ -145,7 +145,7 @@ def every(
         typer.echo(json.dumps(sections))
         return
     for section in sections.values():
-        _tell(section)
+        tell(section)
     typer.echo(f"page: {page}")
 
 
@@ -209,7 +209,7 @@ def _run(
     if as_json:
         typer.echo(json.dumps(section))
         return
-    _tell(section)
+    tell(section)
     typer.echo(f"page: {page}  picture: {report / name}  numbers: {report / name / 'summary.json'}")
 
 
@@ -234,7 +234,8 @@ def _changes(given: list[str], realisations: int | None) -> dict[str, Any]:
     return ({} if realisations is None else {"realisations": realisations}) | assignments(given)
 
 
-def _tell(section: dict[str, Any]) -> None:
+def tell(section: dict[str, Any]) -> None:
+    """Print what a study found: its statements and tables."""
     from rich.console import Console  # noqa: PLC0415  the command line starts quickly
     from rich.table import Table  # noqa: PLC0415
 
@@ -243,14 +244,18 @@ def _tell(section: dict[str, Any]) -> None:
         holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
         typer.echo(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
         typer.echo(f"    published: {s['published']}\n    ours: {s['ours']}")
+    console = Console()
+    if not console.is_terminal:
+        console.width = 10_000  # a file breaks and cuts nothing
     for shown in section["tables"]:
         if not shown["folded"]:
-            table = Table(title=shown["title"], title_justify="left")
+            typer.echo(f"\n{shown['title']}")
+            table = Table(box=None, pad_edge=False)
             for k, name in enumerate(shown["head"]):
-                table.add_column(name, justify="right" if k else "left", no_wrap=not k)
+                table.add_column(name, justify="right" if k else "left", no_wrap=not k, overflow="fold")
             for row in shown["rows"]:
                 table.add_row(*row)
-            Console().print(table)
+            console.print(table)
     for file, why in section["unread"].items():
         typer.echo(f"could not be read, so left out: {file}: {why}")
 

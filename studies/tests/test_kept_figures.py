@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typer.testing import CliRunner
 
 from taxel import FormatError, ProblemError
 from taxel_studies import kept, load
-from taxel_studies.command import app
+from taxel_studies.command import app, tell
 from taxel_studies.page import write_page
 
 _spec = importlib.util.spec_from_file_location("figures", Path(__file__).parents[2] / "docs" / "figures.py")
@@ -172,3 +173,10 @@ def test_a_stale_figure_is_marked_on_the_page(tmp_path: Path) -> None:
 def test_a_change_makes_those_stale_that_use_it(changed: str, stale: set[str], counts: set[str]) -> None:
     uses = {name for name in stale | counts if changed in load(name).made_of}
     assert uses == stale
+
+
+def test_a_printed_table_loses_no_cell_to_the_width(capsys: pytest.CaptureFixture[str]) -> None:
+    head, row = ["way", *map(str, range(12))], ["a long name of one of the ways", *["100.25"] * 12]
+    table = {"title": "Shares", "head": head, "rows": [row], "folded": False}
+    tell({"name": "touch", "size": "toy", "title": "t", "statements": [], "tables": [table], "unread": {}})
+    assert re.split(" {2,}", capsys.readouterr().out.splitlines()[-1].strip()) == row
