@@ -59,6 +59,7 @@ class Loads:
         clocks: Sequence[Clock],
         noise_floor: float,
         report: Callable[[str], object],
+        quantities: Sequence[str] = ("area", "total", "local_load"),
     ) -> None:
         self.noise_floor = noise_floor
         self.names = sorted({name for one in examples for name in one.labels})
@@ -70,7 +71,9 @@ class Loads:
         self._changes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
         self._edges: dict[tuple[str, float, float, int], tuple[Found, Found]] = {}
         self._ages: dict[float, Found] = {}
-        for quantity in ("area", "total", "local_load")[: 2 if lacks_noise(examples) else 3]:
+        for quantity in quantities:
+            if quantity == "local_load" and lacks_noise(examples):
+                continue
             report(f"plain rules by {quantity.replace('_', ' ')}")
             self._curves[quantity] = [
                 _curve(quantity, noise_floor, one, *clock) for one, clock in zip(examples, clocks, strict=True)

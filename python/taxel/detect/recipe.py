@@ -236,10 +236,9 @@ class Recipe:
         """
 
         def listed(label: str, point: Mapping[str, Any]) -> dict[str, Any]:
-            before = self.neurons.get(label, {})
-            first = self.points_of(label)[0]
-            kept = {key: before[key] for key in LISTS if key in before}
-            return kept if point == first else {key: [{**first, **one} for one in kept[key]] for key in kept}
+            before, first = self.neurons.get(label, {}), self.points_of(label)[0]
+            other = {name: value for name, value in first.items() if point.get(name) != value}
+            return {key: [{**other, **one} for one in before[key]] for key in LISTS if key in before}
 
         return replace(self, neurons={label: {**point, **listed(label, point)} for label, point in points.items()})
 
