@@ -9,7 +9,7 @@ SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-br
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
 	@echo "make test   all tests but the slow ones     make slow   the slow ones"
-	@echo "make lint   format, lint, types, floors     make bench  ratios against peers, to benchmarks/results/"
+	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
 	@echo "make aarch64 the extension for ARM computers, where a cross compiler is installed; says what is missing"
@@ -113,7 +113,7 @@ lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
-	$(BIN)/python -m pytest -q tests/test_floors.py
+	$(BIN)/python -m pytest -q tests/test_layers.py
 	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
 	$(BIN)/python tools/page_types.py
 

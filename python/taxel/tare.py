@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 
 __all__ = ["Tare"]
+
+#: How another file of taxel begins, which says what it is.
+_OTHER = re.compile(r'\s*\{\s*"format":\s*"([\w ]+)"')
 
 
 class Tare:
@@ -139,6 +143,10 @@ class Tare:
         """
         if not isinstance(text, str):
             raise ProblemError(f"tare is {shown(text)}: must be JSON text")
+        if other := _OTHER.match(text):
+            raise FormatError(
+                f"is a {other[1]}, not a tare: must be a file that Tare.save or taxel live --save-tare wrote"
+            )
         tare = cls.__new__(cls)
         tare._text = _core.check_tare(checked_text("tare", text))
         values: dict[str, Any] = json.loads(tare._text)

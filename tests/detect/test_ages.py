@@ -67,6 +67,16 @@ def test_the_board_keeps_the_recipe_and_slower_events_take_whole_frames() -> Non
     assert {1: slow.neurons["contact"]} == {1: recipe.neurons["contact"]}
 
 
+def test_a_recipe_whose_later_age_was_chosen_is_sound_and_its_search_is_as_it_was() -> None:
+    recipe = Recipe.load("touch", labels=KINDS)
+    later = recipe._choices_of("small")[2]
+    assert later["inputs"] == ["later"]
+    made = recipe._at({"small": later, "large": recipe.points_of("large")[0]})
+    assert made.learner_of("small")[1] == 20.0
+    assert made.points_of("small")[1:] == recipe.points_of("small")[1:]
+    assert made.neurons["large"] == recipe.neurons["large"]
+
+
 @settings(max_examples=30)
 @given(st.floats(0.3, 200.0))
 def test_each_delay_has_one_picture(picture_ms: float) -> None:

@@ -133,6 +133,15 @@ def test_taxels_whose_rest_is_not_in_the_tare_are_said(folder: Path, trained: Pa
     assert (code, error) == (0, "")
 
 
+def test_a_readout_as_a_tare_is_called_what_it_is(folder: Path, trained: Path, capsys) -> None:
+    code, _, error = call(capsys, "detect", folder / "9.npz", "--readout", trained, "--tare", trained)
+    assert (code, error) == (
+        2,
+        f"taxel: {trained}: is a taxel readout, not a tare: must be a file that Tare.save or taxel live --save-tare "
+        "wrote\n",
+    )
+
+
 def test_a_tare_longer_than_half_of_the_recording_is_refused(folder: Path, trained: Path, capsys) -> None:
     events = taxel.open(folder / "9.npz").events
     half = (int(events.t[-1]) - int(events.t[0])) / 2e6

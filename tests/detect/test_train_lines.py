@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shell import call
+from test_ages import touched
 from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
-from taxel.detect import Example, score
+from taxel.detect import Example, PlainRule, run, score
 from taxel.detect.advice import advised, loaded_at_rest
 from taxel.detect.training import Trained, trained
 from taxel.encode import ContactArea, LevelCrossing
@@ -80,6 +81,31 @@ def test_the_last_lines_warn_of_labels_that_are_not_found_and_the_readout_is_wri
     assert [f"warning: {one}" for one in result["warnings"]] == out.splitlines()[-2:]
     code, out, _ = call(capsys, *arguments, "--window-ms", 10)
     assert (code, "warning" in out) == (0, False), "all are found"
+
+
+def test_one_rule_tells_kinds_at_a_picture_of_a_touch_and_says_which_lies_below(tmp_path: Path, capsys) -> None:
+    frames, truth = touched(1, 80)
+    taxel.convert(frames, tmp_path / "kinds.npz")
+    rows = [f"{kind},{t}" for kind, times in truth.items() for t in times]
+    (tmp_path / "kinds.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
+    arguments = ("train", tmp_path / "kinds.npz", "--labels", tmp_path / "kinds.csv", "-o", tmp_path / "r.json")
+    code, out, _ = call(capsys, *arguments)
+    assert (code, out.splitlines()[0]) == (0, "held out: 4 blocks of time (window 50 ms)")
+    said = [
+        re.search(rf"^{kind}, plain rule: \d of 8 found.*; tuned on all: (.*)$", out, re.MULTILINE)[1]
+        for kind in ("large", "small")
+    ]
+    rule = re.fullmatch(
+        r"one rule for both kinds, the area (\S+) ms after the onset: below (\S+) small, from there on large", said[0]
+    )
+    assert rule, said[0]
+    assert said[0] == said[1]
+    # A picture lasts 12.5 ms, and the age is in the middle of one, or 0.
+    assert float(rule[1]) in (0.0, *(12.5 * k + 6.25 for k in range(1, 5)))
+    # As it is printed it tells the touches that it was tuned on.
+    detector = PlainRule("area", float(rule[2]), age_ms=float(rule[1]), labels=("small", "large"), noise_floor=0.012)
+    found = run(detector, frames, tare=taxel.Tare.take(frames, stop_us=1_200_000))
+    assert score(found, truth).found >= 14
 
 
 def test_labels_are_learnt_as_given_where_that_is_asked_for(tmp_path: Path, capsys) -> None:

@@ -347,7 +347,7 @@ def test_the_gap_of_a_cone_x_is_proven_too(lambdas, norm, time):
         other.multipliers_ = replace(cone.multipliers_, values=0.5 * cone.multipliers_.values)
         assert check_gap(other, patterns, targets) >= gap
         other.multipliers_ = None
-        with pytest.raises(NotFittedError, match="its fit is solved"):
+        with pytest.raises(NotFittedError, match="its fit is assigned"):
             check_gap(other, patterns, targets)
     assert checked > 1
 

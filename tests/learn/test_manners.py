@@ -89,6 +89,27 @@ def test_what_was_learnt_survives_a_copy_and_a_pickle(name):
 
 
 @each_learner
+def test_weights_that_are_assigned_have_no_verdict_of_the_fit_and_a_new_fit_has_its_own(name):
+    learner, patterns = fitted(name)
+    before = {key: value for key, value in vars(learner).items() if key in ("status_", "gap_", "objective_")}
+    copied = copy.copy(learner)
+    copied.weights_ = 0.9 * learner.weights_
+    assert {key: value for key, value in vars(learner).items() if key in before} == before, "the fit stays as it was"
+    if "status_" not in before:
+        assert not hasattr(copied, "status_")
+        return
+    assert copied.status_ == "assigned"
+    assert not {"gap_", "objective_", "parts_", "violation_", "margin_", "reason_"} & vars(copied).keys()
+    assert "solved" not in repr(copied)
+    assert len(copied.predict(patterns)) == len(patterns)
+    if "gap_" in before:
+        copied.weights_ *= 1.1
+        assert copied.status_ == "assigned"
+        assert copied.fit(*examples()).status_ == before["status_"]
+        assert copied.gap_ <= copied.tolerance
+
+
+@each_learner
 def test_scores_lie_between_0_and_1_and_predictions_are_spikes(name):
     one, patterns = fitted(name)
     if name == "Tempotron":

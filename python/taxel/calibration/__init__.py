@@ -46,6 +46,7 @@ class Calibration:
     rest : float64, shape (rows, columns), or None
         What taxels read without a load, where it is known; NaN where it is not, and such taxels give 0.
     floor : float, in readings
+        The noise floor: a reading that is no more than this above rest is no load.
     date : str
         The day, as 2026-11-21.
     residual : float or None

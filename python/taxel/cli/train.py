@@ -103,7 +103,10 @@ def train(
     """
     from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import recipes  # noqa: PLC0415
+    from taxel.detect.examples import checked  # noqa: PLC0415
     from taxel.detect.floors import measured_floor  # noqa: PLC0415
+    from taxel.detect.label_times import off_by  # noqa: PLC0415
+    from taxel.detect.plain_score import floor_of  # noqa: PLC0415
     from taxel.recorded import recorded  # noqa: PLC0415
 
     try_whole(out, overwrite=overwrite)
@@ -133,7 +136,12 @@ def train(
         plan = _planned(recipe, changes, names, measured_floor(examples))
         assert plan is not None
         training = _Training(opened, examples, search, window_ms, update)
-        result, outcomes = training.result(plan, folds)
+        try:
+            result, outcomes = training.result(plan, folds)
+        except ProblemError as error:
+            off = off_by(checked(examples), names, floor_of(plan.encoder))
+            said = (f"{label}: {one}" for label, one in off.items())
+            raise ProblemError("; ".join([str(error), *said])) from None
     result.made.readout.save(out, overwrite=overwrite)
     if report is not None:
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly

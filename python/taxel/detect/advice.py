@@ -1,8 +1,9 @@
-"""What helps a training of which many events are missed or false: another tare or recipe, the plain rule, a search."""
+"""What helps a training of which many events are missed or false: other labels, tare or recipe, the rule, a search."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import comb
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -10,16 +11,18 @@ import numpy as np
 from taxel import _core
 from taxel._base.messages import counted
 from taxel.detect import recipes
-from taxel.detect.examples import Example
+from taxel.detect.alignment import WINDOW_MS
+from taxel.detect.examples import Example, checked
+from taxel.detect.label_times import Off, held_by_tare, off_by
 from taxel.detect.loads import lacks_neighbours
-from taxel.detect.plain_score import PlainScore
+from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.scoring import Score
 from taxel.detect.training import Trained
 from taxel.encode import ContactArea, Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 
 __all__ = ["Advice", "advised", "drifted", "loaded_at_rest"]
@@ -36,12 +39,17 @@ _TOUCH = 2
 _PARTS, _LOOKS = 8, 40
 #: A touched taxel reads so many times its drift.
 _TIMES = 4
+#: Kinds of touch are told apart where chance would tell as many with at most this probability.
+_CHANCE = 0.05
 
 
 class Advice(NamedTuple):
     """What may help a label, and how that is known."""
 
-    helps: Literal["more labels", "another tare", "--search", "--array", "--recipe touch", "the plain rule"]
+    helps: Literal[
+        "other times of the labels", "another tare", "the plain rule", "--recipe touch", "other kinds", "--array",
+        "--search", "more labels",
+    ]  # fmt: skip
     because: str
 
 
@@ -55,11 +63,13 @@ def advised(
 ) -> dict[str, Advice]:
     """Return what may help each label of which more than 5 % are missed or false.
 
-    Another tare where taxels read above their rest before touches begin, or nothing was felt of most labels that are
-    missed. Else the plain rule, where it makes at most half the mistakes on the same labels; or the recipe that learns
-    from the same quantities, if this one does not. For contact and lift of channels their distance. Else more labels,
-    where on its own training data the readout makes at most half the mistakes, as it learnt by heart what these data
-    have. Else a search of other parameters, if the recipe lists any.
+    Other times of the labels where most of them lie at one distance of more than 50 ms from what the sensor felt.
+    Another tare where it holds a touch, where taxels read above their rest before touches begin, or where nothing was
+    felt of most labels that are missed. Else the plain rule, where it makes at most half the mistakes on the same
+    labels; or the recipe that learns from the same quantities, if this one does not. Other kinds of touch where neither
+    tells more of them than chance would. For contact and lift of channels their distance. Else more labels, where on
+    its own training data the readout makes at most half the mistakes, as it learnt by heart what these data have. Else
+    a search of other parameters, if the recipe lists any.
 
     Parameters
     ----------
@@ -78,46 +88,113 @@ def advised(
         for label, one in scored.by_label.items()
         if label in made.readout.labels and max(one.missed, one.false) > _MANY * one.events
     ]
-    loaded = loaded_at_rest(examples, made.recipe.encoder) if many else 0
+    if not many:
+        return {}
+    sound, floor = checked(examples), floor_of(made.recipe.encoder)
+    times = _OfTimes(
+        off_by(sound, many, floor), held_by_tare(sound, floor), loaded_at_rest(examples, made.recipe.encoder)
+    )
     better = (
         {} if plain is None or plain.together is None else {one: plain.together[one] for one in plain.better(scored)}
     )
     channels = lacks_neighbours(examples)
     return {
-        label: _advice(made, label, scored[label], own[label], loaded, search_s, better.get(label), channels=channels)
+        label: _of_times(made, label, scored[label], times)
+        or _advice(
+            made,
+            label,
+            scored,
+            own[label],
+            search_s,
+            better.get(label),
+            _chance(label, scored, plain),
+            channels=channels,
+        )
         for label in many
     }
+
+
+class _OfTimes(NamedTuple):
+    """What is known of the times of labels, and of the tares: taxels that hold a touch, or are loaded at rest."""
+
+    off: Mapping[str, Off]
+    held: int
+    loaded: int
+
+
+def _of_times(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advice | None:
+    """Return what is wrong with the times of labels, or with a tare, if anything is."""
+    alignment = made.alignments.get(label)
+    if label in times.off:
+        because = f"{times.off[label]}, and are aligned within {WINDOW_MS:.0f} ms only"
+        return Advice("other times of the labels", because)
+    if times.held >= _TOUCH:
+        late_ms = 0.0 if alignment is None or alignment.train is None else -alignment.median_ms
+        why = f", as labels lie {late_ms:.0f} ms after what was felt (median)" * (late_ms > to_ms(_BEFORE_US))
+        return Advice("another tare", f"it holds a touch of {times.held} taxels{why}; give --tare SECONDS or FILE")
+    if times.loaded >= _TOUCH:
+        return Advice("another tare", f"{times.loaded} taxels read above theirs while nothing touches them")
+    unfelt = 0 if alignment is None else int(alignment.unpaired.sum())
+    if 2 * unfelt > scored.missed + scored.false:
+        return Advice(
+            "another tare",
+            f"nothing was felt of {counted(unfelt, 'label')}, unless their times are off by more than 50 ms, each by "
+            "another time",
+        )
+    return None
 
 
 def _advice(
     made: Trained,
     label: str,
-    scored: Score,
+    together: Score,
     own: Score,
-    loaded: int,
     search_s: float | None,
     rule: Score | None,
+    chance: str,
     *,
     channels: bool,
 ) -> Advice:
     points = len(made.recipe.points_of(label))
-    wrong, learnt = scored.missed + scored.false, own.missed + own.false
-    unfelt = int(made.alignments[label].unpaired.sum()) if label in made.alignments else 0
-    if loaded >= _TOUCH:
-        return Advice("another tare", f"{loaded} taxels read above theirs while nothing touches them")
-    if 2 * unfelt > wrong:
-        return Advice(
-            "another tare",
-            f"nothing was felt of {counted(unfelt, 'label')}, unless their times are off by more than 50 ms",
-        )
+    wrong, learnt = together[label].missed + together[label].false, own.missed + own.false
     if rule is not None and 2 * rule.rank[0] <= wrong:
         return _by_rule(made, rule.rank[0], wrong)
+    if chance:
+        return Advice(
+            "other kinds", f"{chance}: no input tells these kinds apart, or the labels are too few or mixed up"
+        )
     if channels and _for_touch(made):
         because = "channels in a row at a known distance have neighbours; then the recipe touch fits"
         return Advice("--array", f"{because}, as --array 1x24x5mm")
     if search_s is not None and 2 * learnt > wrong and points > 1:
         return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
     return Advice("more labels", f"of those that it learnt {own.missed} are missed, and {own.false} are false")
+
+
+def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:
+    """Return how many of a kind of touch are told, where neuron and rule tell no more than chance would; else ""."""
+    by = {"the neuron": scored} | ({} if plain is None or plain.together is None else {"the rule": plain.together})
+    said = [_by_chance(label, who, one) for who, one in by.items()]
+    return ", ".join(said) + ", as by chance" if all(said) else ""
+
+
+def _by_chance(label: str, who: str, together: Score) -> str:
+    """Return how many of a kind are told, and of the others taken for it, where chance may do so (Fisher, one-sided).
+
+    Every false detection counts as one at a touch of another kind.
+    """
+    kinds = [one for one in together.by_label.values() if not recipes.knows("touch", one.label)]
+    own = together[label]
+    others = sum(one.events for one in kinds) - own.events
+    if own not in kinds or not others:
+        return ""
+    told, taken = own.found, min(own.false, others)
+    ways = sum(
+        comb(own.events, k) * comb(others, told + taken - k) for k in range(told, own.events + 1) if k <= told + taken
+    )
+    if ways <= _CHANCE * comb(own.events + others, told + taken):
+        return ""
+    return f"{who} tells {told} of {own.events} and takes {taken} of {others} others for {label}"
 
 
 def _for_touch(made: Trained) -> bool:

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from taxel.array import Array
 from taxel.detect.examples import Example
-from taxel.detect.loads import Clock
+from taxel.detect.loads import Clock, picture_ms
 from taxel.detect.recipe import LISTS, Recipe
 from taxel.encode import Composite, Encoder
-from taxel.frames import Frames
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
@@ -133,7 +132,7 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         return recipe
     own = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()]
     delays = [_delay_ms(one) for one in own if _aged(recipe, one)]
-    pictures_ms = max(_picture_ms(one) for one in examples)
+    pictures_ms = max(picture_ms(one) for one in examples)
     period_ms = pictures_ms or max(to_ms(frame_us or 0.0) for frame_us, _ in clocks)
     if not delays or not period_ms or (not pictures_ms and period_ms <= min(delays)):
         return recipe
@@ -190,9 +189,3 @@ def _aged(recipe: Recipe, values: Mapping[str, Any]) -> bool:
 
 def _delay_ms(values: Mapping[str, Any]) -> float:
     return float(values.get("delay_ms", 0.0))
-
-
-def _picture_ms(example: Example) -> float:
-    """Return the median distance of the pictures of a (checked) example, ms; 0 of what has no pictures."""
-    source = example.source
-    return to_ms(float(np.median(np.diff(source.t)))) if isinstance(source, Frames) and len(source) > 1 else 0.0

@@ -18,10 +18,10 @@ from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_us
 
-__all__ = ["Alignment", "align", "aligned_to"]
+__all__ = ["WINDOW_MS", "Alignment", "align", "aligned_to"]
 
 #: How far from its label an input spike may lie, either way, ms.
-_WINDOW_MS = 50.0
+WINDOW_MS = 50.0
 #: Trains with more spikes a label than that are not compared with the labels: they fire throughout.
 _MOST_A_LABEL = 4
 #: Trains are alike that have so many missed and false more than the best one, or that share of the labels.
@@ -153,7 +153,7 @@ def align(
     for train, spikes in candidates.items():
         each = [np.rint(to_us(ms - latency_ms)).astype(np.int64) + by for ms, by in zip(spikes, shift, strict=True)]
         fired = np.concatenate(each)
-        scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, _WINDOW_MS)
+        scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, WINDOW_MS)
     best = _best(scores, len(truth))
     moved = np.zeros(len(truth)) if best is None else np.full(len(truth), np.nan)
     if best is not None:

@@ -14,10 +14,10 @@ from taxel.detect.examples import Example
 from taxel.detect.scoring import APART_US
 from taxel.frames import Frames
 from taxel.recording import Recording
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.wire import FRAME_US
 
-__all__ = ["Clock", "Found", "Loads", "Stretch", "clock_of"]
+__all__ = ["Clock", "Found", "Loads", "Stretch", "clock_of", "picture_ms"]
 
 #: How long a frame lasts (us; None: as the source says), and the wire's version.
 Clock: TypeAlias = tuple[float | None, int]
@@ -59,17 +59,21 @@ class Loads:
         clocks: Sequence[Clock],
         noise_floor: float,
         report: Callable[[str], object],
+        quantities: Sequence[str] = ("area", "total", "local_load"),
     ) -> None:
         self.noise_floor = noise_floor
         self.names = sorted({name for one in examples for name in one.labels})
         self._labels = [{name: np.sort(times) for name, times in one.labels.items()} for one in examples]
         self.every: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(one) for k, one in enumerate(examples)]
+        self._picture_ms = max(map(picture_ms, examples))
         self._curves: dict[str, list[_core.LoadCurve]] = {}
         self._changes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
         self._edges: dict[tuple[str, float, float, int], tuple[Found, Found]] = {}
         self._ages: dict[float, Found] = {}
-        for quantity in ("area", "total", "local_load")[: 2 if lacks_noise(examples) else 3]:
+        for quantity in quantities:
+            if quantity == "local_load" and lacks_noise(examples):
+                continue
             report(f"plain rules by {quantity.replace('_', ' ')}")
             self._curves[quantity] = [
                 _curve(quantity, noise_floor, one, *clock) for one, clock in zip(examples, clocks, strict=True)
@@ -88,6 +92,18 @@ class Loads:
             begins, ends = map(self._together, sides)
             self._edges[point] = begins, ends
         return self._edges[point]
+
+    def ages_ms(self, ages_ms: Iterable[float]) -> list[float]:
+        """Return ages at which something else is read than at those before.
+
+        A picture holds until the next one, so of pictures those are 0 for the first of a touch, and for each later one
+        the middle of the time for which it holds, as stamps are not regular. Of several examples the longest picture
+        counts.
+        """
+        if not self._picture_ms:
+            return list(ages_ms)
+        holds = sorted({int(age / self._picture_ms + 1e-6) for age in ages_ms})
+        return [to_ms(round(to_us((k + 0.5) * self._picture_ms))) if k else 0.0 for k in holds]
 
     def at_age(self, age_ms: float) -> Found:
         """Return the area at an age of every touch."""
@@ -141,6 +157,12 @@ def lacks_noise(examples: Sequence[Example]) -> bool:
 def lacks_neighbours(examples: Sequence[Example]) -> bool:
     """Whether an example is of channels: their taxels have no known neighbours, and rules count those beside one."""
     return any(not one.source.array._has_neighbours for one in examples if not isinstance(one.source, SpikeTrains))  # type: ignore[union-attr]
+
+
+def picture_ms(example: Example) -> float:
+    """Return the median distance of the pictures of a (checked) example, ms; 0 of what has no pictures."""
+    source = example.source
+    return to_ms(float(np.median(np.diff(source.t)))) if isinstance(source, Frames) and len(source) > 1 else 0.0
 
 
 def _first(example: Example) -> int:

@@ -171,7 +171,11 @@ class PlainRule(_Detector):
         return f"PlainRule({self.quantity} >= {self.threshold:g}, release {self.release:g}, {frames}: {found})"
 
     def _compared(self) -> str:
-        """Return what the rule compares, without its labels."""
+        """Return what the rule compares, without its labels; with both of kinds, which one of them lies below."""
+        if self.age_ms is not None:
+            below, above = (label or "nothing" for label in self._parts["labels"])
+            kinds = f"below {self.threshold:.3g} {below}, from there on {above}"
+            return f"one rule for both kinds, the {self.quantity} {self.age_ms:g} ms after the onset: {kinds}"
         return repr(self).removeprefix("PlainRule(").rpartition(": ")[0]
 
 

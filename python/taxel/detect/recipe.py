@@ -230,9 +230,17 @@ class Recipe:
         return replace(self, neurons={label: point})
 
     def _at(self, points: Mapping[str, Mapping[str, Any]]) -> Recipe:
-        """Return the recipe with these parameters of its neurons, and with the points that it lists."""
-        lists = {label: {key: own[key] for key in LISTS if key in own} for label, own in self.neurons.items()}
-        return replace(self, neurons={label: {**point, **lists.get(label, {})} for label, point in points.items()})
+        """Return the recipe with these parameters of its neurons, and with the points that it lists.
+
+        Those are changes of the neuron as it was, whose other parameters they keep.
+        """
+
+        def listed(label: str, point: Mapping[str, Any]) -> dict[str, Any]:
+            before, first = self.neurons.get(label, {}), self.points_of(label)[0]
+            other = {name: value for name, value in first.items() if point.get(name) != value}
+            return {key: [{**other, **one} for one in before[key]] for key in LISTS if key in before}
+
+        return replace(self, neurons={label: {**point, **listed(label, point)} for label, point in points.items()})
 
     def _without_choices(self, part: str) -> Recipe:
         """Return the recipe without the points to choose from whose neuron receives an encoder of this name."""

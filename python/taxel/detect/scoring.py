@@ -62,7 +62,10 @@ class Spread(NamedTuple):
         >>> Spread.of([1.0, 2.0, 3.0, 4.0])
         2.5 ± 1.29 (median 2.5, 95 % in 1.07 to 3.92)
         """
-        return cls(*_core.spread(floats("values", values)))
+        given = floats("values", values)
+        spread = cls(*_core.spread(given))
+        # The mean of equal values is rounded, so that they seem to vary by some 1e-17.
+        return spread._replace(mean=float(given[0]), sd=0.0) if len(given) > 1 and np.ptp(given) == 0.0 else spread
 
     def __repr__(self) -> str:
         if np.isnan(self.mean):

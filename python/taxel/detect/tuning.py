@@ -65,6 +65,7 @@ def tune(
     releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
     where exactly two are nearer to onsets than to ends, or where there are only two: then thresholds of the area at
     each of `AGES_MS` are tried too, on a logarithmic scale, and hold for both where they are better for both together.
+    Of pictures each counts once that holds at one of these ages.
 
     Parameters
     ----------
@@ -130,7 +131,7 @@ def best_rules(
     single = {name: min(pair, key=lambda one: one.fit[:2]) for name, pair in best.items()}
     kinds = onsets if len(onsets) == 2 else list(names) if len(names) == 2 else []
     if kinds:
-        touches = {age: loads.at_age(age).between(windows) for age in AGES_MS}
+        touches = {age: loads.at_age(age).between(windows) for age in loads.ages_ms(AGES_MS)}
         found = _for_kinds(touches, kinds, truth, width_us, loads.noise_floor)
         if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
             single |= dict(zip(kinds, found, strict=True))

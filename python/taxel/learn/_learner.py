@@ -19,7 +19,9 @@ from taxel.spikes import SpikeTrains
 __all__ = ["Learner", "SpikeLearner", "Status", "predicted"]
 
 #: How a fit ended, of all learners; the page on errors has the table.
-Status = Literal["solved", "feasible", "infeasible", "right", "epochs", "stopped"]
+Status = Literal["solved", "feasible", "infeasible", "right", "epochs", "stopped", "assigned"]
+#: What a fit says of its weights. It does not hold of others; a certificate and multipliers are of the problem.
+_OF_WEIGHTS = ("objective_", "parts_", "gap_", "violation_", "margin_", "reason_")
 
 
 _DEFAULT = defaults("matching")
@@ -27,6 +29,15 @@ _DEFAULT = defaults("matching")
 
 class Learner(Parameters):
     """Learn weights; names of results end in ``_``."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set an attribute; weights that are assigned after a fit have none of its verdicts."""
+        super().__setattr__(name, value)
+        fit = vars(self)
+        if name == "weights_" and "status_" in fit:
+            fit["status_"] = "assigned"
+            for of_weights in _OF_WEIGHTS:
+                fit.pop(of_weights, None)
 
     def __repr__(self) -> str:
         """Return the parameters, and of a fit with a proven gap how it ended."""

@@ -89,8 +89,10 @@ class ConeR(SpikeLearner):
         the rows: the minimum itself may miss targets and break silence (`parts_`, `check_solution`).
     multipliers_ : Multipliers
         The proof of it, which `taxel.learn.check_gap` checks in plain NumPy.
-    status_ : {"solved", "stopped"}
-        "stopped": the gap is above `tolerance`, as `max_seconds` or Ctrl-C ended the fit, or neither engine closed it.
+    status_ : {"solved", "stopped", "assigned"}
+        "solved": no weights have an objective smaller by more than `tolerance` of it; these may miss targets and break
+        silence, which are costs here and conditions in `ConeX`. "stopped": the gap is above `tolerance`, as
+        `max_seconds` or Ctrl-C ended the fit, or neither engine closed it. "assigned": as in `ConeX`.
     engine_ : {"native", "cone solver"}
         Which engine found these weights: "cone solver" also where the native engine's result could not be proven.
     rounds_, rows_ : int

@@ -227,13 +227,14 @@ class ConeX(SpikeLearner):
 
     Attributes
     ----------
-    status_ : {"solved", "feasible", "infeasible", "stopped"}
+    status_ : {"solved", "feasible", "infeasible", "stopped", "assigned"}
         "solved" and "feasible": silence keeps at least half its margin, and the neuron, run on the patterns, fires
         within 1e-6 ms of every target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion
         where theta_0 is not 0.3 mV). "solved": these weights are also the best, as no weights that keep the whole
         margin have an objective smaller by more than `tolerance` of it, or by more than 1e-10 of the value of B for
         zero weights. "feasible": the search ended before that was proven (`reason_`). "infeasible": `certificate_`
-        proves it. "stopped": none of these is known.
+        proves it. "stopped": none of these is known. "assigned": `weights_` was assigned after the fit, and
+        what that said of its own weights is gone (`objective_`, `parts_`, `gap_`, `margin_`, `reason_`, `violation_`).
     weights_ : float64, shape (trains,), mV
         The best so far if stopped, which may miss any row; NaN if infeasible, or if only the least margin tried is
         proven to be.
@@ -364,8 +365,8 @@ class ConeX(SpikeLearner):
         result = problem._problem.fit(first, multipliers, progress)
         (status, weights, objective, parts, gap, violation), rest, proof, signal = result
         (margin, requested), engine, rounds, (rows, multipliers), certificate, reason = rest
-        self.status_ = status
         self.weights_ = weights
+        self.status_ = status
         self.objective_ = objective
         self.parts_ = dict(zip(("l1", "l2", "B"), parts, strict=True))
         self.gap_ = gap

@@ -1,0 +1,133 @@
+"""Whether the labels of a training are at the times of what the sensor felt, and whether a tare holds a touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import ProblemError
+from taxel.detect.alignment import WINDOW_MS
+from taxel.detect.examples import Example
+from taxel.detect.floors import measured_floor
+from taxel.detect.loads import Loads, clock_of, lacks_neighbours
+from taxel.spikes import SpikeTrains, to_ms, to_us
+from taxel.tare import Tare
+
+__all__ = ["Off", "held_by_tare", "off_by"]
+
+#: So many loaded taxels are a touch, the smallest that there is.
+_TOUCH = 2.0
+#: Distances between labels and touches are looked at up to this, ms, and are the same that differ by this.
+_FARTHEST_MS, _SAME_MS = 1000.0, 50.0
+#: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so.
+_SHARE, _LEAST = 0.8, 5
+#: Touches that are so many times as many as the labels are at some distance of them by chance.
+_MOST_A_LABEL = 4
+#: This share of a tare, at its beginning, holds no touch.
+_EARLY = 0.25
+#: A taxel varies more than its noise at the beginning from so many times that on, and this part of the noise floor.
+_TIMES, _OF_FLOOR = 3.0, 6.0
+
+
+class Off(NamedTuple):
+    """By how much labels of one name lie after what was felt, ms; how many lie there, and of how many."""
+
+    ms: float
+    alike: int
+    labels: int
+
+    def __str__(self) -> str:
+        side = "after" if self.ms > 0 else "before"
+        return f"{self.alike} of {self.labels} lie {abs(self.ms):.0f} ms {side} what the sensor felt (median)"
+
+
+def off_by(examples: Sequence[Example], labels: Sequence[str], noise_floor: float) -> dict[str, Off]:
+    """Return which labels lie at one distance from what was felt that is too large for them to be aligned.
+
+    What was felt are the begins or the ends of loads on two taxels or more, whichever more labels follow. Loads are
+    measured from the beginning of a tare that is of its own recording, as late labels let it end in a touch.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+    labels : sequence of str
+    noise_floor : float, in the sensor's unit
+        Of a board; that of other sensors is measured.
+    """
+    sources = [one for one in examples if one.tare is not None and not isinstance(one.source, SpikeTrains)]
+    if len(sources) < len(examples) or lacks_neighbours(examples):
+        return {}
+    early = [one if (tare := _early(one)) is None else one._replace(tare=tare) for one in examples]
+    floor = measured_floor(early) or noise_floor
+    loads = Loads(early, [clock_of(one) for one in early], floor, lambda _: None, ("area",))
+    felt = [edge.t for edge in loads.edges("area", _TOUCH, 1.0, 1)]
+    found = {}
+    for label in labels:
+        times = loads.truth(label, loads.every)
+        one = max((_steady(times, edge) for edge in felt), key=lambda one: (one[0].alike, -one[1]))[0]
+        if one.alike >= max(_LEAST, _SHARE * len(times)) and abs(one.ms) > WINDOW_MS:
+            found[label] = one
+    return found
+
+
+def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[Off, float]:
+    """Return the distance that most labels have from one of these times, the least of equals; and its spread, ms."""
+    if not len(times) or len(felt) > _MOST_A_LABEL * len(times):
+        return Off(0.0, 0, len(times)), np.inf
+    far = round(to_us(_FARTHEST_MS))
+    reach = np.searchsorted(felt, [times - far, times + far])
+    which = np.repeat(np.arange(len(times)), reach[1] - reach[0])
+    beside = np.concatenate([np.arange(*one) for one in reach.T])
+    apart = to_ms(times[which] - felt[beside])
+    order = np.argsort(apart, kind="stable")
+    apart, which = apart[order], which[order]
+    ends = np.searchsorted(apart, apart + _SAME_MS, side="right")
+    best = Off(0.0, 0, len(times)), np.inf
+    for k, end in enumerate(ends):
+        one = Off(float(np.median(apart[k:end])), len(np.unique(which[k:end])), len(times))
+        spread = float(np.ptp(apart[k:end]))
+        if (one.alike, -abs(one.ms)) > (best[0].alike, -abs(best[0].ms)):
+            best = one, spread
+    return best
+
+
+def held_by_tare(examples: Sequence[Example], noise_floor: float) -> int:
+    """Return how many taxels vary far more in the tare of an example than at its beginning, as a touch is in it.
+
+    Of several examples it is the largest number. A tare that is not of its own recording says nothing: 0.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+    noise_floor : float, in the sensor's unit
+        As of `off_by`.
+    """
+    return max((_held(one, noise_floor) for one in examples), default=0)
+
+
+def _held(example: Example, noise_floor: float) -> int:
+    early = _early(example)
+    if early is None or example.tare is None:
+        return 0
+    floor = measured_floor([example._replace(tare=early)]) or noise_floor
+    return int(np.count_nonzero(example.tare.noise > _TIMES * early.noise + floor / _OF_FLOOR))
+
+
+def _early(example: Example) -> Tare | None:
+    """Return the beginning of a tare that is of its own recording; None of another."""
+    tare, source = example.tare, example.source
+    if tare is None or isinstance(source, SpikeTrains):
+        return None
+    try:
+        whole = Tare.take(source, start_us=tare.start_us, stop_us=tare.stop_us)
+        early = tare.start_us + round(_EARLY * (tare.stop_us - tare.start_us))
+        return (
+            Tare.take(source, start_us=tare.start_us, stop_us=early)
+            if np.array_equal(whole.rest, tare.rest, equal_nan=True)
+            else None
+        )
+    except ProblemError:
+        return None

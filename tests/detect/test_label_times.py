@@ -1,0 +1,133 @@
+"""Labels that are off by a time, and tares that hold a touch: training measures both and says so first."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shell import call
+
+import taxel
+from taxel import Array, Frames, Tare
+from taxel.detect import Example, score
+from taxel.detect.advice import _chance
+from taxel.detect.examples import checked
+from taxel.detect.label_times import held_by_tare, off_by
+
+ARRAY = Array(6, 6, pitch_mm=5.0)
+FLOOR = 0.05
+
+
+def touched(seed: int, count: int = 12, begin_s: float = 2.5) -> tuple[Frames, dict[str, np.ndarray]]:
+    """Return pictures at 200 Hz of touches that follow each other irregularly, and when each began and ended, us."""
+    random = np.random.default_rng(seed)
+    begins = begin_s + np.cumsum(random.uniform(0.5, 1.5, count))
+    ends = begins + random.uniform(0.1, 0.3, count)
+    t = np.arange(0, round(1e6 * (ends[-1] + 2)), 5000)
+    values = random.normal(0, 0.002, (len(t), 6, 6))
+    for begin, end in zip(begins, ends, strict=True):
+        y, x = random.integers(1, 4, 2)
+        here = (t >= 1e6 * begin) & (t < 1e6 * end)
+        values[here, y : y + 2, x : x + 2] += random.uniform(0.5, 1.0)
+    labels = {"contact": np.rint(1e6 * begins).astype(np.int64), "lift": np.rint(1e6 * ends).astype(np.int64)}
+    return Frames(values, t, unit="V", array=ARRAY), labels
+
+
+def example(seed: int, shift_ms: float, **more: float) -> Example:
+    """Return touches with their labels so much too late, and the tare before the first label."""
+    frames, truth = touched(seed, **more)
+    labels = {label: times + round(1000 * shift_ms) for label, times in truth.items()}
+    (one,) = checked([Example(frames, labels, Tare.take(frames, stop_us=int(labels["contact"][0]) - 20_000))])
+    return one
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 1000), st.floats(-900, 900))
+def test_labels_that_are_off_are_measured_and_others_are_not_called_so(seed: int, shift_ms: float) -> None:
+    found = off_by([example(seed, shift_ms)], ["contact", "lift"], FLOOR)
+    if abs(shift_ms) < 40:
+        assert found == {}
+    if abs(shift_ms) > 60:
+        assert found.keys() == {"contact", "lift"}
+        for one in found.values():
+            assert abs(one.ms - shift_ms) < 6
+            assert one.alike >= 10
+
+
+@given(st.integers(0, 1000))
+def test_labels_that_nothing_follows_are_not_off(seed: int) -> None:
+    frames, _ = touched(seed)
+    random = np.random.default_rng(seed)
+    labels = {"odd": np.sort(random.integers(3_000_000, int(frames.t[-1]), 12))}
+    (one,) = checked([Example(frames, labels, Tare.take(frames, stop_us=2_000_000))])
+    assert off_by([one], ["odd"], FLOOR) == {}
+
+
+@given(st.integers(0, 1000), st.floats(0, 0.9))
+def test_a_tare_that_ends_in_a_touch_holds_it(seed: int, share: float) -> None:
+    frames, truth = touched(seed, 5, 0.0)
+    begin, end = (int(truth[label][0]) for label in ("contact", "lift"))
+    until = int(begin + share * (end - begin))
+    (one,) = checked([Example(frames, truth, Tare.take(frames, stop_us=until))])
+    held = held_by_tare([one], FLOOR)
+    assert held == (4 if until - begin > 20_000 else held)
+    assert held_by_tare([one._replace(tare=Tare.take(frames, stop_us=begin - 20_000))], FLOOR) == 0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("shift_ms", [-200, 200])
+def test_training_says_first_by_how_much_labels_are_off(tmp_path: Path, capsys, seed: int, shift_ms: int) -> None:
+    frames, truth = touched(seed)
+    taxel.convert(frames, tmp_path / "a.npz")
+    rows = [f"{label},{t + 1000 * shift_ms}" for label, times in truth.items() for t in times]
+    (tmp_path / "a.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
+    arguments = ("train", tmp_path / "a.npz", "--labels", tmp_path / "a.csv", "--recipe", "touch")
+    code, out, _ = call(capsys, *arguments, "-o", tmp_path / "r.json")
+    assert code == 0
+    helps = dict(re.findall(r"^(\w+): \d+% missed, .*; what may help is (.*)$", out, re.MULTILINE))
+    side = "after" if shift_ms > 0 else "before"
+    for label in ("contact", "lift"):
+        said = re.match(rf"other times of the labels: 1\d of 12 lie (\d+) ms {side} what the sensor felt", helps[label])
+        assert said, helps[label]
+        assert abs(int(said[1]) - 200) <= 6
+
+
+def test_where_nothing_can_be_learnt_the_error_says_by_how_much_labels_are_off(tmp_path: Path, capsys) -> None:
+    frames, truth = touched(1)
+    taxel.convert(frames, tmp_path / "a.npz")
+    rows = [f"{label},{t + 200_000}" for label, times in truth.items() for t in times]
+    (tmp_path / "a.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
+    arguments = ("train", tmp_path / "a.npz", "--labels", tmp_path / "a.csv", "--recipe", "touch", "--folds", 2)
+    code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
+    assert (code, error.count("\n")) == (2, 1)
+    assert re.search(r"nothing was felt .*; contact: 12 of 12 lie \d+ ms after what the sensor felt", error), error
+
+
+def told(found: int, events: int, false: int, others: int) -> taxel.detect.Score:
+    """Return the score of a kind with so many found and false, beside another that is never told."""
+    times = np.arange(events + others) * 1_000_000
+    named = times[:found].tolist() + times[events : events + false].tolist()
+    return score(
+        taxel.Detections(["soft"] * len(named), named, named), {"soft": times[:events], "hard": times[events:]}
+    )
+
+
+@pytest.mark.parametrize(
+    ("found", "false", "by_chance"), [(6, 6, True), (0, 0, True), (9, 7, True), (10, 2, False), (12, 5, False)]
+)
+def test_kinds_are_told_by_chance_as_fisher_s_test_has_it(found: int, false: int, by_chance: bool) -> None:
+    stats = pytest.importorskip("scipy.stats")
+    table = [[found, 12 - found], [false, 12 - false]]
+    assert (stats.fisher_exact(table, alternative="greater").pvalue > 0.05) == by_chance
+    said = _chance("soft", told(found, 12, false, 12), None)
+    assert bool(said) == by_chance
+    if by_chance:
+        assert said == f"the neuron tells {found} of 12 and takes {false} of 12 others for soft, as by chance"
+
+
+def test_contact_and_lift_are_no_kinds() -> None:
+    assert _chance("contact", score(taxel.Detections([], [], []), {"contact": [1000], "lift": [2000]}), None) == ""
