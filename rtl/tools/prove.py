@@ -88,7 +88,7 @@ PROOFS = (
             (REGISTERS, "reserved ? 4'd4 : refused(which)", "refused(which)"),
             (REGISTERS, "command && room;", "command;"),
             (PACKAGE, "if (which[11]) return 4'd3;", ""),
-            (PACKAGE, "if (which[12]) return 4'd3;", ""),
+            (PACKAGE, "if (which[12]) return 4'd7;", ""),
             (PACKAGE, "(40'(r.step_read) << 1)", "(40'(r.step_read) << 2)"),
             (PACKAGE, "changed.step_read = value[31:16];", "changed.step_read = value[15:0];"),
         ),
