@@ -239,12 +239,12 @@ module taxel_change_detector
 
   // What is due to be repeated goes with the next frame's end that finds room, where what was repeated last has been sent. The
   // copy of a line begins before that is known, two clocks ahead of the frame's first event, and stays ahead of all.
-  logic line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, ends;
+  logic line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, writes, ends;
   logic [6:0] line_next, line_due, line_now;
-  logic [ROW_BITS-1:0] place, row_copied, row_written;
+  logic [ROW_BITS-1:0] place, row_copied, row_fetched, row_written;
   logic [15:0] again[2**ADDRESS_BITS];  // the same values, for the copy to read
   logic [15:0] line_values[2**ROW_BITS];
-  logic [15:0] copied_value;
+  logic [15:0] copied_value, value_written;
 
   // In the order of the scan: channel by channel.
   if (STEPS == 1) begin : g_row_of_one
@@ -262,7 +262,7 @@ module taxel_change_detector
   assign ends       = frame_ends && !full;
   assign states_now = copies;
   assign totals_now = totals_pending && !totals_busy;
-  assign states_ready = states_busy && !copying && !copied;
+  assign states_ready = states_busy && !copying && !copied && !writes;
 
   always_ff @(posedge clk) begin
     if (read_done && after_sent) begin
@@ -301,13 +301,17 @@ module taxel_change_detector
     if (store) again[judged.address] <= stored;
     copied_value <= again[{line_now[LINE_BITS-1:0], row_copied}];
     copied       <= copying;
-    row_written  <= row_copied;
-    if (copied) line_values[row_written] <= copied_value;
+    row_fetched  <= row_copied;
+    // A RAM block's output comes late, and the block that it goes to may lie far.
+    value_written <= copied_value;
+    writes        <= copied;
+    row_written   <= row_fetched;
+    if (writes) line_values[row_written] <= value_written;
     value_repeated <= line_values[row_repeated[ROW_BITS-1:0]];
     if (push) lost_before <= 1'b0;
     else if (changed) lost_before <= 1'b1;
     if (reset) begin
-      {line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, lost_before} <= '0;
+      {line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, writes, lost_before} <= '0;
       line_next <= '0;
     end
   end
