@@ -2,6 +2,10 @@
 // the blocks lie far apart, and two behind it, as its output comes late.
 //
 // It gives one every other clock at most: nothing but `ready` waits for `pop`, which is known late in a clock.
+//
+// Throughput: an event a clock in, one every other clock out.
+// Latency: four clocks from `push` to `ready`, where nothing waits.
+// Loses nothing: it is full before it would. Who pushes counts what found no room.
 module taxel_event_fifo #(
     parameter int DEPTH = 4096,
     parameter int BITS = 47,

@@ -1,6 +1,8 @@
 """Faults planted in the logic, one line each: the comparison with the emulated board sees every one of them."""
 
 import shutil
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,10 @@ from logic import RTL
 from pair import Pair, answers
 from taxel.simulate import NOT_RETURNED
 from taxel.wire import Command
+
+sys.path.insert(0, str(RTL / "tools"))
+
+from prove import PROOFS
 
 #: File, what stands there, what stands there instead.
 FAULTS = [
@@ -135,6 +141,19 @@ OF_MODULES = [
     ("udp_sender", "payload[{filled, place}] <= tdata", "payload[{1'b0, place}] <= tdata"),
     ("udp_sender", "lengths[filled] <= room ? place + BITS'(1) : place", "lengths[filled] <= place + BITS'(1)"),
 ]
+
+
+def test_quick_each_planted_fault_has_one_place():
+    """Those of the proofs too: an edit whose text moved plants nothing."""
+    edits = [*FAULTS, *TOTALS, *VERSION_2, *SPIKES]
+    edits += [(f"taxel_{module}.sv", there, instead) for module, there, instead in OF_MODULES]
+    for proof in PROOFS:
+        sources = {Path(source).name: RTL / source for source in proof.sources}
+        for file, there, _ in proof.faults:
+            assert sources[file].read_text().count(there) == 1, (proof.name, file, there)
+    for file, there, instead in edits:
+        assert (RTL / file).read_text().count(there) == 1, (file, there)
+        assert there != instead
 
 
 def plant(fault, to):
