@@ -150,9 +150,9 @@ rtl-lint: $(VENV)/.installed
 	@$(BIN)/python rtl/tools/lint.py
 lint: rtl-lint
 
-# All tests of the RTL; make test runs those that are quick, where the tools are.
+# All tests of the RTL, on two cores; make test runs those that are quick, where the tools are.
 rtl-test: $(RTL)/.installed released $(VENV)/.for-test rtl-lint
-	$(BIN)/python -m pytest -q rtl/tests -m "not slow"
+	$(BIN)/python -m pytest -q -n 2 rtl/tests -m "not slow"
 rtl-quick: released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q rtl/tests -m "not slow" -k "quick or 8-8-16"
 test: rtl-quick

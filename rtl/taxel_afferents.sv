@@ -3,19 +3,21 @@
 // It follows the stages of the change detector: clock 0 is that in which a taxel's address is given, and clock 5 tells of it.
 // A taxel's first reading counts as what had always been. For that a line that was not read before in this mode forgets what
 // its taxels hold.
-module taxel_afferents
-  import taxel_types::*;
-#(
+//
+// Throughput: a taxel a clock.
+// Latency: five clocks after a taxel's address it is known whether it fires.
+// Loses nothing: no taxel waits. An integral above 16 bits is given as 65535.
+module taxel_afferents #(
     parameter int COLUMNS = 64,
     parameter int STEPS = 4,
     parameter int ADDRESS_BITS = 12
 ) (
     input  logic                    clk,
     input  logic                    begins,     // a read whose taxels come from the next clock on
-    input  read_t                   read,
+    input  taxel_types::read_t      read,
     input  logic [ADDRESS_BITS-1:0] address,    // clock 0
     input  logic [15:0]             ticks,      // clock 1: at most the ramp
-    input  threshold_t              threshold,  // clock 3
+    input  taxel_types::threshold_t threshold,  // clock 3
     input  logic                    sampled,    // clock 5: this was a taxel of a frame of spikes
     input  logic                    returned,   // its comparator had returned
     input  logic [ADDRESS_BITS-1:0] stored_at,
@@ -23,6 +25,8 @@ module taxel_afferents
     output logic                    more,       // the spike is of more pressure
     output logic [15:0]             intensity   // the integral, 1/1024
 );
+
+  import taxel_types::*;
 
   localparam int LINE_BITS = $clog2(COLUMNS) == 0 ? 1 : $clog2(COLUMNS);
   localparam int PRESSURE = 24;  // bits

@@ -1,18 +1,22 @@
 // Answers that wait for the serial line.
-module taxel_answer_queue
-  import taxel_types::*;
-#(
+//
+// Throughput: an answer a clock.
+// Latency: an answer stands at the output a clock after it came.
+// Loses nothing: it says whether there is room before a command is judged. The register file refuses and counts the others.
+module taxel_answer_queue #(
     parameter int DEPTH = 8
 ) (
-    input  logic    clk,
-    input  logic    reset,
-    input  logic    answer,
-    input  answer_t answered,
-    output logic    room,    // for one more command, of which the answer comes four clocks later
-    output logic    ready,
-    output answer_t oldest,
-    input  logic    pop
+    input  logic                 clk,
+    input  logic                 reset,
+    input  logic                 answer,
+    input  taxel_types::answer_t answered,
+    output logic                 room,      // for one more command, of which the answer comes four clocks later
+    output logic                 ready,
+    output taxel_types::answer_t oldest,
+    input  logic                 pop
 );
+
+  import taxel_types::*;
 
   localparam int PLACES = $clog2(DEPTH);
 

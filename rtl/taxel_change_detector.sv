@@ -6,9 +6,11 @@
 //
 // Before the first events of a frame of version 2 come, its predecessor's end is queued; where a line's values are due to be
 // repeated then, they are copied, ahead of the events that change them.
-module taxel_change_detector
-  import taxel_types::*;
-#(
+//
+// Throughput: a taxel a clock; what goes ahead of a frame's first taxel takes at most 6 clocks more.
+// Latency: seven clocks from a read's report to its first taxel's event.
+// Loses events and markers that find the queue full (`lost`; `taxel_totals` counts them), and then a taxel keeps its value.
+module taxel_change_detector #(
     parameter int COLUMNS = 64,
     parameter int ROWS = 64,
     parameter int CHANNELS = 16,
@@ -21,24 +23,24 @@ module taxel_change_detector
     input  logic                      clk,
     input  logic                      reset,
     input  logic                      step_end,
-    input  read_t                     read,       // of the step that ends
-    input  logic                      read_done,  // its counts are there
+    input  taxel_types::read_t        read,             // of the step that ends
+    input  logic                      read_done,        // its counts are there
     input  logic [CHANNELS-1:0]       tripped,
     input  logic [CHANNELS-1:0]       first,
     input  logic [CHANNELS-1:0][14:0] at,
     output logic                      push,
-    output event_t                    found,
+    output taxel_types::event_t       found,
     input  logic                      full,
-    output logic                      frame,         // of the events to come, alternating over frames that have any
-    output logic                      sent,          // a taxel's event found room
-    output logic                      lost,          // an event or a marker found none
-    output logic                      frame_over,    // all events of a frame but the first one were found
-    output logic                      not_returned,  // a comparator had tripped when its ramp began
-    output logic                      counted_first, // a count of the initial frame, in the order of the scan
-    output logic [15:0]               count_first,   // 65535: not returned
+    output logic                      frame,            // of the events to come, alternating over frames that have any
+    output logic                      sent,             // a taxel's event found room
+    output logic                      lost,             // an event or a marker found none
+    output logic                      frame_over,       // all events of a frame but the first one were found
+    output logic                      not_returned,     // a comparator had tripped when its ramp began
+    output logic                      counted_first,    // a count of the initial frame, in the order of the scan
+    output logic [15:0]               count_first,      // 65535: not returned
     // What is repeated: the packer reads it by rows, and says when it has.
-    input  totals_t                   totals,
-    output totals_t                   repeated_totals,
+    input  taxel_types::totals_t      totals,
+    output taxel_types::totals_t      repeated_totals,
     output logic                      states_ready,
     output logic [6:0]                repeated_line,
     input  logic [6:0]                row_repeated,
@@ -46,6 +48,8 @@ module taxel_change_detector
     input  logic                      states_sent,
     input  logic                      totals_sent
 );
+
+  import taxel_types::*;
 
   localparam int STEP_BITS = $clog2(STEPS);
   localparam int CHANNEL_BITS = $clog2(CHANNELS);
@@ -239,12 +243,12 @@ module taxel_change_detector
 
   // What is due to be repeated goes with the next frame's end that finds room, where what was repeated last has been sent. The
   // copy of a line begins before that is known, two clocks ahead of the frame's first event, and stays ahead of all.
-  logic line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, ends;
+  logic line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, writes, ends;
   logic [6:0] line_next, line_due, line_now;
-  logic [ROW_BITS-1:0] place, row_copied, row_written;
+  logic [ROW_BITS-1:0] place, row_copied, row_fetched, row_written;
   logic [15:0] again[2**ADDRESS_BITS];  // the same values, for the copy to read
   logic [15:0] line_values[2**ROW_BITS];
-  logic [15:0] copied_value;
+  logic [15:0] copied_value, value_written;
 
   // In the order of the scan: channel by channel.
   if (STEPS == 1) begin : g_row_of_one
@@ -262,7 +266,7 @@ module taxel_change_detector
   assign ends       = frame_ends && !full;
   assign states_now = copies;
   assign totals_now = totals_pending && !totals_busy;
-  assign states_ready = states_busy && !copying && !copied;
+  assign states_ready = states_busy && !copying && !copied && !writes;
 
   always_ff @(posedge clk) begin
     if (read_done && after_sent) begin
@@ -301,13 +305,17 @@ module taxel_change_detector
     if (store) again[judged.address] <= stored;
     copied_value <= again[{line_now[LINE_BITS-1:0], row_copied}];
     copied       <= copying;
-    row_written  <= row_copied;
-    if (copied) line_values[row_written] <= copied_value;
+    row_fetched  <= row_copied;
+    // A RAM block's output comes late, and the block that it goes to may lie far.
+    value_written <= copied_value;
+    writes        <= copied;
+    row_written   <= row_fetched;
+    if (writes) line_values[row_written] <= value_written;
     value_repeated <= line_values[row_repeated[ROW_BITS-1:0]];
     if (push) lost_before <= 1'b0;
     else if (changed) lost_before <= 1'b1;
     if (reset) begin
-      {line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, lost_before} <= '0;
+      {line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, writes, lost_before} <= '0;
       line_next <= '0;
     end
   end

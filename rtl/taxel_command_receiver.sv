@@ -1,4 +1,8 @@
 // Commands of the host: five bytes that set one register; it finds its place again after damage.
+//
+// Throughput: a byte a clock.
+// Latency: a command stands a clock after its fifth byte.
+// Loses bytes that belong to no command (`skipped`; `taxel_totals` counts them).
 module taxel_command_receiver (
     input  logic        clk,
     input  logic        reset,

@@ -3,6 +3,10 @@
 // The scan's clock and the fast one are of one PLL, but nothing here rests on their phase: single bits that alternate from read
 // to read cross through two flip-flops, and what they announce stands still meanwhile. Counting begins with the ramp in the
 // fast clock's own domain, so how long a crossing takes plays no part in a count.
+//
+// Throughput: a read at a time; the next one may follow at once.
+// Latency: a read is reported before the next one ends.
+// Loses a read whose ramp does not fall for a clock after the one before: rule 3 of the registers keeps 5 ticks for that.
 module taxel_comparator_array #(
     parameter int CHANNELS = 16,
     parameter int DELAY = 2

@@ -1,4 +1,8 @@
 // One channel of the converter, on the fast clock: at which sample its comparator tripped.
+//
+// Throughput: a pair of samples a clock.
+// Latency: the result of a pair stands a clock later.
+// Loses nothing: one that trips after a read's last pair counts as not tripped.
 module taxel_comparator_column (
     input  logic        clk_fast,
     input  logic        begins,   // a clock before pair 0 of a read is sampled

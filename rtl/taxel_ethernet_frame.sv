@@ -3,9 +3,11 @@
 //
 // Lengths and the header's checksum follow the payload's length. The checksum of UDP is 0, which is none (RFC 768): the
 // frame has its check sequence. What the sender's two addresses and ports are is fixed.
-module taxel_ethernet_frame
-  import taxel_types::*;
-#(
+//
+// Throughput: a frame of n bytes of payload every n + 67 clocks, of less than 18 bytes every 85.
+// Latency: five clocks from `waits` to the first byte.
+// Loses nothing: a payload is there before its frame begins.
+module taxel_ethernet_frame #(
     parameter logic [47:0] FROM_MAC  = '0,
     parameter logic [47:0] TO_MAC    = '1,
     parameter logic [31:0] FROM_IP   = '0,
@@ -24,6 +26,8 @@ module taxel_ethernet_frame
     output logic [7:0]      txd,
     output logic            enable
 );
+
+  import taxel_types::*;
 
   localparam int PREAMBLE = 8;
   localparam int HEADERS = 14 + 20 + 8;

@@ -1,6 +1,11 @@
-// The queue of events: a ring in block memory, with two registers behind it as its output comes late.
+// The queue of events: a ring in block memory, with a register before it, as whether an event comes is known late in a clock and
+// the blocks lie far apart, and two behind it, as its output comes late.
 //
 // It gives one every other clock at most: nothing but `ready` waits for `pop`, which is known late in a clock.
+//
+// Throughput: an event a clock in, one every other clock out.
+// Latency: four clocks from `push` to `ready`, where nothing waits.
+// Loses nothing: it is full before it would. Who pushes counts what found no room.
 module taxel_event_fifo #(
     parameter int DEPTH = 4096,
     parameter int BITS = 47,
@@ -23,32 +28,37 @@ module taxel_event_fifo #(
   localparam int SLICES = (BITS + WIDTH - 1) / WIDTH;
 
   logic [PLACES-1:0] write, read;
-  logic [PLACES:0] waiting;  // in the ring
+  logic [PLACES:0] waiting;  // in the ring and before it
+  logic [BITS-1:0] held;     // before it
+  logic stored;              // into the ring, in this clock
   logic [SLICES-1:0][WIDTH-1:0] fetched;
   logic fetched_valid, fetch, move;
-  logic none;  // waits
+  logic none;  // in the ring
 
-  assign empty = none && !fetched_valid && !ready;
+  assign empty = none && !stored && !fetched_valid && !ready;
   assign move  = fetched_valid && !ready;
   assign fetch = !none && (!fetched_valid || move);
 
   for (genvar k = 0; k < SLICES; k++) begin : g_slice
     logic [WIDTH-1:0] ring[DEPTH];
     always_ff @(posedge clk) begin
-      if (push) ring[write] <= WIDTH'(entered >> (k * WIDTH));
+      if (stored) ring[write] <= WIDTH'(held >> (k * WIDTH));
       if (fetch) fetched[k] <= ring[read];
     end
   end
 
   always_ff @(posedge clk) begin
-    if (push) write <= write == PLACES'(DEPTH - 1) ? '0 : write + PLACES'(1);
+    held   <= entered;
+    stored <= push;
+    if (stored) write <= write == PLACES'(DEPTH - 1) ? '0 : write + PLACES'(1);
     if (fetch) read <= read == PLACES'(DEPTH - 1) ? '0 : read + PLACES'(1);
     // What the count will be is not waited for: whether a word is fetched is known late in a clock.
     if (push != fetch) begin
       waiting <= push ? waiting + (PLACES + 1)'(1) : waiting - (PLACES + 1)'(1);
       full    <= push && waiting == (PLACES + 1)'(DEPTH - 1);
-      none    <= fetch && waiting == (PLACES + 1)'(1);
     end
+    // A word that is pushed now is in the ring after the next clock.
+    none <= waiting == (PLACES + 1)'(fetch);
     if (fetch) fetched_valid <= 1'b1;
     else if (move) fetched_valid <= 1'b0;
     if (move) oldest <= BITS'(fetched);
@@ -58,6 +68,7 @@ module taxel_event_fifo #(
       write         <= '0;
       read          <= '0;
       waiting       <= '0;
+      stored        <= 1'b0;
       full          <= 1'b0;
       none          <= 1'b1;
       fetched_valid <= 1'b0;

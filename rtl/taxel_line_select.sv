@@ -3,6 +3,11 @@
 // A later line is reached by shifting on. For an earlier one the old one is shifted out beyond the last line, and a new one in.
 // After reset, and where there are more lines than before, the whole chain is shifted through, as what it holds is not known.
 // A pulse takes 2 x HALF clocks, so a jump over n lines settles n pulses later.
+//
+// Throughput: a line every 2 x HALF clocks for each place of the jump, and three more.
+// Latency: as long.
+// Loses a jump that the next line's start cuts short: then no line or two are driven, until ascending lines have passed all
+// places.
 module taxel_line_select #(
     parameter int COLUMNS = 64,
     parameter int HALF = 1  // clocks of half a pulse

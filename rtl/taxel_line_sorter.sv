@@ -2,22 +2,26 @@
 //
 // Events of a line are gathered in one of two banks until an entry comes that is not of it; then they are handed on row by row,
 // while the next line's are gathered in the other bank. Everything else passes when both banks are empty.
-module taxel_line_sorter
-  import taxel_types::*;
-#(
+//
+// Throughput: an entry every other clock; a line is handed on while the next one is gathered.
+// Latency: an event waits until an entry comes that is not of its line.
+// Loses nothing: while the packer waits, so does the queue.
+module taxel_line_sorter #(
     parameter int ROWS = 64
 ) (
-    input  logic   clk,
-    input  logic   reset,
-    input  logic   ready,    // an entry of version 2 stands at the queue's output
-    input  event_t oldest,
-    input  logic   leaving,  // an entry of version 1 does
-    output logic   pop,
-    output logic   idle,     // nothing is gathered
-    output logic   valid,    // an entry stands at the output
-    output event_t entry,
-    input  logic   taken
+    input  logic                clk,
+    input  logic                reset,
+    input  logic                ready,    // an entry of version 2 stands at the queue's output
+    input  taxel_types::event_t oldest,
+    input  logic                leaving,  // an entry of version 1 does
+    output logic                pop,
+    output logic                idle,     // nothing is gathered
+    output logic                valid,    // an entry stands at the output
+    output taxel_types::event_t entry,
+    input  logic                taken
 );
+
+  import taxel_types::*;
 
   localparam int GROUP = 8;
   localparam int GROUPS = (ROWS + GROUP - 1) / GROUP;

@@ -3,38 +3,42 @@
 // Frame after frame without a pause: each line has STEPS steps, and of each step the last `step_read` is read, after the taxels
 // have settled. `EARLY` clocks before a frame's edge the registers as written are taken for the next frame. All pulses are of
 // one clock; those of a frame's, a line's and a step's start come together.
-module taxel_mux_ctrl
-  import taxel_registers::*;
-  import taxel_types::*;
-#(
+//
+// Throughput: a step every `step_period` clocks.
+// Latency: what is written `EARLY` clocks before a frame's edge acts in that frame.
+// Loses nothing: the scan waits for nobody.
+module taxel_mux_ctrl #(
     parameter int COLUMNS = 64,
     parameter int STEPS = 4,
-    parameter registers_t AT_RESET = '0
+    parameter taxel_registers::registers_t AT_RESET = '0
 ) (
-    input  logic              clk,
-    input  logic              reset,
-    input  registers_t        written,
-    input  logic [2:0]        markers,         // how many wait, and what they mark
-    input  logic [MARKERS-1:0] starts,
-    output logic              markers_taken,
-    output registers_t        active,          // of this frame
-    input  logic [15:0]       stamp,           // of a step that starts now
-    input  micros_t           micros,
-    input  logic [30:0]       ended_micros,    // at a frame's start: the length of the one before
-    input  logic              line_due,        // and what came due in it
-    input  logic              totals_due,
-    output logic              zero,            // time 0
-    output logic              frame_start,
-    output logic              step_start,
-    output logic              read_start,      // of the ramp and the conversion
-    output logic              step_end,        // which is the end of the read
-    output logic              reading,         // the line's part that is read, a step's part that is read
-    output logic              converting,
-    output read_t             read,            // of this step
-    output logic [2:0]        rsel,
-    output logic              csel_clk,
-    output logic              csel_din
+    input  logic                            clk,
+    input  logic                            reset,
+    input  taxel_registers::registers_t     written,
+    input  logic [2:0]                      markers,        // how many wait, and what they mark
+    input  logic [taxel_types::MARKERS-1:0] starts,
+    output logic                            markers_taken,
+    output taxel_registers::registers_t     active,         // of this frame
+    input  logic [15:0]                     stamp,          // of a step that starts now
+    input  taxel_types::micros_t            micros,
+    input  logic [30:0]                     ended_micros,   // at a frame's start: the length of the one before
+    input  logic                            line_due,       // and what came due in it
+    input  logic                            totals_due,
+    output logic                            zero,           // time 0
+    output logic                            frame_start,
+    output logic                            step_start,
+    output logic                            read_start,     // of the ramp and the conversion
+    output logic                            step_end,       // which is the end of the read
+    output logic                            reading,        // the line's part that is read, a step's part that is read
+    output logic                            converting,
+    output taxel_types::read_t              read,           // of this step
+    output logic [2:0]                      rsel,
+    output logic                            csel_clk,
+    output logic                            csel_din
 );
+
+  import taxel_registers::*;
+  import taxel_types::*;
 
   localparam int EARLY = 16;
 

@@ -2,26 +2,30 @@
 //
 // A datagram ends with its frame, or before an event whose words would not fit. So the last byte of an event waits until it is
 // known what comes next: the next event, or that its frame has no more.
-module taxel_packer_v1
-  import taxel_types::*;
-#(
+//
+// Throughput: a byte a clock: 5 for a word, 10 for an event with its value.
+// Latency: a clock from an event that is taken to its first byte.
+// Loses nothing: while the link waits, so does the queue.
+module taxel_packer_v1 #(
     parameter bit VALUED = 1'b1,  // a change is followed by its intensity, as a spike always is
     parameter int MOST = 280      // words of a datagram
 ) (
-    input  logic       clk,
-    input  logic       reset,
-    input  logic       ready,    // the oldest event stands at the queue's output
-    input  event_t     oldest,
-    input  logic       allowed,  // it is of this version, and the other one's datagrams have gone
-    output logic       busy,     // an event has not gone yet
-    output logic       pop,
-    input  logic       empty,    // the queue holds none
-    input  logic       frame,    // of the events to come
-    output logic [7:0] tdata,
-    output logic       tvalid,
-    input  logic       tready,
-    output logic       tlast
+    input  logic                clk,
+    input  logic                reset,
+    input  logic                ready,    // the oldest event stands at the queue's output
+    input  taxel_types::event_t oldest,
+    input  logic                allowed,  // it is of this version, and the other one's datagrams have gone
+    output logic                busy,     // an event has not gone yet
+    output logic                pop,
+    input  logic                empty,    // the queue holds none
+    input  logic                frame,    // of the events to come
+    output logic [7:0]          tdata,
+    output logic                tvalid,
+    input  logic                tready,
+    output logic                tlast
 );
+
+  import taxel_types::*;
 
   event_t now;
   logic marker, second, advance, valued, word_over, known, single, fits, ends, over;

@@ -2,9 +2,11 @@
 //
 // A body is written as units of 16 bits. What a datagram holds, and when it ends, is as of the emulated board's packer: an
 // event that does not fit ends it, so does the end of a frame, unless events are held for later ones.
-module taxel_packer_v2
-  import taxel_types::*;
-#(
+//
+// Throughput: an event every 2 clocks and one more for each of its units, 1 to 6.
+// Latency: a datagram is sent when it is known that it is over.
+// Loses nothing: while both banks wait for the link, so does the queue. What the queue lost is flagged.
+module taxel_packer_v2 #(
     parameter int ROWS = 64,
     parameter bit VALUED = 1'b1,
     parameter bit DIFFERENCE = 1'b0,
@@ -12,30 +14,32 @@ module taxel_packer_v2
     parameter int HEARTBEAT_US = 10_000, // between promises that nothing has happened
     parameter int MOST = 688             // units of a body: 1376 bytes
 ) (
-    input  logic        clk,
-    input  logic        reset,
-    input  logic        valid,        // an entry, by ascending rows within a line
-    input  event_t      entry,
-    output logic        taken,
-    input  logic        leaving,      // an entry of version 1 is next
-    output logic        idle,         // no event waits, nor a datagram
+    input  logic                   clk,
+    input  logic                   reset,
+    input  logic                   valid,           // an entry, by ascending rows within a line
+    input  taxel_types::event_t    entry,
+    output logic                   taken,
+    input  logic                   leaving,         // an entry of version 1 is next
+    output logic                   idle,            // no event waits, nor a datagram
     // What is repeated.
-    input  logic        states_ready,
-    input  logic [6:0]  repeated_line,
-    output logic [6:0]  row_repeated,
-    input  logic [15:0] value_repeated,
-    output logic        states_sent,
-    input  totals_t     totals,
-    output logic        totals_sent,
+    input  logic                   states_ready,
+    input  logic [6:0]             repeated_line,
+    output logic [6:0]             row_repeated,
+    input  logic [15:0]            value_repeated,
+    output logic                   states_sent,
+    input  taxel_types::totals_t   totals,
+    output logic                   totals_sent,
     // The buffer and the header of what is in it.
-    output logic        write,
-    output logic        bank,
-    output logic [9:0]  place,
-    output logic [15:0] unit,
-    output logic        send,         // one clock
-    output datagram_t   datagram,
-    input  logic        sending       // the datagram before has not gone
+    output logic                   write,
+    output logic                   bank,
+    output logic [9:0]             place,
+    output logic [15:0]            unit,
+    output logic                   send,            // one clock
+    output taxel_types::datagram_t datagram,
+    input  logic                   sending          // the datagram before has not gone
 );
+
+  import taxel_types::*;
 
   localparam int STRIDE = ROWS > 1 ? $clog2(ROWS) : 0;
   localparam micros_t LATEST = 48'd32_511;

@@ -4,6 +4,10 @@
 // A tick is half a clock, 1/300 us: the ramp is given, and the comparators are sampled, at both edges. Of each pair the first
 // sample, and the first half of the ramp, is in bit 0. `DELAY` clocks pass from the ramp's pair to the pair of samples that
 // were taken during it.
+//
+// Throughput: a ramp at a time.
+// Latency: the ramp rises a clock after `start`.
+// Loses a ramp that starts before the one before has fallen for a clock: comparators see one.
 module taxel_ramp_counter #(
     parameter int DELAY = 3
 ) (

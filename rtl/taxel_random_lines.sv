@@ -3,6 +3,10 @@
 // The order of a frame of n lines begins as 0 to n - 1. Line k of the frame, except the last one, swaps places k and
 // k + (word x (n - k) >> 16), where `word` is the shift register 16 shifts on; then place k is driven. The shift register has
 // 16 bits, begins at 0xACE1 at reset and runs on from frame to frame: its new top bit is the sum modulo 2 of bits 0, 2, 3 and 5.
+//
+// Throughput: a line every 7 clocks.
+// Latency: 7 clocks.
+// Loses nothing: lines come at least 26 clocks apart.
 module taxel_random_lines (
     input  logic       clk,
     input  logic       reset,

@@ -1,6 +1,10 @@
 // When a board of version 2 repeats a line's values and its totals: all lines once in EVERY clocks.
 //
 // Both flags say at a frame's start whether they came due in the frame that ended.
+//
+// Throughput: a line and the totals a frame at most.
+// Latency: flags stand at the start of the next frame.
+// Loses turns that come due twice in a frame: once is repeated.
 module taxel_refresh #(
     parameter int EVERY = 100_000_000  // clocks; 0: never
 ) (

@@ -2,31 +2,36 @@
 //
 // Every command is answered, four clocks later; it takes longer than that to come. One that finds no room for its answer is
 // refused, and counted.
-module taxel_register_file
-  import taxel_registers::*;
-  import taxel_types::*;
-#(
+//
+// Throughput: a command every four clocks.
+// Latency: four clocks from a command to its answer.
+// Loses a command that finds no room for its answer (`refused_full`), and a marker that finds four waiting (`marker_lost`):
+// `taxel_totals` counts both.
+module taxel_register_file #(
     parameter int COLUMNS = 64,
     parameter int ROWS = 64,
     parameter int CHANNELS = 16,
     parameter int STEPS = 4,
-    parameter registers_t AT_RESET = '0
+    parameter taxel_registers::registers_t AT_RESET = '0
 ) (
-    input  logic               clk,
-    input  logic               reset,
-    input  logic               command,
-    input  logic [2:0]         number,
-    input  logic [31:0]        value,
-    output logic               answer,       // to a command: one clock
-    output answer_t            answered,
-    input  logic               room,         // for an answer
-    output logic               refused_full, // a command found none
-    output registers_t         written,
-    output logic [2:0]         markers,      // starts and stops of recordings that wait for a frame
-    output logic [MARKERS-1:0] starts,
-    input  logic               markers_taken,
-    output logic               marker_lost
+    input  logic                            clk,
+    input  logic                            reset,
+    input  logic                            command,
+    input  logic [2:0]                      number,
+    input  logic [31:0]                     value,
+    output logic                            answer,         // to a command: one clock
+    output taxel_types::answer_t            answered,
+    input  logic                            room,           // for an answer
+    output logic                            refused_full,   // a command found none
+    output taxel_registers::registers_t     written,
+    output logic [2:0]                      markers,        // starts and stops of recordings that wait for a frame
+    output logic [taxel_types::MARKERS-1:0] starts,
+    input  logic                            markers_taken,
+    output logic                            marker_lost
 );
+
+  import taxel_registers::*;
+  import taxel_types::*;
 
   registers_t changed;
   logic begun, judged, checked;

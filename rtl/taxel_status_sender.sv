@@ -1,28 +1,32 @@
 // Status lines in ASCII: the greeting, the answers to commands, the totals, and which faults there were.
 //
 // A fault line gives the count since reset. Lines of faults come unasked, at most once in FAULT_CLOCKS, where no answer waits.
-module taxel_status_sender
-  import taxel_types::*;
-#(
+//
+// Throughput: a character in fewer clocks than the serial line takes for one.
+// Latency: an answer waits for the line before it.
+// Loses nothing: a count that changed several times is given as it stands then.
+module taxel_status_sender #(
     parameter int COLUMNS = 64,
     parameter int ROWS = 64,
     parameter int CHANNELS = 16,
     parameter int FAULT_CLOCKS = 1_000_000
 ) (
-    input  logic       clk,
-    input  logic       reset,
-    input  logic [1:0] version,    // of the wire that is spoken
-    input  logic       ready,      // an answer waits
-    input  answer_t    oldest,
-    output logic       pop,
-    input  count_t     lost,       // counts of which a changed one is given unasked
-    input  count_t     faults,
-    input  count_t     commands,
-    input  totals_t    totals,
-    output logic       valid,      // a byte for the serial line
-    output logic [7:0] data,
-    input  logic       taken
+    input  logic                 clk,
+    input  logic                 reset,
+    input  logic [1:0]           version,   // of the wire that is spoken
+    input  logic                 ready,     // an answer waits
+    input  taxel_types::answer_t oldest,
+    output logic                 pop,
+    input  taxel_types::count_t  lost,      // counts of which a changed one is given unasked
+    input  taxel_types::count_t  faults,
+    input  taxel_types::count_t  commands,
+    input  taxel_types::totals_t totals,
+    output logic                 valid,     // a byte for the serial line
+    output logic [7:0]           data,
+    input  logic                 taken
 );
+
+  import taxel_types::*;
 
   // The counts of faults, and as they were given last.
   count_t counts[3], given[3];

@@ -1,4 +1,8 @@
 // A register in a stream, and one more for what comes while it waits: neither side's signals pass through in a clock.
+//
+// Throughput: a word a clock.
+// Latency: a clock.
+// Loses nothing: while the output waits, the input does a clock later.
 module taxel_stream_register #(
     parameter int BITS = 8
 ) (

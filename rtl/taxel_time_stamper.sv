@@ -1,17 +1,21 @@
 // Times since time 0, the start of the first frame that is sent: stamps of 100 us, and us.
 //
 // With `frame_sync` all reads of a frame carry the time of its start, else each carries that of its step.
-module taxel_time_stamper
-  import taxel_types::*;
-(
-    input  logic        clk,
-    input  logic        zero,         // this clock is time 0
-    input  logic        frame_start,  // a frame starts in this clock
-    input  logic        frame_sync,
-    output logic [15:0] stamp,        // of a step that starts in this clock
-    output micros_t     micros,
-    output logic [30:0] ended         // at a frame's start: how long the one before was, us
+//
+// Throughput: a stamp a clock.
+// Latency: none: it stands in the clock in which a step starts.
+// Loses nothing: a stamp begins again after 2^16 x 100 us, the length of a frame stays at 2^31 - 1 us.
+module taxel_time_stamper (
+    input  logic                 clk,
+    input  logic                 zero,         // this clock is time 0
+    input  logic                 frame_start,  // a frame starts in this clock
+    input  logic                 frame_sync,
+    output logic [15:0]          stamp,        // of a step that starts in this clock
+    output taxel_types::micros_t micros,
+    output logic [30:0]          ended         // at a frame's start: how long the one before was, us
 );
+
+  import taxel_types::*;
 
   localparam int CLOCKS = 10_000;  // of 10 ns in 100 us
   localparam int SHORT = 100;      // in 1 us

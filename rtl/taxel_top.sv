@@ -2,10 +2,12 @@
 //
 // `clk` has 100 MHz, `clk_fast` 150 MHz. The ramp and the comparators have two bits a fast clock, one for each half, the first
 // in bit 0: on a board these come from the pins' both-edge cells, which are no part of this module.
-module taxel_top
-  import taxel_registers::*;
-  import taxel_types::*;
-#(
+//
+// Throughput: a taxel in 10 clocks in version 1 of the wire, in 3 to 5 in version 2 (docs/hardware.md).
+// Latency: an event leaves when its datagram is over: at the end of its frame, or as it is full.
+// Loses events and markers that find the queue full, and commands for whose answer there is no room: counted, and reported by
+// status lines.
+module taxel_top #(
     parameter int COLUMNS = 64,               // driven lines of the array
     parameter int ROWS = 64,                  // sense lines
     parameter int CHANNELS = 16,              // of the converter, 16 or 64
@@ -46,6 +48,9 @@ module taxel_top
     output logic                     col_read_sync,
     output logic                     row_read_sync
 );
+
+  import taxel_registers::*;
+  import taxel_types::*;
 
   localparam int SENSE_LINES = ROWS > 64 ? ROWS : 64;
   localparam int STEPS = (SENSE_LINES + CHANNELS - 1) / CHANNELS;

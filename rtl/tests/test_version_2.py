@@ -6,7 +6,7 @@ from test_frames import clocks, last_faults, pressures, settles, write
 
 from pair import Pair, answers
 from taxel.simulate import NOT_RETURNED
-from taxel.wire import Command
+from taxel.wire import Command, Decoder
 
 #: Options of version 2 with which each kind of datagram comes within few frames.
 OFTEN = {"board": 513, "states_us": 700, "heartbeat_us": 60}
@@ -73,6 +73,36 @@ def test_128_lines_begin_in_version_2():
     assert pair.agrees
     assert kinds(pair) == {1, 6}
     assert max(datagram[17] >> 4 for datagram in pair.received) > 7
+
+
+def test_a_link_that_is_behind_repeats_fewer_lines_each_in_its_turn_with_its_values():
+    rng = np.random.default_rng(60)
+    # A line comes due with nearly every frame of 24 us, and the link carries fewer than that.
+    pair = Pair(8, 64, QUEUE=1 << 14, version_2={"states_us": 200, "heartbeat_us": 60})
+    in_version_2(pair)
+    pair.frame(np.full(pair.array.shape, 100, np.uint16))
+    pair.logic.call("link", 60)
+    ticks = np.zeros(pair.array.shape, np.uint16)
+    for _ in range(60):
+        moves = rng.random(ticks.shape) < rng.choice([0.05, 0.5])
+        ticks = np.where(moves, rng.integers(0, 150, ticks.shape), ticks).astype(np.uint16)
+        pair.frame(ticks)
+    pair.logic.call("link", 256)
+    pair.finish()
+    received, expected = ([d for d in all_ if d[0] == 0x54] for all_ in (pair.received, pair.expected))
+    lines = [datagram[16] >> 5 for datagram in received if datagram[1] & 15 == 6]
+    assert lines == [k % 8 for k in range(len(lines))]
+    assert 20 < len(lines) < sum(datagram[1] & 15 == 6 for datagram in expected)
+    # Nothing else differs but their numbers, and no repeated value differs from what the events before it said.
+    assert pair.board.counts["dropped"] == 0
+    others = [[d[8:-4] for d in all_ if d[1] & 15 not in (4, 6)] for all_ in (received, expected)]
+    assert others[0] == others[1]
+    decoders = [Decoder(2, array=pair.array) for _ in range(2)]
+    for decoder, datagrams in zip(decoders, (received, expected), strict=True):
+        for datagram in datagrams:
+            decoder.push(datagram)
+    assert decoders[0].counts.states > 1000
+    assert decoders[0].counts.repaired == decoders[1].counts.repaired
 
 
 @pytest.mark.parametrize(("columns", "rows", "channels", "previous", "intensity", "hold_us"), BUILDS)

@@ -208,7 +208,11 @@ def compression(source: Table) -> str:
         )
     entries = [f"{bits}'d{entry}" for entry in law]
     rows = ",\n".join("    " + ", ".join(entries[k : k + 8]) for k in range(0, len(entries), 8))
-    return f"""{HEAD}// Ticks to the power of {source["power_law"]["exponent"]} (5.1), a clock later; larger ticks use the last entry.
+    return f"""{HEAD}// Ticks to the power of {source["power_law"]["exponent"]} (5.1).
+//
+// Throughput: a value a clock.
+// Latency: a clock.
+// Loses nothing: ticks beyond the table use its last entry.
 module taxel_power_law (
     input  logic        clk,
     input  logic [15:0] ticks,

@@ -79,8 +79,11 @@ def test_a_wrong_order_is_refused_half_way():
         ({"step_read": 0.03, "ramp": 8}, r"step_read.*\(rule 4\)"),
         ({"step_read": 0.8}, r"step_read 0.80 us is longer than step_period 0.75 us \(rule 1\)"),
         ({"col_change_period": 76}, r"4 x step_period 0.76 us is longer than line_read 3.00 us \(rule 2\)"),
-        ({"ramp": 165}, r"ramp 165 ticks is not shorter than step_read 0.55 us = 165 ticks \(rule 3\)"),
-        ({"step_read": 0.75, "ramp": 221}, r"ramp 221 ticks leaves no 5 ticks of step_period 0.75 us = 225 ticks"),
+        (
+            {"ramp": 161},
+            r"ramp 161 ticks leaves no 5 ticks of step_read 0.55 us = 165 ticks in which it falls \(rule 3\)",
+        ),
+        ({"step_read": 0.75, "ramp": 221}, r"ramp 221 ticks leaves no 5 ticks of step_read 0.75 us = 225 ticks"),
         ({"ramp": 0}, r"ramp 0 does not fit: must be 1 to 65534 \(rule 4\)"),
         ({"lines": 65}, r"65 lines: the array has 64 columns to drive \(rule 4\)"),
         ({"lines": 257}, r"lines 257 does not fit: must be 1 to 256 \(rule 4\)"),

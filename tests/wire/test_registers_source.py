@@ -53,7 +53,7 @@ def settings(draw):
         "line_read": line_read,
         "step_period": step_period,
         "step_read": step_read,
-        "ramp": edge(draw.choice([3 * step_read, 3 * step_period - 4])),
+        "ramp": edge(3 * step_read - 4),
         "noise_floor": draw.randrange(256),
         "lines": max(1, edge(columns)) if columns < 256 else 256,
         "wire_version": draw.choice([1, 2]),

@@ -77,8 +77,7 @@ export function refused(v) {
   if (line_read > line_period) broken.push({ rule: 1, text: `line_read ${us(line_read)} us is longer than line_period ${us(line_period)} us (rule 1)` });
   if (step_read > step_period) broken.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
   if (steps * step_period > line_read) broken.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });
-  if (ramp >= 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks is not shorter than step_read ${us(step_read)} us = ${3 * step_read} ticks (rule 3)` });
-  if (ramp + 5 > 3 * step_period) broken.push({ rule: 3, text: `ramp ${ramp} ticks leaves no 5 ticks of step_period ${us(step_period)} us = ${3 * step_period} ticks in which it falls (rule 3)` });
+  if (ramp + 5 > 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks leaves no 5 ticks of step_read ${us(step_read)} us = ${3 * step_read} ticks in which it falls (rule 3)` });
   if (channels + 10 > step_period) broken.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one a clock and wants ${us(channels + 10)} us (rule 7)` });
   if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `version 1 of the wire names 64 x 64 taxels, the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
   return broken;

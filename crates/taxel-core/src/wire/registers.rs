@@ -160,7 +160,7 @@ impl Registers {
         let line_period = line.round() as u32;
         let step_period = (line_period / steps).min(65_535);
         let step_read = step_period - 20;
-        let (values, most) = ((1_u32 << bits) - 1, (3 * step_read - 1).min(65_534));
+        let (values, most) = ((1_u32 << bits) - 1, (3 * step_read - 5).min(65_534));
         let shift = (0..16).find(|shift| values >> shift <= most).unwrap_or(16);
         let registers = Self {
             channels: CHANNELS,

@@ -42,25 +42,14 @@ pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, S
             ),
         ));
     }
-    if ramp >= 3 * step_read {
+    if ramp + 5 > 3 * step_read {
         return Some((
             3,
             format!(
-                "ramp {} ticks is not shorter than step_read {} us = {} ticks (rule 3)",
+                "ramp {} ticks leaves no 5 ticks of step_read {} us = {} ticks in which it falls (rule 3)",
                 ramp,
                 us(step_read),
                 3 * step_read
-            ),
-        ));
-    }
-    if ramp + 5 > 3 * step_period {
-        return Some((
-            3,
-            format!(
-                "ramp {} ticks leaves no 5 ticks of step_period {} us = {} ticks in which it falls (rule 3)",
-                ramp,
-                us(step_period),
-                3 * step_period
             ),
         ));
     }

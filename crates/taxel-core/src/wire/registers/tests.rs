@@ -105,9 +105,9 @@ fn every_rule_refuses_with_its_numbers_and_keeps_the_old_value() {
         ),
         (
             4,
-            165,
+            161,
             3,
-            "ramp 165 ticks is not shorter than step_read 0.55 us = 165 ticks (rule 3); the board keeps ramp 150 ticks",
+            "ramp 161 ticks leaves no 5 ticks of step_read 0.55 us = 165 ticks in which it falls (rule 3); the board keeps ramp 150 ticks",
         ),
         (
             3,
