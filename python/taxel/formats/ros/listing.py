@@ -92,7 +92,7 @@ def _of_topic(bag: Bag, topic: str) -> list[Topic]:
     span = (max(times) - min(times)) / 1e9
     rate = (len(times) - 1) / span if span > 0 else None
     return [
-        Topic(topic, kind, field, grid(first, field) or held.shape, str(held.dtype), len(times), rate)
+        Topic(topic, kind, field, grid(first, field) or held.shape, held.dtype.name, len(times), rate)
         for field, held in found
         if held.size > 1
     ]
