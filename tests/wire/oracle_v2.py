@@ -193,10 +193,12 @@ def decode(datagrams, rows, columns):
     reader = Reader(rows, columns)
     for data in datagrams:
         reader.push(data)
-    for numbers in reader.seen.values():
+    for k, numbers in enumerate(reader.seen.values()):
         # Modulo 2^32: numbers that are far apart are on opposite sides of the wrap.
         wrapped = max(numbers) - min(numbers) > 2**31
         line = [n + 2**32 if wrapped and n < 2**31 else n for n in numbers]
-        reader.counts["missing"] += max(line) - min(line) + 1 - len(line)
+        # After a reset the numbers begin at 0.
+        first = 0 if k and max(line) < 2**31 else min(line)
+        reader.counts["missing"] += max(line) - first + 1 - len(line)
     reader.counts["events"], reader.counts["markers"] = len(reader.events), len(reader.markers)
     return reader.events, reader.markers, reader.counts

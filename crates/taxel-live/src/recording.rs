@@ -29,14 +29,14 @@ use taxel_core::{Array, problem};
 
 pub use event_pictures::EventPictures;
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
-pub use mcap_reader::{Datagrams, Decoded, Message, Place, Reader, Remarks, begin_with};
+pub use mcap_reader::{Datagrams, Decoded, Message, Numbers, Place, Reader, Remarks, Unread, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
 pub use pictures::{Encoding, PictureSource, Pictures};
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 pub use verdict::{
-    Basis, Condition, Counts, Ending, Found, NOTHING_LOST, Rebuilt, Status, Verdict, damage, damage_of_version_2,
+    Basis, Condition, Counts, Ending, Found, NOTHING_LOST, Rebuilt, Status, Verdict, damage, damage_of_version_1,
 };
 
 /// Longest time that a datagram waits until its chunk is closed and passed to the operating system.

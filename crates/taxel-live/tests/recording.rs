@@ -57,7 +57,8 @@ fn datagrams(reader: &Reader) -> (Vec<(u64, i64, Vec<u8>)>, u64) {
             }
             Ok(())
         })
-        .unwrap();
+        .unwrap()
+        .chunks;
     (all, bad)
 }
 

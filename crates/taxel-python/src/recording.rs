@@ -27,7 +27,6 @@ use crate::threaded::Threaded;
 type DecodedOut<'py> = (
     EventsOut<'py>,
     String,
-    u64,
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<u64>>,
     Bound<'py, PyArray1<u64>>,
@@ -97,7 +96,7 @@ impl RecordingReader {
 
     /// Registers, notes, detections, counts, sizes: JSON.
     fn remarks(&self, py: Python<'_>) -> PyResult<String> {
-        let (all, bad_chunks) = enter(py, |stop| self.reader.remarks(stop))?;
+        let (all, unread) = enter(py, |stop| self.reader.remarks(stop))?;
         let detections: Vec<_> =
             all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope, d.repaired)).collect();
         let markers: Vec<_> = all.markers.iter().map(|m| (m.t, m.start)).collect();
@@ -105,7 +104,7 @@ impl RecordingReader {
             "registers": all.registers, "markers": markers, "notes": all.notes, "detections": detections,
             "board": all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>(),
             "counts": all.counts, "datagrams": all.datagrams, "datagram_bytes": all.datagram_bytes,
-            "skipped_numbers": all.skipped_numbers(), "arrivals": all.arrivals, "pictures": all.pictures, "bad_chunks": bad_chunks,
+            "arrivals": all.arrivals, "pictures": all.pictures, "condition": self.reader.condition(&all, &unread),
             "samples": all.samples, "held": all.held, "zeroings": all.zeroings,
         });
         Ok(remarks.to_string())
@@ -118,7 +117,6 @@ impl RecordingReader {
         Ok((
             from_events(py, decoded.events),
             json!(decoded.counts).to_string(),
-            decoded.bad_chunks,
             array(py, decoded.arrived_ns),
             array(py, decoded.number),
             array(py, decoded.first),
@@ -344,7 +342,7 @@ fn recording_verdict(basis: &str) -> PyResult<String> {
 /// The damage among a decoder's counts: JSON in and out.
 #[pyfunction]
 fn recording_damage(counts: &str) -> PyResult<String> {
-    Ok(json!(taxel_live::recording::damage(&parsed("counts", counts)?, 0)).to_string())
+    Ok(json!(taxel_live::recording::damage_of_version_1(&parsed("counts", counts)?)).to_string())
 }
 
 /// Writes raw bytes as a complete `.lsa` with its `.lss`.

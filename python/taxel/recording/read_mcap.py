@@ -86,7 +86,7 @@ class _Source:
             clock=once(lambda: _clock(decoded()), arrived),
             counts=once(lambda: self.counts_of_board(decoded()), lambda: True),
             datagrams=once(lambda: Datagrams(*self.reader.datagrams()), arrived),
-            version_2=once(lambda: bool(json.loads(decoded()[6])["intact"])),
+            version_2=once(lambda: bool(json.loads(decoded()[5])["intact"])),
             differences=bool(self.header["difference"]),
             origin_us=int(self.header["origin_us"]),
             unmarked=tuple(self.header.get("repaired", ())),
@@ -188,19 +188,20 @@ class _Source:
     def rebuilt(self) -> dict[str, int]:
         """Return counts of damage that the reader skipped or repaired."""
         rebuilt = {key: int(value) for key, value in self.opened.items() if key != "unfinished"}
-        return {**rebuilt, "bad_chunks": int(self.remarks()["bad_chunks"])}
+        return {**rebuilt, "bad_chunks": int(self.remarks()["condition"]["bad_chunks"])}
 
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
         remarks = self.remarks()
         counts = self.ending.get("finished", {}).get("counts") or remarks["counts"] or {}
-        of_2 = json.loads(decoded[6])
+        of_2 = json.loads(decoded[5])
         # What this computer dropped or the file lost is missing among the board's numbers too, and is counted apart.
-        of_2["missing"] -= min(of_2["missing"], remarks["skipped_numbers"])
+        skipped = remarks["condition"]["skipped_numbers"]
+        of_2["missing"] -= min(of_2["missing"], skipped)
         return {
             "datagrams": remarks["datagrams"],
             "bytes": remarks["datagram_bytes"],
-            "missing_numbers": remarks["skipped_numbers"],
+            "missing_numbers": skipped,
             "lost_in_file": self.verdict(lambda: decoded).lost.get("lost_in_file", 0),
             **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
             "decoder": json.loads(decoded[1]),
@@ -217,20 +218,9 @@ class _Source:
 
     def verdict(self, decoded: Callable[[], tuple[Any, ...]] | None = None) -> Verdict:
         """Return what was lost at which stage; `decoded` decodes a board."""
-        opened, remarks = self.opened, self.remarks()
-        stream = self.header.get("stream") is not None
-        messages = remarks["samples" if stream else "datagrams"]
-        condition = {
-            "ending": self.ending or None,
-            "rebuilt": opened,
-            "bad_chunks": remarks["bad_chunks"],
-            "messages": None if self.header.get("pictures") else messages,
-            "skipped_numbers": remarks["skipped_numbers"],
-            "so_far": remarks["counts"],
-            "lines": stream,
-        }
-        if decoded is not None and messages and self.must_decode():
-            condition["decoded"] = json.loads(decoded()[8])
+        condition = self.remarks()["condition"]
+        if decoded is not None and condition["messages"] and self.must_decode():
+            condition = condition | {"decoded": json.loads(decoded()[7])}
         return Verdict._of({"file": condition})
 
     def must_decode(self) -> bool:
@@ -242,7 +232,7 @@ class _Source:
 
 
 def _clock(decoded: tuple[Any, ...]) -> Clock:
-    arrived, left = decoded[3], decoded[7]
+    arrived, left = decoded[2], decoded[6]
     has = left > np.iinfo(np.int64).min
     return Clock(np.ascontiguousarray(left[has]), np.ascontiguousarray(arrived[has]))
 

@@ -1,6 +1,7 @@
 //! Decodes one sender's datagrams to events, whichever version of the wire it sends.
 
 mod ahead;
+mod recent;
 
 use crate::wire::decoder::{Counts, Decoder};
 use crate::wire::silence::silence;
@@ -8,6 +9,7 @@ use crate::wire::v1::{FIRST, WORD_BYTES};
 use crate::wire::v2::{self, Header, Outcome};
 use crate::{Array, Events};
 pub use ahead::Ahead;
+use recent::Recent;
 
 /// For how long only whole words of version 1 must arrive before a sender of version 2 counts as changed to version 1,
 /// us.
@@ -50,6 +52,8 @@ pub struct SenderDecoder {
     refused: u64,
     changes: u64,
     ahead: Ahead,
+    recent: Recent,
+    repeated: u64,
 }
 
 impl SenderDecoder {
@@ -69,6 +73,8 @@ impl SenderDecoder {
             refused: 0,
             changes: 0,
             ahead: Ahead::default(),
+            recent: Recent::default(),
+            repeated: 0,
         }
     }
 
@@ -120,6 +126,12 @@ impl SenderDecoder {
         &self.ahead
     }
 
+    /// Number of datagrams of version 1 that came again; their events are decoded again too.
+    #[must_use]
+    pub fn repeated(&self) -> u64 {
+        self.repeated
+    }
+
     /// Notes that the host has set the board to this version of the wire.
     pub fn expect(&mut self, version: u8, out: &mut Events) {
         if version != self.version {
@@ -146,6 +158,7 @@ impl SenderDecoder {
             if self.version == 2 {
                 self.change(1, out);
             }
+            self.repeated += u64::from(self.recent.repeats(datagram, arrived, &self.array));
             let rows = out.len();
             let markers = out.markers.len();
             let before = self.one.times();

@@ -67,6 +67,8 @@ pub struct DecodingCounts {
     pub wire_late: u64,
     /// Number of times that the times of version 1 jumped ahead of this computer's clock.
     pub wire_jumps: u64,
+    /// Number of datagrams of version 1 that came again.
+    pub wire_repeated: u64,
     /// Number of decoded events.
     pub events: u64,
 }
@@ -211,6 +213,7 @@ impl DecodingCounts {
             wire_changes: self.wire_changes - earlier.wire_changes,
             wire_late: self.wire_late - earlier.wire_late,
             wire_jumps: self.wire_jumps - earlier.wire_jumps,
+            wire_repeated: self.wire_repeated - earlier.wire_repeated,
             events: self.events - earlier.events,
         }
     }

@@ -9,7 +9,7 @@ use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
-use super::counters::Counters;
+use super::counters::{Counters, DecodingCounts};
 use super::options::{LiveOptions, Record};
 use super::sink::OutputDetection;
 use super::source::Source;
@@ -430,12 +430,9 @@ fn kind_of_name(path: &Path) -> Result<&str> {
 pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::Counts {
     // Datagrams that wait at the end belong to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
-    let mut decoder = recording::damage(&now.decoding.wire, now.decoding.wire_jumps);
+    let DecodingCounts { wire, wire_jumps, wire_repeated, wire_v2, .. } = &now.decoding;
+    let (mut decoder, missing) = recording::damage(wire, *wire_jumps, *wire_repeated, wire_v2);
     decoder.insert("bytes_of_version_1_refused".to_owned(), now.decoding.wire_refused);
-    let missing = recording::damage_of_version_2(&now.decoding.wire_v2).map(|(causes, missing)| {
-        decoder.extend(causes);
-        missing
-    });
     // Version 1 does not number datagrams: a recording with any of it cannot state that none is missing.
     let knows = now.decoding.wire_v2.intact > 0 && now.decoding.wire.bytes == 0;
     recording::Counts {

@@ -7,6 +7,7 @@
 mod blocks;
 mod message;
 mod remarks;
+mod summary;
 mod walk;
 
 use std::collections::BTreeMap;
@@ -19,12 +20,12 @@ use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Events, Stop, problem};
 
 use super::stream::Sampling;
-use super::{BoardChange, Change, Counts, Ending, Found, Header, Pictures, Rebuilt, Samples, Topic, limits};
+use super::{BoardChange, Change, Condition, Counts, Ending, Found, Header, Pictures, Rebuilt, Samples, Topic, limits};
 use crate::clock::leaves;
 use crate::{Error, Result};
-use blocks::Blocks;
+use blocks::{Blocks, Indexed};
 pub use message::Message;
-pub use remarks::{Remarks, begin_with};
+pub use remarks::{Numbers, Remarks, begin_with};
 use walk::Walk;
 
 /// An open recording in the live format.
@@ -53,6 +54,26 @@ impl Place {
     #[must_use]
     pub fn without_memory(&self) -> Self {
         Self { bytes: vec![], topics: self.topics.clone(), ..*self }
+    }
+}
+
+/// What of a source's messages could not be read.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Unread {
+    /// Number of chunks that could not be used.
+    pub chunks: u64,
+    /// Number of messages in them and in skipped parts of the file, as far as message indexes list them.
+    pub messages: BTreeMap<Topic, u64>,
+    /// Whether nothing is listed of one of them.
+    pub unknown: bool,
+}
+
+impl Unread {
+    /// Adds what could not be read elsewhere in the file.
+    pub fn add(&mut self, other: &Self) {
+        self.chunks += other.chunks;
+        self.unknown |= other.unknown;
+        other.messages.iter().for_each(|(topic, n)| *self.messages.entry(*topic).or_default() += n);
     }
 }
 
@@ -86,8 +107,6 @@ pub struct Decoded {
     pub first: Vec<u64>,
     /// Earliest time at which each datagram could leave the board, us; `i64::MIN` if it is not known.
     pub left: Vec<i64>,
-    /// Number of chunks that could not be used.
-    pub bad_chunks: u64,
     /// What the decoder could not use, as a verdict states it.
     pub found: Found,
 }
@@ -103,7 +122,6 @@ impl Decoded {
             number: vec![],
             first: vec![],
             left: vec![],
-            bad_chunks: 0,
             found: Found::default(),
         }
     }
@@ -135,8 +153,8 @@ impl Reader {
         let mut walk = Walk::of(path, &file, length);
         walk.magic()?;
         walk.records()?;
-        let Walk { begin, end, ending, ends, blocks, rebuilt, .. } = walk;
-        let blocks = Blocks { path: path.to_owned(), file, length, places: blocks };
+        let Walk { begin, end, ending, ends, blocks, skipped, summary, rebuilt, .. } = walk;
+        let blocks = Blocks { path: path.to_owned(), file, length, places: blocks, skipped, summary };
         // The copy of the header in the chunk of the datagrams' channel has a checksum; the other copies have none.
         let Some(header) = blocks.header()?.or(end).or(begin) else {
             return Err(Error::format(
@@ -192,18 +210,83 @@ impl Reader {
         self.rebuilt
     }
 
-    /// Passes all messages to `take` in the order of the file; skips bad chunks, and returns their number.
+    /// What is known of the file and of this source's messages, of which `remarks` and `unread` were found.
+    #[must_use]
+    pub fn condition(&self, remarks: &Remarks, unread: &Unread) -> Condition {
+        let Header { name, stream, pictures, .. } = self.header();
+        let data = match (stream, pictures) {
+            (Some(_), _) => Topic::Samples,
+            (_, Some(_)) => Topic::Pictures,
+            _ => Topic::Datagrams,
+        };
+        let read = |topic: Topic| remarks.messages.get(&topic).copied().unwrap_or(0);
+        let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
+        let total = |topic: Topic| match (totals, &self.ending) {
+            (Some(totals), _) => totals.get(&topic.channel_name(self.source, name)).copied(),
+            (None, Some(Ending::Finished { counts })) if topic == data => Some(counts.recorded),
+            _ => None,
+        };
+        let mut unread = unread.clone();
+        if let Some((0, indexed)) = self.blocks.skipped.first() {
+            unread.add(&self.listed(&Place::default(), indexed, &Indexed::new()));
+        }
+        let (mut lost, mut repeated) = (BTreeMap::new(), 0);
+        for topic in Topic::ALL.into_iter().filter(|topic| topic.lost_in_file().is_some()) {
+            let (read, total) = (read(topic), total(topic));
+            // Arrival numbers tell which datagrams are there twice.
+            let again = match topic {
+                Topic::Datagrams => remarks.numbers.repeated(),
+                _ => total.map_or(0, |total| read.saturating_sub(total)),
+            };
+            repeated += again;
+            let listed = unread.messages.get(&topic).copied().unwrap_or(0);
+            lost.insert(topic, total.map_or(listed, |total| total.saturating_sub(read - again)));
+        }
+        Condition {
+            ending: self.ending.clone(),
+            rebuilt: self.rebuilt,
+            bad_chunks: unread.chunks,
+            lost,
+            unknown: unread.unknown && totals.is_none(),
+            repeated,
+            messages: read(data),
+            skipped_numbers: remarks.numbers.skipped(),
+            so_far: remarks.counts.clone(),
+            decoded: None,
+            lines: data == Topic::Samples,
+        }
+    }
+
+    /// The messages of this source that message indexes list beyond those that were read.
+    fn listed(&self, place: &Place, indexed: &Indexed, read: &Indexed) -> Unread {
+        let mut unread = Unread { unknown: true, ..Unread::default() };
+        for (channel, n) in indexed {
+            let n = n.saturating_sub(read.get(channel).copied().unwrap_or(0));
+            unread.unknown &= n == 0;
+            if let Some(topic) = self.topic(place, *channel).filter(|_| n > 0) {
+                *unread.messages.entry(topic).or_default() += n;
+            }
+        }
+        unread
+    }
+
+    /// The topic of a channel, if it belongs to this source.
+    fn topic(&self, place: &Place, channel: u16) -> Option<Topic> {
+        place.topics.get(&channel).copied().unwrap_or_else(|| Topic::of_number(channel, self.source))
+    }
+
+    /// Passes all messages to `take` in the order of the file; skips bad chunks, and returns what was not read.
     ///
     /// # Errors
     ///
     /// `File` if the file cannot be read, `Core` if `take` returns it or the caller stops.
-    pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<u64> {
-        let (mut place, mut bad) = (Place::default(), 0);
+    pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<Unread> {
+        let (mut place, mut unread) = (Place::default(), Unread::default());
         for block in 0..self.blocks() {
             stop.check()?;
-            bad += u64::from(!self.block(block, &mut place, &mut take)?);
+            unread.add(&self.block(block, &mut place, &mut take)?);
         }
-        Ok(bad)
+        Ok(unread)
     }
 
     /// Number of blocks (chunks).
@@ -213,7 +296,7 @@ impl Reader {
     }
 
     /// Passes the messages of one block to `take`; `place` is the state after earlier blocks, all or some of them.
-    /// Returns whether the block is valid.
+    /// Returns what of the block, and of what was skipped behind it, was not read.
     ///
     /// # Errors
     ///
@@ -223,16 +306,20 @@ impl Reader {
         block: usize,
         place: &mut Place,
         mut take: impl FnMut(Message<'_>) -> Result<()>,
-    ) -> Result<bool> {
+    ) -> Result<Unread> {
+        let skipped = self.blocks.skipped.binary_search_by_key(&(block + 1), |(before, _)| *before);
         let (block, most) = (self.blocks.places[block], limits::datagrams(self.blocks.length));
         let Place { topics, last, in_datagrams, bytes } = place;
-        let mut wrong = None;
+        let (mut wrong, mut read) = (None, Indexed::new());
         let sound = self.blocks.records(block, bytes, |record| {
             match record {
                 Record::Channel(channel) => {
                     topics.insert(channel.id, Topic::of_name(&channel.topic, self.source, &self.header().name));
                 }
                 Record::Message { header, data } => {
+                    if skipped.is_ok() {
+                        *read.entry(header.channel_id).or_default() += 1;
+                    }
                     let topic = topics.get(&header.channel_id).copied();
                     if let Some(topic) = topic.unwrap_or_else(|| Topic::of_number(header.channel_id, self.source)) {
                         let mut number = u64::from(header.sequence);
@@ -260,21 +347,33 @@ impl Reader {
             }
             wrong.is_none()
         })?;
-        wrong.map_or(Ok(sound), Err)
+        if let Some(wrong) = wrong {
+            return Err(wrong);
+        }
+        let mut unread = match (skipped, sound) {
+            (Ok(k), _) => self.listed(place, &self.blocks.skipped[k].1, &read),
+            (Err(_), true) => Unread::default(),
+            (Err(_), false) => match self.blocks.indexed(block)? {
+                Some(indexed) => Unread { unknown: false, ..self.listed(place, &indexed, &read) },
+                None => Unread { unknown: true, ..Unread::default() },
+            },
+        };
+        unread.chunks = u64::from(!sound);
+        Ok(unread)
     }
 
-    /// Collects everything except the datagrams' bytes and the pictures; also returns the number of bad chunks.
+    /// Collects everything except the datagrams' bytes and the pictures; also returns what was not read.
     ///
     /// # Errors
     ///
     /// As [`Reader::messages`].
-    pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, u64)> {
+    pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, Unread)> {
         let mut all = Remarks::default();
-        let bad = self.messages(stop, |message| {
+        let unread = self.messages(stop, |message| {
             all.add(&message);
             Ok(())
         })?;
-        Ok((all, bad))
+        Ok((all, unread))
     }
 
     /// All datagrams as they arrived.
@@ -353,7 +452,7 @@ impl Reader {
         let mut decoded = Decoded::empty(Events::empty(array));
         #[allow(clippy::cast_possible_truncation)]
         let frame_us = header.registers.map_or(0, |registers| registers.frame_us() as i64);
-        let bad = self.messages(stop, |message| {
+        self.messages(stop, |message| {
             if message.topic == Topic::Datagrams {
                 let before = decoded.events.len();
                 let arrived = Some(message.at_ns / 1000);
@@ -383,7 +482,6 @@ impl Reader {
         decoded.events.markers.iter_mut().for_each(|m| m.t += header.origin_us);
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.two().counts();
-        decoded.bad_chunks = bad;
         decoded.found = Found::of(&sender, header.origin_us);
         Ok(decoded)
     }

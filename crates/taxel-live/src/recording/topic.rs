@@ -1,10 +1,13 @@
 //! The channels of a recording, with their schemas.
 
+use serde::{Deserialize, Serialize};
+
 use super::Header;
 
 /// A channel of a recording. Its number is the same in every file, so that a file is readable even if its first chunk,
 /// which contains the channel records, is damaged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 #[repr(u16)]
 pub enum Topic {
     /// Raw datagrams of the board, of either version of the wire.
@@ -108,6 +111,24 @@ impl Topic {
             Self::Samples => ("taxel.Sample", include_str!("schemas/Sample.json")),
         };
         Some((name, "jsonschema", text.as_bytes()))
+    }
+
+    /// How a verdict names messages of the channel that a file has lost: the cause, and what one of them is; none where
+    /// nothing is lost by them.
+    pub(super) fn lost_in_file(self) -> Option<(&'static str, &'static str)> {
+        Some(match self {
+            Self::Datagrams => ("lost_in_file", "datagram"),
+            Self::Samples => ("lost_in_file", "line"),
+            Self::Pictures => ("lost_in_file", "picture"),
+            Self::Registers => ("registers_lost_in_file", "register setting"),
+            Self::Markers => ("markers_lost_in_file", "marker"),
+            Self::Notes => ("notes_lost_in_file", "note"),
+            Self::Detections => ("detections_lost_in_file", "detection"),
+            Self::Held => ("held_values_lost_in_file", "initial state"),
+            Self::Board => ("changes_lost_in_file", "board change"),
+            // Later counts include them, and datagrams the values of low-rate pictures.
+            Self::Counts | Self::Pressure => return None,
+        })
     }
 
     /// The number of the channel in a file; `source` is the index of the source.

@@ -8,12 +8,16 @@ use serde::{Deserialize, Serialize};
 
 use taxel_core::wire::{self, SenderDecoder};
 
+use super::Topic;
 use crate::bridged::Bridged;
 
 /// The wording of version 1 when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
 /// The same for a stream of numbers.
 const NO_LINE_LOST: &str = "nothing lost after arrival (lines without numbers cannot show what was lost before it)";
+
+/// The wording where the record with the final counts is damaged.
+const NO_END: &str = "the final counts are damaged: what was lost since the last before them is not known";
 
 /// How much of a recording is there, from the best to the worst; of several parts the worst counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -145,6 +149,10 @@ pub struct Rebuilt {
     pub skipped_bytes: u64,
     /// Number of chunks that were skipped because the unpacked size that they state exceeds the limit.
     pub large_chunks: u64,
+    /// Whether the summary behind the data of a file that was closed is missing or damaged.
+    pub no_summary: bool,
+    /// Whether the record with the final counts is damaged, as the summary states that there was one.
+    pub no_end: bool,
 }
 
 /// What a verdict is made from.
@@ -166,7 +174,7 @@ pub enum Basis {
 }
 
 /// One source of a file of the live format: how it ended, and what reading found.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Condition {
     /// How the recording ended.
@@ -175,8 +183,14 @@ pub struct Condition {
     pub rebuilt: Rebuilt,
     /// Number of chunks that could not be used.
     pub bad_chunks: u64,
-    /// Number of datagrams or lines in the file, if known.
-    pub messages: Option<u64>,
+    /// Number of messages that the file has lost, as far as they are known, by channel.
+    pub lost: BTreeMap<Topic, u64>,
+    /// Whether parts of the file were skipped of which it is not known what they held.
+    pub unknown: bool,
+    /// Number of messages that the file holds a second time, as far as they are known.
+    pub repeated: u64,
+    /// Number of datagrams, lines or pictures in the file.
+    pub messages: u64,
     /// Arrival numbers that the file lacks between its first and last datagram.
     pub skipped_numbers: u64,
     /// The last counts before the end.
@@ -203,11 +217,8 @@ impl Found {
     /// What a decoder found; `origin_us` is added to its times.
     #[must_use]
     pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
-        let mut causes = damage(sender.counts(), sender.ahead().jumps);
-        let missing = damage_of_version_2(&sender.two().counts()).map(|(more, missing)| {
-            causes.extend(more);
-            missing
-        });
+        let (causes, missing) =
+            damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.two().counts());
         Self { damage: causes, missing, doubtful_after_us: sender.ahead().after.map(|t| t + origin_us) }
     }
 }
@@ -220,9 +231,9 @@ impl Counts {
     }
 }
 
-/// What a decoder could not use, by cause, as recordings store it; `jumps` are those of [`wire::Ahead`].
+/// What a decoder of version 1 could not use, by cause, as recordings store it.
 #[must_use]
-pub fn damage(counts: &wire::Counts, jumps: u64) -> BTreeMap<String, u64> {
+pub fn damage_of_version_1(counts: &wire::Counts) -> BTreeMap<String, u64> {
     [
         ("bytes_skipped", counts.skipped),
         ("short_events", counts.short),
@@ -230,27 +241,37 @@ pub fn damage(counts: &wire::Counts, jumps: u64) -> BTreeMap<String, u64> {
         ("outside_the_array", counts.outside),
         ("unpaired_intensities", counts.unpaired),
         ("events_out_of_order", counts.back),
-        (JUMPS, jumps),
     ]
     .map(|(cause, n)| (cause.to_owned(), n))
     .into()
 }
 
-/// The same for version 2, if the board sends it; and the number of its missing datagrams.
+/// The same of both versions, with the jumps of [`wire::Ahead`] and the datagrams of version 1 that came `again`; and the
+/// number of missing datagrams of version 2, if the board sends it.
 #[must_use]
-pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String, u64>, u64)> {
-    let causes = [
-        ("datagrams_damaged", counts.checksum + counts.short + counts.foreign),
-        (REPEATED, counts.repeated + counts.old),
-        ("taxels_outside_the_array", counts.outside),
-        ("datagrams_of_an_unknown_kind", counts.unknown_kind),
-        ("malformed_bodies", counts.malformed),
-        (BOARD_DROPPED, counts.dropped),
-        (BOARD_RESET, counts.resets),
-        (REPAIRED, counts.repaired),
-        ("differences_from_an_unknown_value", counts.unknown_value),
+pub fn damage(
+    counts: &wire::Counts,
+    jumps: u64,
+    again: u64,
+    two: &wire::v2::Counts,
+) -> (BTreeMap<String, u64>, Option<u64>) {
+    let mut causes = damage_of_version_1(counts);
+    causes.extend([(JUMPS.to_owned(), jumps), (REPEATED.to_owned(), again + two.repeated + two.old)]);
+    if two.datagrams == 0 {
+        return (causes, None);
+    }
+    let of_version_2 = [
+        ("datagrams_damaged", two.checksum + two.short + two.foreign),
+        ("taxels_outside_the_array", two.outside),
+        ("datagrams_of_an_unknown_kind", two.unknown_kind),
+        ("malformed_bodies", two.malformed),
+        (BOARD_DROPPED, two.dropped),
+        (BOARD_RESET, two.resets),
+        (REPAIRED, two.repaired),
+        ("differences_from_an_unknown_value", two.unknown_value),
     ];
-    (counts.datagrams > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))
+    causes.extend(of_version_2.map(|(cause, n)| (cause.to_owned(), n)));
+    (causes, Some(two.missing))
 }
 
 impl Verdict {
@@ -354,7 +375,7 @@ impl Verdict {
         let no_damage = [BOARD_DROPPED, BOARD_RESET, REPAIRED];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
-            // Each repeated datagram is decoded once.
+            // Of version 2 each is decoded once.
             let place = if cause == REPEATED { &mut self.noted } else { &mut self.damaged };
             place.insert(cause.clone(), *n);
         }
@@ -367,37 +388,37 @@ impl Verdict {
 
     /// The verdict on a source of a file.
     fn of_file(condition: Condition) -> Self {
-        let Condition { ending, rebuilt, bad_chunks, messages, skipped_numbers, so_far, decoded, lines } = condition;
+        let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
+        let Condition { repeated, so_far, decoded, lines, .. } = condition;
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
         let decoded = decoded.unwrap_or_default();
         let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
         let mut no_counts = false;
-        let (mut verdict, why, recorded) = match ending {
-            Some(Ending::Finished { counts }) => (Self::of_counts(&counts, nothing_lost), None, Some(counts.recorded)),
+        let (mut verdict, why) = match ending {
+            Some(Ending::Finished { counts }) => (Self::of_counts(&counts, nothing_lost), None),
             ending => {
                 let why = match ending {
                     Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
+                    _ if rebuilt.no_end => NO_END.to_owned(),
                     _ => "not finished: what came last is missing".to_owned(),
                 };
                 let counts = so_far.filter(|counts| counts.received > 0);
                 no_counts = counts.is_none();
                 // The file may hold more than its counts, which are saved now and then; where parts were skipped,
                 // decoding finds faults that never came.
-                let counts = counts.unwrap_or_else(|| Counts { recorded: messages.unwrap_or(0), ..Counts::default() });
+                let counts = counts.unwrap_or_else(|| Counts { recorded: messages, ..Counts::default() });
                 let found = if skipped { Found::default() } else { decoded.clone() };
                 let dropped = if skipped { 0 } else { skipped_numbers };
-                let until = Self::of_counts(&so_far_with(counts, found, dropped), nothing_lost);
-                (until, Some(why), None)
+                (Self::of_counts(&so_far_with(counts, found, dropped), nothing_lost), Some(why))
             }
         };
-        let lost_in_file = match (recorded, messages) {
-            (Some(recorded), Some(messages)) => recorded.saturating_sub(messages),
-            (None, _) if skipped => {
-                skipped_numbers.saturating_sub(verdict.lost.get("dropped_by_queue").copied().unwrap_or(0))
-            }
-            _ => 0,
-        };
-        let (whole, came_short) = (why.is_none(), !verdict.lost.is_empty());
+        let came_short = !verdict.lost.is_empty();
+        if unknown && why.is_some() {
+            // Numbers that the file skips, and that were not dropped before.
+            let dropped = verdict.lost.get("dropped_by_queue").copied().unwrap_or(0);
+            let datagrams = lost.entry(Topic::Datagrams).or_default();
+            *datagrams = skipped_numbers.saturating_sub(dropped).max(*datagrams);
+        }
         let mut bad = vec![];
         for (n, cause, text) in [
             (
@@ -416,27 +437,44 @@ impl Verdict {
                 ),
             ),
             (rebuilt.torn_bytes, "torn_bytes", format!("{} at the end", counted(rebuilt.torn_bytes, "torn byte"))),
+            (repeated, "repeated_in_file", format!("{} there twice", counted(repeated, "message"))),
+            (rebuilt.no_summary.into(), "no_summary", "the summary at the end missing or damaged".to_owned()),
         ] {
             if n > 0 {
                 verdict.damaged.insert(cause.to_owned(), n);
                 bad.push(text);
             }
         }
-        if lost_in_file > 0 {
-            verdict.lost.insert("lost_in_file".to_owned(), lost_in_file);
-            bad.push(format!("{} lost", counted(lost_in_file, if lines { "line" } else { "datagram" })));
+        if rebuilt.no_end {
+            verdict.damaged.insert("no_final_counts".to_owned(), 1);
         }
+        lost.retain(|_, n| *n > 0);
+        for (topic, n) in &lost {
+            if let Some((cause, what)) = topic.lost_in_file() {
+                verdict.lost.insert(cause.to_owned(), *n);
+                bad.push(format!("{} lost", counted(*n, what)));
+            }
+        }
+        let lost_here = !lost.is_empty();
+        if unknown {
+            bad.push("what else was there is not known".to_owned());
+        }
+        let whole = why.is_none() || rebuilt.no_end;
         if !whole && verdict.status == Status::NothingArrived {
             // It may have come after what is left of the file.
             verdict.status = Status::Unfinished;
         }
+        if !bad.is_empty() || rebuilt.no_end {
+            verdict.status = verdict.status.max(Status::Damaged);
+        }
         if !whole || rebuilt.torn_bytes > 0 {
             verdict.status = verdict.status.max(Status::Unfinished);
         }
-        if skipped || lost_in_file > 0 {
+        if lost_here {
             verdict.status = verdict.status.max(Status::Lost);
         }
-        let damaged_file = (!bad.is_empty()).then(|| format!("LOST in the file: {}", bad.join(", ")));
+        let damage = if lost_here { "LOST" } else { "damage" };
+        let damaged_file = (!bad.is_empty()).then(|| format!("{damage} in the file: {}", bad.join(", ")));
         let before = match (&why, &damaged_file) {
             (Some(_), _) => "until then: ",
             (None, Some(_)) => "while recording: ",

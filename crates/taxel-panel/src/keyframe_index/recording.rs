@@ -20,7 +20,7 @@ use taxel_core::held::UNKNOWN;
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::Change;
 use taxel_live::recording::{
-    Basis, Condition, Found, Header, Place, Reader, Remarks, Topic, Verdict, begin_with, damage,
+    Basis, Condition, Found, Header, Place, Reader, Remarks, Topic, Unread, Verdict, begin_with, damage_of_version_1,
 };
 use taxel_live::{Error, Result};
 
@@ -170,7 +170,7 @@ impl RecordingIndex {
         let frame_us = self.header.registers.map_or(0, |registers| registers.frame_us() as i64);
         match (&self.source, &mut *decoding) {
             (Source::Mcap(reader), Decoding::Datagrams(decoder)) => {
-                let whole = reader.block(k, place, |message| {
+                let unread = reader.block(k, place, |message| {
                     if message.topic == Topic::Datagrams {
                         let before = events.len();
                         let info = decoder.push(message.data, Some(message.at_ns / 1000), events);
@@ -191,7 +191,7 @@ impl RecordingIndex {
                     Ok(())
                 })?;
                 if let Some(contents) = beside {
-                    contents.bad_chunks += u64::from(!whole);
+                    contents.unread.add(&unread);
                 }
             }
             (Source::Lsa(file, length), Decoding::Bytes(decoder)) => {
@@ -303,7 +303,7 @@ impl RecordingIndex {
             activity: Activity::new(&self.header.array),
             remarks: Remarks::default(),
             clock: BoardClock::default(),
-            bad_chunks: 0,
+            unread: Unread::default(),
             verdict: String::new(),
         };
         for k in 0..self.blocks() {
@@ -347,7 +347,10 @@ impl RecordingIndex {
             (Source::Mcap(reader), _) => reader,
             (Source::Lsa(..), Decoding::Bytes(decoder)) => {
                 let name = self.path.with_extension("lss").file_name().map(|name| name.to_string_lossy().into_owned());
-                return Verdict::of(Basis::Raw(name.filter(|_| self.unfinished), damage(decoder.counts(), 0)));
+                return Verdict::of(Basis::Raw(
+                    name.filter(|_| self.unfinished),
+                    damage_of_version_1(decoder.counts()),
+                ));
             }
             (Source::Lsa(..), Decoding::Datagrams(_)) => return Verdict::default(),
         };
@@ -355,16 +358,8 @@ impl RecordingIndex {
             Decoding::Datagrams(sender) => Some(Found::of(sender, self.header.origin_us)),
             Decoding::Bytes(_) => None,
         };
-        Verdict::of(Basis::File(Box::new(Condition {
-            ending: reader.ending().cloned(),
-            rebuilt: reader.rebuilt(),
-            bad_chunks: contents.bad_chunks,
-            messages: Some(contents.remarks.datagrams),
-            skipped_numbers: contents.remarks.skipped_numbers(),
-            so_far: contents.remarks.counts.clone(),
-            decoded,
-            lines: false,
-        })))
+        let condition = reader.condition(&contents.remarks, &contents.unread);
+        Verdict::of(Basis::File(Box::new(Condition { decoded, ..condition })))
     }
 }
 
@@ -386,7 +381,7 @@ struct Contents {
     activity: Activity,
     remarks: Remarks,
     clock: BoardClock,
-    bad_chunks: u64,
+    unread: Unread,
     verdict: String,
 }
 

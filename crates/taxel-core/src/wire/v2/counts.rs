@@ -20,7 +20,7 @@ pub struct Status {
 /// Counts of what a decoder received and, by cause, missed.
 ///
 /// `datagrams = intact + repeated + old + short + long + foreign + checksum`; `missing` counts, for each session, the
-/// numbers between its first and its last intact datagram that never arrived.
+/// numbers up to its last intact datagram that never arrived: of the first session from its first intact one on, else from 0 on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
     /// Number of datagrams passed to the decoder.
@@ -39,7 +39,7 @@ pub struct Counts {
     pub foreign: u64,
     /// Refused datagrams: the checksum does not match.
     pub checksum: u64,
-    /// Sequence numbers that never arrived intact, between the first and the last of each session.
+    /// Sequence numbers that never arrived intact: between the first and the last of a session, and after a reset from 0 on.
     pub missing: u64,
     /// Datagrams of an unknown kind; skipped.
     pub unknown_kind: u64,

@@ -32,7 +32,7 @@ pub enum Outcome {
     Intact {
         /// No datagram with a higher number has an event before this time, us; none if nothing is promised.
         until: Option<i64>,
-        /// Sequence numbers between the session's first and this one that have not arrived.
+        /// Sequence numbers up to this one that have not arrived, from the session's first one on, or after a reset from 0 on.
         missing: u64,
         /// Whether the board was reset before this datagram.
         reset: bool,
@@ -314,7 +314,7 @@ impl Decoder {
         if self.sessions.len() == SESSIONS {
             self.missed_before += self.sessions.remove(0).missing();
         }
-        self.sessions.push(Session::new(header, offset));
+        self.sessions.push(Session::new(header, offset, !began));
         (self.sessions.len() - 1, !began)
     }
 }

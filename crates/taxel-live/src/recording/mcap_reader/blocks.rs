@@ -1,13 +1,15 @@
 //! Reads the chunks of a file one at a time.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use mcap::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
+use super::summary::Summary;
 use crate::recording::{Header, limits};
 use crate::{Error, Result};
 
@@ -19,6 +21,16 @@ pub(super) struct Block {
     pub(super) bare: bool,
 }
 
+/// Numbers of messages by the number of their channel, as the message indexes behind a chunk list them.
+pub(super) type Indexed = BTreeMap<u16, u64>;
+
+/// The channel and the number of messages that a message index lists, from its first 15 bytes.
+pub(super) fn indexed(head: &[u8]) -> Option<(u16, u64)> {
+    // Opcode 1, length 8, channel 2, size of the entries 4; an entry has 16 bytes.
+    let (channel, size) = head.get(9..15)?.split_first_chunk::<2>()?;
+    Some((u16::from_le_bytes(*channel), u64::from(u32::from_le_bytes(size.try_into().ok()?)) / 16))
+}
+
 /// Where the messages of a file are.
 #[derive(Debug)]
 pub(super) struct Blocks {
@@ -26,6 +38,9 @@ pub(super) struct Blocks {
     pub(super) file: File,
     pub(super) length: u64,
     pub(super) places: Vec<Block>,
+    /// Of each place where something was skipped, the number of blocks before it and what the message indexes around it list.
+    pub(super) skipped: Vec<(usize, Indexed)>,
+    pub(super) summary: Option<Summary>,
 }
 
 impl Blocks {
@@ -46,49 +61,81 @@ impl Blocks {
         Ok(header)
     }
 
-    /// Passes the records of a block to `take` until it returns false; returns whether the block is valid.
+    /// What the message indexes behind a block list; none if there are none, though the block had messages.
+    pub(super) fn indexed(&self, block: Block) -> Result<Option<Indexed>> {
+        // Times of the first and the last message, both 0 in a chunk without messages.
+        let mut times = [0; 16];
+        self.file.read_exact_at(&mut times, block.offset + 9).map_err(Error::file(&self.path))?;
+        let all = indexed_from(&self.path, &self.file, self.length, block.offset + block.length)?;
+        Ok((times == [0; 16] || !all.is_empty()).then_some(all))
+    }
+
+    /// As [`records`].
     pub(super) fn records(
         &self,
         block: Block,
         bytes: &mut Vec<u8>,
-        mut take: impl FnMut(Record<'_>) -> bool,
+        take: impl FnMut(Record<'_>) -> bool,
     ) -> Result<bool> {
-        let Ok(length) = usize::try_from(block.length) else { return Ok(false) };
-        bytes.resize(length, 0);
-        self.file.read_exact_at(bytes, block.offset).map_err(Error::file(&self.path))?;
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(length.max(limits::CHUNK as usize));
-        let mut reader = LinearReader::new_with_options(options);
-        let mut given = 0;
-        while let Some(event) = reader.next_event() {
-            match event {
-                Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                    // At the end of the block no bytes are available: the reader then ends, or reports that data are
-                    // missing.
-                    let more = wanted.min(length - given);
-                    reader.insert(more).copy_from_slice(&bytes[given..given + more]);
-                    reader.notify_read(more);
-                    given += more;
-                }
-                // The content of other records is not used, so an error in them is ignored.
-                Ok(LinearReadEvent::Record { opcode, .. }) if !matches!(opcode, op::CHANNEL | op::MESSAGE) => {}
-                Ok(LinearReadEvent::Record { data, opcode }) if !texts_fit(opcode, data) => return Ok(false),
-                Ok(LinearReadEvent::Record { data, opcode }) => match parse_record(opcode, data) {
-                    Ok(record) => {
-                        if !take(record) {
-                            return Ok(true);
-                        }
-                    }
-                    Err(_) => return Ok(false),
-                },
-                Err(_) => return Ok(false),
-            }
-        }
-        Ok(true)
+        records(&self.path, &self.file, block, bytes, take)
     }
+}
+
+/// Passes the records of a block to `take` until it returns false; returns whether the block is valid.
+pub(super) fn records(
+    path: &Path,
+    file: &File,
+    block: Block,
+    bytes: &mut Vec<u8>,
+    mut take: impl FnMut(Record<'_>) -> bool,
+) -> Result<bool> {
+    let Ok(length) = usize::try_from(block.length) else { return Ok(false) };
+    bytes.resize(length, 0);
+    file.read_exact_at(bytes, block.offset).map_err(Error::file(path))?;
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(length.max(limits::CHUNK as usize));
+    let mut reader = LinearReader::new_with_options(options);
+    let mut given = 0;
+    while let Some(event) = reader.next_event() {
+        match event {
+            Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                // At the end of the block no bytes are available: the reader then ends, or reports that data are
+                // missing.
+                let more = wanted.min(length - given);
+                reader.insert(more).copy_from_slice(&bytes[given..given + more]);
+                reader.notify_read(more);
+                given += more;
+            }
+            // The content of other records is not used, so an error in them is ignored.
+            Ok(LinearReadEvent::Record { opcode, .. }) if !matches!(opcode, op::CHANNEL | op::MESSAGE) => {}
+            Ok(LinearReadEvent::Record { data, opcode }) if !texts_fit(opcode, data) => return Ok(false),
+            Ok(LinearReadEvent::Record { data, opcode }) => match parse_record(opcode, data) {
+                Ok(record) => {
+                    if !take(record) {
+                        return Ok(true);
+                    }
+                }
+                Err(_) => return Ok(false),
+            },
+            Err(_) => return Ok(false),
+        }
+    }
+    Ok(true)
+}
+
+/// What the message indexes from `at` on list, up to the next other record.
+pub(super) fn indexed_from(path: &Path, file: &File, length: u64, mut at: u64) -> Result<Indexed> {
+    let (mut all, mut head) = (Indexed::new(), [0; 15]);
+    while at.checked_add(15).is_some_and(|end| end <= length) {
+        file.read_exact_at(&mut head, at).map_err(Error::file(path))?;
+        let Some((channel, messages)) = indexed(&head).filter(|_| head[0] == op::MESSAGE_INDEX) else { break };
+        *all.entry(channel).or_default() += messages;
+        at += 15 + 16 * messages;
+    }
+    Ok(all)
 }
 
 /// Whether the strings in a channel or metadata record end within it: the parser allocates their memory before it

@@ -1,5 +1,7 @@
 //! The small messages of a recording: registers, markers, notes, detections, counts, and others.
 
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 use taxel_core::Marker;
 use taxel_core::detect::Detection;
@@ -32,8 +34,10 @@ pub struct Remarks {
     pub datagram_bytes: u64,
     /// Times of the first and the last arrival, ns since 1970.
     pub arrivals: Option<(i64, i64)>,
-    /// Arrival numbers of the first and the last datagram.
-    pub numbers: Option<(u64, u64)>,
+    /// Arrival numbers of the datagrams.
+    pub numbers: Numbers,
+    /// Number of messages of each channel.
+    pub messages: BTreeMap<Topic, u64>,
     /// Number of pictures.
     pub pictures: u64,
     /// Resets of the board, and changes of its version of the wire.
@@ -45,23 +49,55 @@ pub struct Remarks {
     pub held: Option<Vec<u16>>,
 }
 
-impl Remarks {
-    /// Number of arrival numbers between the first and the last datagram that the file lacks.
-    #[must_use]
-    pub fn skipped_numbers(&self) -> u64 {
-        self.numbers.map_or(0, |(first, last)| (last - first + 1).saturating_sub(self.datagrams))
+/// Arrival numbers that were read.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Numbers {
+    /// The last number of each run of successive ones, by the first.
+    runs: BTreeMap<u64, u64>,
+    repeated: u64,
+}
+
+impl Numbers {
+    fn add(&mut self, number: u64) {
+        match self.runs.range_mut(..=number).next_back() {
+            Some((_, last)) if number <= *last => {
+                self.repeated += 1;
+                return;
+            }
+            Some((_, last)) if number == *last + 1 => *last = number,
+            _ => drop(self.runs.insert(number, number)),
+        }
+        let next = number.checked_add(1).and_then(|next| self.runs.remove(&next));
+        if let (Some(end), Some((_, last))) = (next, self.runs.range_mut(..=number).next_back()) {
+            *last = end;
+        }
     }
 
+    /// Number of datagrams whose arrival number another one before them has.
+    #[must_use]
+    pub fn repeated(&self) -> u64 {
+        self.repeated
+    }
+
+    /// Number of arrival numbers that are missing between the first and the last.
+    #[must_use]
+    pub fn skipped(&self) -> u64 {
+        let inner = self.runs.values().zip(self.runs.keys().skip(1));
+        inner.map(|(last, next)| next - last - 1).sum()
+    }
+}
+
+impl Remarks {
     /// Adds a message; datagrams and pictures are only counted.
     pub fn add(&mut self, message: &Message<'_>) {
+        *self.messages.entry(message.topic).or_default() += 1;
         match message.topic {
             Topic::Datagrams => {
                 self.datagrams += 1;
                 self.datagram_bytes += message.data.len() as u64;
                 let (first, last) = self.arrivals.unwrap_or((message.at_ns, message.at_ns));
                 self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
-                let (first, last) = self.numbers.unwrap_or((message.number, message.number));
-                self.numbers = Some((first.min(message.number), last.max(message.number)));
+                self.numbers.add(message.number);
             }
             Topic::Pressure | Topic::Pictures => self.pictures += 1,
             // The checksum of a message that does not parse is valid, so another program wrote the message; it is

@@ -8,13 +8,17 @@ use std::path::Path;
 use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 
-use super::blocks::{Block, texts_fit};
-use crate::recording::metadata::{BEGIN, END};
+use super::blocks::{Block, Indexed, indexed, indexed_from, records, texts_fit};
+use super::summary::Summary;
+use crate::recording::metadata::{BEGIN, CHECK, END, check};
 use crate::recording::{Counts, Ending, Header, Rebuilt, limits};
 use crate::{Error, Result};
 
 /// Size of a record's opcode and length, bytes.
 const RECORD_HEAD: u64 = 9;
+
+/// Size of a footer and of the magic bytes behind it, with which a file ends.
+const FOOTER: u64 = RECORD_HEAD + 20 + MAGIC.len() as u64;
 
 /// The state of the walk.
 pub(super) struct Walk<'a> {
@@ -27,6 +31,12 @@ pub(super) struct Walk<'a> {
     /// The final counts of the other sources.
     pub(super) ends: BTreeMap<String, Counts>,
     pub(super) blocks: Vec<Block>,
+    /// Of each place where something was skipped, the number of blocks before it and what the message indexes between these
+    /// blocks and the next one list.
+    pub(super) skipped: Vec<(usize, Indexed)>,
+    /// What message indexes list since the last block, and whether anything was skipped since.
+    since: (Indexed, bool),
+    pub(super) summary: Option<Summary>,
     /// Unpacked size of the chunks so far, as they state it, bytes.
     unpacked: u64,
     pub(super) rebuilt: Rebuilt,
@@ -44,6 +54,9 @@ impl<'a> Walk<'a> {
             ending: None,
             ends: BTreeMap::new(),
             blocks: vec![],
+            skipped: vec![],
+            since: (Indexed::new(), false),
+            summary: None,
             unpacked: 0,
             rebuilt,
         }
@@ -77,18 +90,61 @@ impl<'a> Walk<'a> {
     }
 
     pub(super) fn records(&mut self) -> Result<()> {
+        self.data()?;
+        self.next_block();
+        // The record that ends a recording is written after all data.
+        let ended = matches!(self.ending, Some(Ending::Finished { .. }));
+        self.rebuilt.no_summary = self.summary.is_none() && (ended || !self.rebuilt.unfinished);
+        if ended {
+            (self.rebuilt.unfinished, self.rebuilt.torn_bytes) = (false, 0);
+        }
+        self.rebuilt.no_end = self.ending.is_none() && self.summary.as_ref().is_some_and(|summary| summary.finished);
+        Ok(())
+    }
+
+    /// Ends the part of the file that follows the last block.
+    fn next_block(&mut self) {
+        let (indexed, skipped) = std::mem::take(&mut self.since);
+        if skipped {
+            self.skipped.push((self.blocks.len(), indexed));
+        }
+    }
+
+    /// Where what cannot be read begins: at `at`, or at the chunk that ends there, if that is damaged. In it bytes may be
+    /// missing or too many, so that it ends elsewhere.
+    fn unless_damaged(&mut self, at: u64) -> Result<u64> {
+        let Some(&block) = self.blocks.last().filter(|block| !block.bare && block.offset + block.length == at) else {
+            return Ok(at);
+        };
+        if records(self.path, self.file, block, &mut vec![], |_| true)? {
+            return Ok(at);
+        }
+        self.blocks.pop();
+        // What follows the block before it.
+        let again = self.skipped.pop_if(|(before, _)| *before == self.blocks.len());
+        self.since.0 = match (again, self.blocks.last()) {
+            (Some((_, indexed)), _) => indexed,
+            (None, Some(block)) => indexed_from(self.path, self.file, self.length, block.offset + block.length)?,
+            (None, None) => Indexed::new(),
+        };
+        Ok(block.offset)
+    }
+
+    fn data(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         while at < self.length {
             let Some((opcode, length, size)) = self.sound(at)? else {
-                match self.next_sound(at + 1)? {
+                let from = self.unless_damaged(at)?;
+                match self.next_sound(from + 1)? {
                     Some(next) => {
                         self.rebuilt.gaps += 1;
-                        self.rebuilt.skipped_bytes += next - at;
+                        self.rebuilt.skipped_bytes += next - from;
+                        self.since.1 = true;
                         at = next;
                         continue;
                     }
                     None => {
-                        self.rebuilt.torn_bytes = self.length - at;
+                        self.rebuilt.torn_bytes = self.length - from;
                         return Ok(());
                     }
                 }
@@ -96,11 +152,21 @@ impl<'a> Walk<'a> {
             match opcode {
                 op::DATA_END => {
                     self.rebuilt.unfinished = false;
+                    self.summary = Summary::read(self.file, at, self.length);
                     return Ok(());
                 }
                 op::METADATA => self.metadata(at, length)?,
-                op::CHUNK if size.max(length) > u64::from(limits::CHUNK) => self.rebuilt.large_chunks += 1,
+                op::CHUNK if size.max(length) > u64::from(limits::CHUNK) => {
+                    self.rebuilt.large_chunks += 1;
+                    self.since.1 = true;
+                }
+                op::MESSAGE_INDEX => {
+                    if let Some((channel, messages)) = indexed(&self.bytes(at, 15)?) {
+                        *self.since.0.entry(channel).or_default() += messages;
+                    }
+                }
                 op::CHUNK => {
+                    self.next_block();
                     self.unpacked += size;
                     let most = limits::unpacked(self.length);
                     if self.unpacked > most {
@@ -114,11 +180,15 @@ impl<'a> Walk<'a> {
                     }
                     self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: false });
                 }
+                // Next to chunks such a record is another one, damaged.
                 op::SCHEMA | op::CHANNEL | op::MESSAGE => match self.blocks.last_mut() {
                     Some(block) if block.bare && block.offset + block.length == at && block.length < 1 << 20 => {
                         block.length += RECORD_HEAD + length;
                     }
-                    _ => self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: true }),
+                    _ => {
+                        self.next_block();
+                        self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: true });
+                    }
                 },
                 _ => {}
             }
@@ -137,33 +207,62 @@ impl<'a> Walk<'a> {
         let known = match opcode {
             op::CHUNK => chunk(&head, length).is_some(),
             op::MESSAGE_INDEX => head.get(11..15).is_some_and(|b| word(b) + 6 == length),
-            op::METADATA => head.get(9..13).is_some_and(|b| word(b) + 8 <= length),
+            // Name and table.
+            op::METADATA => self.two_parts(at + RECORD_HEAD)? == length,
+            // Two times of 8 bytes, name and kind, content behind its length of 8 bytes, checksum of 4.
+            op::ATTACHMENT => {
+                let before = 16 + self.two_parts(at + RECORD_HEAD + 16)?;
+                let content = number(&self.bytes(at + RECORD_HEAD + before, 8)?, 0);
+                content.and_then(|content| content.checked_add(before + 12)) == Some(length)
+            }
             op::DATA_END => length == 4,
-            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::ATTACHMENT => true,
+            op::HEADER => at == MAGIC.len() as u64,
+            op::SCHEMA | op::CHANNEL | op::MESSAGE => self.blocks.last().is_none_or(|block| block.bare),
             _ => false,
         };
         let size = if opcode == op::CHUNK { chunk(&head, length).unwrap_or(0) } else { 0 };
         Ok((fits && known).then_some((opcode, length, size)))
     }
 
-    /// The next position from `at` on with a chunk or a metadata record of ours.
+    /// Size of two parts that follow each other at `at`, each behind its length of 4 bytes.
+    fn two_parts(&self, at: u64) -> Result<u64> {
+        let first = 4 + word(&self.bytes(at, 4)?);
+        Ok(first + 4 + word(&self.bytes(at + first, 4)?))
+    }
+
+    /// Whether the record at `at`, which makes sense, is one at which the walk may continue after damage: a chunk, a message
+    /// index before such a record, a metadata record of ours, or the end of the data.
+    fn resumes(&self, at: u64, opcode: u8, length: u64) -> Result<bool> {
+        let next = at + RECORD_HEAD + length;
+        Ok(match opcode {
+            op::CHUNK => true,
+            op::MESSAGE_INDEX => length > 6 && self.sound(next)?.is_some(),
+            op::METADATA => {
+                length < limits::METADATA && self.bytes(at + RECORD_HEAD + 4, BEGIN.len() as u64)? == BEGIN.as_bytes()
+            }
+            // A footer behind the data names the place where its summary begins.
+            op::DATA_END => {
+                let footer = self.bytes(self.length.saturating_sub(FOOTER), FOOTER)?;
+                footer.first() == Some(&op::FOOTER) && number(&footer, 9).is_some_and(|begin| begin == next)
+            }
+            _ => false,
+        })
+    }
+
+    /// The next position from `at` on where the walk may continue.
     fn next_sound(&self, mut at: u64) -> Result<Option<u64>> {
         const WINDOW: u64 = 1 << 20;
         while at < self.length {
             let window = self.bytes(at, WINDOW)?;
             for (k, &byte) in window.iter().enumerate() {
-                if byte != op::CHUNK && byte != op::METADATA {
+                if !matches!(byte, op::CHUNK | op::MESSAGE_INDEX | op::METADATA | op::DATA_END) {
                     continue;
                 }
                 let place = at + k as u64;
-                if let Some((opcode, length, _)) = self.sound(place)? {
-                    let ours = || -> Result<bool> {
-                        Ok(length < limits::METADATA
-                            && self.bytes(place + RECORD_HEAD + 4, BEGIN.len() as u64)? == BEGIN.as_bytes())
-                    };
-                    if opcode == op::CHUNK || ours()? {
-                        return Ok(Some(place));
-                    }
+                if let Some((opcode, length, _)) = self.sound(place)?
+                    && self.resumes(place, opcode, length)?
+                {
+                    return Ok(Some(place));
                 }
             }
             at += window.len() as u64;
@@ -189,8 +288,10 @@ impl<'a> Walk<'a> {
                     Some((key.strip_prefix("counts.")?.to_owned(), serde_json::from_str(text).ok()?))
                 });
                 self.ends = ends.collect();
+                let stated = record.metadata.get(CHECK);
                 self.ending = match record.metadata.get("stopped") {
                     Some(why) => Some(Ending::Stopped(why.clone())),
+                    None if stated.is_some_and(|stated| *stated != check(&record.metadata)) => None,
                     None => {
                         let counts = record.metadata.get("counts").and_then(|text| serde_json::from_str(text).ok());
                         counts.map(|counts| Ending::Finished { counts })

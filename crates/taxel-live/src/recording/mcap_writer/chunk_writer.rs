@@ -14,7 +14,7 @@ use serde_json::json;
 
 use super::queue::Queue;
 use super::record_file::RecordFile;
-use crate::recording::metadata::{BEGIN, END};
+use crate::recording::metadata::{BEGIN, CHECK, END, check};
 use crate::recording::{Compression, Counts, Header, OutputFile, Topic, now_ns};
 
 /// Size at which a chunk is closed, bytes; it is closed earlier if the queue is empty.
@@ -118,6 +118,7 @@ impl ChunkWriter {
                 ("stopped_ns".to_owned(), now_ns().to_string()),
             ]);
             end.extend(others.iter().map(|(name, counts)| (format!("counts.{name}"), json!(counts).to_string())));
+            end.insert(CHECK.to_owned(), check(&end));
             self.mcap.write_metadata(&Metadata { name: END.to_owned(), metadata: end })?;
         }
         self.mcap.flush()?;

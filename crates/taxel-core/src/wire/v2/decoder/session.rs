@@ -21,11 +21,14 @@ pub(super) struct Session {
 }
 
 impl Session {
-    pub(super) fn new(header: &Header, offset: i64) -> Self {
+    /// The session of a datagram; with `reset` the board was reset before it, so that the numbers from 0 on are missing.
+    pub(super) fn new(header: &Header, offset: i64, reset: bool) -> Self {
         let first = i64::from(header.sequence);
+        // Numbers count modulo 2^32: in the upper half 0 may have come after this one.
+        let from_0 = reset && header.sequence < 1 << 31;
         Self {
             number: header.session,
-            lowest: first,
+            lowest: if from_0 { 0 } else { first },
             highest: first,
             received: 0,
             seen: vec![0; WINDOW / 64],
@@ -133,7 +136,7 @@ mod tests {
                 span: 0,
             };
             header.write(&[], &mut bytes);
-            let mut session = Session::new(&header, 0);
+            let mut session = Session::new(&header, 0, false);
             let (mut seen, mut highest) = (BTreeSet::from([i64::from(begin)]), i64::from(begin));
             assert_eq!(session.note(highest), Some(true));
             for _ in 0..20_000 {

@@ -1,0 +1,207 @@
+"""Whatever byte of a small recording is damaged, cut, dropped or repeated: the verdict tells what is gone, exactly."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Recording, _core
+from taxel._core import FormatError
+from taxel.recording.verdict import STATUSES
+
+from .making import HEADER, some_events
+
+START_NS = HEADER["started_ns"]
+#: How verdicts name what a file has lost, and what of a recording it is.
+LOST = {
+    "lost_in_file": lambda of: [bytes(one) for one in of.datagrams()],
+    "notes_lost_in_file": lambda of: [(n.text, n.at_ns) for n in of.notes] + [(z.x, z.y) for z in of.zeroings],
+    "detections_lost_in_file": lambda of: [(d.label, d.t) for d in of.detections],
+    "registers_lost_in_file": lambda of: [at for at, _ in of.register_changes],
+    "changes_lost_in_file": lambda of: [(c.t, c.change) for c in of.board_changes],
+    "held_values_lost_in_file": lambda of: [] if of.held is None else [of.held.tolist()],
+}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a recording of a few chunks, with a message of every kind that it may lose."""
+    path, events = tmp_path_factory.mktemp("whole") / "whole.mcap", some_events(60, intensity=False)
+    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
+    at = lambda k: START_NS + int(events.t[k]) * 1000  # noqa: E731  a short name
+    pause = lambda: time.sleep(0.06)  # noqa: E731  chunks end when nothing comes
+    held = np.full(4096, 65_535, np.uint16)
+    writer.held(at(0), None, held[:16].repeat(256))
+    pause()
+    for number in range(6):
+        writer.datagram(at(10 * number), number, taxel.wire.encode(events[10 * number : 10 * number + 10]))
+        if number == 1:
+            pause()
+            writer.note(at(10), 5, "heel")
+            writer.zeroing(at(10), 6, 2, 3, 40.0, None)
+            pause()
+        if number == 3:
+            writer.note(at(20), 9, "toe")
+            writer.detection(at(21), "contact", 10, 20, 1.5, False)
+            writer.registers(at(22), _core.registers_preset("5.2 kHz"))
+            writer.board_change(at(23), json.dumps({"t_us": 30, "change": "reset"}))
+            writer.counts(at(24), json.dumps({"received": 4, "recorded": 4}))
+            pause()
+    pause()
+    writer.finish(json.dumps({"received": 6, "decoder": {"jumps_of_time": 0}}))
+    return path
+
+
+def without_end(data: bytes) -> bytes:
+    """Return the recording as a killed recorder leaves it."""
+    return data[: data.rindex(b"taxel.end", 0, data.rindex(b"header")) - 13]
+
+
+def held_by(recording: Recording) -> dict[str, list[object]]:
+    return {cause: of(recording) for cause, of in LOST.items()}
+
+
+def assert_told(path: Path, data: bytes, of: dict[str, list[object]], where: str) -> taxel.Verdict | None:
+    """Open a damaged recording, and compare its verdict with what is gone; None of a file that is refused."""
+    __tracebackhide__ = True
+    path.write_bytes(data)
+    try:
+        recording = taxel.open(path)
+        now = held_by(recording)
+    except FormatError:
+        return None
+    verdict = recording.verdict
+    where = f"{where}: {verdict!r} {verdict.to_dict()}"
+    gone = {cause: sum((Counter(map(repr, of[cause])) - Counter(map(repr, now[cause]))).values()) for cause in of}
+    more = {cause: sum((Counter(map(repr, now[cause])) - Counter(map(repr, of[cause]))).values()) for cause in of}
+    assert (verdict.status == "lost") == bool(verdict.lost), where
+    assert ("LOST" in verdict) == bool(verdict.lost), where
+    assert all(verdict.lost.values()), where
+    unfinished = "not finished" in verdict
+    torn = unfinished and verdict.damaged.get("torn_bytes", 0) > 0
+    if "not known" in verdict or torn or (unfinished and not verdict.damaged):
+        assert STATUSES.index(verdict.status) >= STATUSES.index("damaged"), where
+        assert all(verdict.lost.get(cause, 0) <= n for cause, n in gone.items()), where
+    else:
+        lost = {cause: n for cause, n in verdict.lost.items() if cause != "markers_lost_in_file"}
+        assert lost == {cause: n for cause, n in gone.items() if n}, where
+    if any(gone.values()):
+        assert STATUSES.index(verdict.status) >= STATUSES.index("unfinished"), where
+    twice = verdict.damaged.get("repeated_in_file", 0)
+    if "not finished" in verdict:
+        assert twice == more["lost_in_file"], where
+    else:
+        # Of held values that are there twice one is to be seen.
+        assert twice - sum(more.values()) in (0, 1), where
+    return verdict
+
+
+@pytest.mark.parametrize("step", [67, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("end", ["finished", "unfinished"])
+def test_a_flipped_bit_anywhere_is_told_exactly(whole: Path, tmp_path: Path, end: str, step: int) -> None:
+    data = whole.read_bytes() if end == "finished" else without_end(whole.read_bytes())
+    path, of = tmp_path / "a.mcap", held_by(taxel.open(whole))
+    statuses: Counter[str] = Counter()
+    for place in range(0, len(data), step):
+        flipped = bytearray(data)
+        flipped[place] ^= 1 << place % 8
+        verdict = assert_told(path, bytes(flipped), of, f"byte {place}")
+        statuses["refused" if verdict is None else verdict.status] += 1
+    assert statuses["refused"] <= 8, "the magic alone"
+    if end == "finished":
+        assert statuses["unfinished"] == 0
+        assert statuses["lost"] > 5
+        assert statuses["damaged"] > 5
+
+
+def spoilt(data: bytes, draw: np.random.Generator) -> Iterator[tuple[str, bytes]]:
+    """Yield the bytes with a part of them cut, dropped, repeated, replaced or set to 0."""
+    size = len(data)
+    a, b = sorted(draw.integers(60, size, 2).tolist())
+    b = min(b, a + int(draw.choice([1, 10, 100, 1000, 4096])))
+    yield f"cut at {a}", data[:a]
+    yield f"drop {a}:{b}", data[:a] + data[b:]
+    yield f"repeat {a}:{b}", data[:b] + data[a:]
+    yield f"zero {a}:{b}", data[:a] + bytes(b - a) + data[b:]
+    yield f"noise {a}:{b}", data[:a] + draw.integers(0, 256, b - a, np.uint8).tobytes() + data[b:]
+
+
+@pytest.mark.parametrize("seed", [*range(20), *(pytest.param(k, marks=pytest.mark.slow) for k in range(20, 600))])
+def test_bytes_that_are_cut_dropped_repeated_or_lost_are_told(whole: Path, tmp_path: Path, seed: int) -> None:
+    draw, data = np.random.default_rng(seed), whole.read_bytes()
+    of = held_by(taxel.open(whole))
+    for what, bad in spoilt(data, draw):
+        assert_told(tmp_path / "a.mcap", bad, of, what)
+    for what, bad in spoilt(without_end(data), draw):
+        assert_told(tmp_path / "b.mcap", bad, of, f"unfinished, {what}")
+
+
+def chunks_of(data: bytes) -> list[tuple[int, int]]:
+    """Return where each chunk begins and its message indexes end."""
+    at, all_of_them = 8, []
+    while data[at] != 0x0F:
+        end = at + 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+        if data[at] == 0x06:
+            all_of_them.append((at, end))
+        elif data[at] == 0x07:
+            all_of_them[-1] = (all_of_them[-1][0], end)
+        at = end
+    return all_of_them
+
+
+@pytest.mark.parametrize("end", ["finished", "unfinished"])
+def test_whole_chunks_that_are_dropped_repeated_or_exchanged_are_told(whole: Path, tmp_path: Path, end: str) -> None:
+    data = whole.read_bytes()
+    chunks, of = chunks_of(data), held_by(taxel.open(whole))
+    data = data if end == "finished" else without_end(data)
+    assert len(chunks) > 4
+    for k, (a, b) in enumerate(chunks):
+        twice = assert_told(tmp_path / "a.mcap", data[:b] + data[a:], of, f"chunk {k} repeated")
+        assert twice is not None
+        if end == "finished":
+            less = assert_told(tmp_path / "a.mcap", data[:a] + data[b:], of, f"chunk {k} dropped")
+            assert less is not None
+    order = data[: chunks[1][0]] + b"".join(data[a:b] for a, b in reversed(chunks[1:])) + data[chunks[-1][1] :]
+    verdict = assert_told(tmp_path / "a.mcap", order, of, "chunks in another order")
+    assert verdict is not None
+    assert verdict.lost == {}
+
+
+def test_a_damaged_chunk_without_data_has_lost_nothing(whole: Path, tmp_path: Path) -> None:
+    """The first chunk holds the channels alone."""
+    data = bytearray(whole.read_bytes())
+    first, _ = chunks_of(bytes(data))[0]
+    data[first + 200] ^= 4
+    verdict = assert_told(tmp_path / "a.mcap", bytes(data), held_by(taxel.open(whole)), "the first chunk")
+    assert verdict is not None
+    assert (verdict.status, verdict.lost, verdict.damaged) == ("damaged", {}, {"bad_chunks": 1})
+    assert verdict.startswith("damage in the file: 1 bad chunk skipped; while recording: nothing lost after arrival")
+
+
+@pytest.mark.parametrize("cut", [1, 8, 9, 100, 1000, "zeros"])
+def test_a_finished_recording_whose_summary_is_damaged_has_lost_nothing(
+    whole: Path, tmp_path: Path, cut: int | str
+) -> None:
+    data = whole.read_bytes()
+    data = data[:-cut] if isinstance(cut, int) else data[:-1500] + bytes(1500)
+    verdict = assert_told(tmp_path / "a.mcap", data, held_by(taxel.open(whole)), "the end")
+    assert verdict is not None
+    assert (verdict.status, verdict.lost, verdict.damaged) == ("damaged", {}, {"no_summary": 1})
+    assert not taxel.open(tmp_path / "a.mcap").truncated
+
+
+def test_damaged_final_counts_are_not_believed(whole: Path, tmp_path: Path) -> None:
+    data = bytearray(whole.read_bytes())
+    place = data.rindex(b'"received":6') + len(b'"received":')
+    data[place] = ord("9")
+    verdict = assert_told(tmp_path / "a.mcap", bytes(data), held_by(taxel.open(whole)), "the counts")
+    assert verdict is not None
+    assert (verdict.status, verdict.lost, verdict.damaged) == ("damaged", {}, {"no_final_counts": 1})
+    assert verdict.startswith("the final counts are damaged: what was lost since the last before them is not known; ")
