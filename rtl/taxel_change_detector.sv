@@ -144,8 +144,9 @@ module taxel_change_detector #(
   end
 
   logic [15:0] values[2**ADDRESS_BITS];
-  logic store;
-  logic [15:0] stored;
+  logic store, storing;
+  logic [ADDRESS_BITS-1:0] storing_at;
+  logic [15:0] stored, storing_value;
 
   always_ff @(posedge clk) begin
     // Which tick it was: the sample before the one that had tripped.
@@ -187,7 +188,11 @@ module taxel_change_detector #(
     counts_now           <= weighed.valid && weighed.exists && !weighed.not_returned && !of_weighed.initial_frame;
     other                <= weighed.valid && weighed.kind != ENTRY_EVENT;
     frame_ends           <= weighed.valid && weighed.kind == ENTRY_FRAME;
-    if (store) values[judged.address] <= stored;
+    // Whether an afferent fires is known late in a clock, and the blocks of the values lie far apart.
+    storing              <= store && !reset;
+    storing_at           <= judged.address;
+    storing_value        <= stored;
+    if (storing) values[storing_at] <= storing_value;
     if (reset) {counted.valid, valued.valid, fetched.valid, compared.valid, weighed.valid, judged.valid} <= '0;
     if (reset) {counts_now, other, frame_ends} <= '0;
   end
@@ -302,7 +307,7 @@ module taxel_change_detector #(
       totals_busy <= 1'b0;
     end
     repeated_line <= line_now;
-    if (store) again[judged.address] <= stored;
+    if (storing) again[storing_at] <= storing_value;
     copied_value <= again[{line_now[LINE_BITS-1:0], row_copied}];
     copied       <= copying;
     row_fetched  <= row_copied;

@@ -163,7 +163,8 @@ module detector_proof
     if (LEMMAS && begun) begin
       assert (!unreported || detector.ended == ended);
       assert (ended.line < 7'(COLUMNS) && ended.step < 3'(STEPS) && ended.markers <= 3'(MARKERS) || !unreported);
-      assert (detector.values[address] == held);
+      // What was judged in the clock before is on its way to the memory.
+      assert (held == (detector.storing && detector.storing_at == address ? detector.storing_value : detector.values[address]));
       assert (!comes || (left <= 5'd12 && since <= 5'd13));
       assert (!comes || since + left == 5'(STAGES) + 5'(ahead) + 5'(of_channel)
               || (since == 5'd1 && left == 5'd0 && ahead == 3'd5 && of_channel));
