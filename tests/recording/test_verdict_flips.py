@@ -210,6 +210,35 @@ def test_of_a_chunk_without_its_index_and_without_the_end_of_the_file_not_all_is
     assert "not known" not in verdict
 
 
+def test_datagrams_that_no_index_lists_are_lost_by_their_numbers_or_the_final_counts(
+    whole: Path, tmp_path: Path
+) -> None:
+    data, all_of_them = whole.read_bytes(), taxel.open(whole).datagrams()
+    # A chunk in the middle, with its index.
+    begin, end = next((a, b) for a, b in chunks_of(data) if all_of_them[2] in data[a:b])
+    gone = sum(all_of_them[k] in data[begin:end] for k in range(len(all_of_them)))
+    spoilt = without_end(data[:begin] + bytes(end - begin) + data[end:])
+    verdict = assert_told(tmp_path / "a.mcap", spoilt, held_by(taxel.open(whole)), "a chunk and its index")
+    assert verdict is not None
+    assert 0 < gone < len(all_of_them)
+    assert (verdict.status, verdict.lost) == ("lost", {"lost_in_file": gone})
+    # Where the summary alone is missing, the final counts tell.
+    spoilt = data[:begin] + bytes(end - begin) + data[end:-1]
+    verdict = assert_told(tmp_path / "b.mcap", spoilt, held_by(taxel.open(whole)), "and the summary")
+    assert verdict is not None
+    assert verdict.lost["lost_in_file"] == gone
+
+
+def test_a_chunk_in_the_place_of_another_is_there_twice_and_the_other_lost(whole: Path, tmp_path: Path) -> None:
+    data, all_of_them = whole.read_bytes(), taxel.open(whole).datagrams()
+    (a, b), (c, d), *_ = [(a, b) for a, b in chunks_of(data) if any(all_of_them[k] in data[a:b] for k in range(6))]
+    verdict = assert_told(tmp_path / "a.mcap", data[:a] + data[c:d] + data[b:], held_by(taxel.open(whole)), "instead")
+    assert verdict is not None
+    assert verdict.status == "lost"
+    assert verdict.lost["lost_in_file"] > 0
+    assert verdict.damaged["repeated_in_file"] > 0
+
+
 @pytest.mark.parametrize("cut", [1, 8, 9, 100, 1000, "zeros"])
 def test_a_finished_recording_whose_summary_is_damaged_has_lost_nothing(
     whole: Path, tmp_path: Path, cut: int | str
