@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from shell import call
 
 from taxel.cli.bench import stale_results
 
@@ -65,6 +66,36 @@ def test_a_change_in_what_is_measured_is_named(folder: Path, file: str, old: str
 def test_a_result_without_its_sources_is_stale(folder: Path) -> None:
     (folder / "results" / "fast.json").write_text("{}")
     assert stale_results(folder, ["fast"]) == {"fast": ["its sources were not recorded"]}
+
+
+@pytest.mark.parametrize(
+    ("result", "said"),
+    [
+        ({"goals": {"a": True, "b": False}}, "1 of 2 goals reached\n  not reached: b\n"),
+        ({"goals": {"a": 3.0, "b": 2.0}, "ratios": {"a": 2.9, "b": 2.0}}, "1 of 2 goals reached\n  not reached: a\n"),
+        ({"goals": {"a": 3.0}, "reached": {"a": True}}, "1 of 1 goal reached\n"),
+        ({"goals, times real time": {"a": 20}, "reached": {"a": False}}, "0 of 1 goal reached\n  not reached: a\n"),
+        ({}, "no goal stated\n"),
+        ({"machine": {"load": 9.7, "cores": 2}}, "no goal stated; load 9.7 on 2 cores\n"),
+        ({"machine": {"load": 2.1, "cores": 2}, "stable": True, "kept": {}}, "no goal stated\n"),
+        ({"kept": {"x": "2026"}}, "no goal stated; 1 time of peers of another day\n"),
+        ({"stable": False}, "no goal stated; times vary by more than 15 %\n"),
+    ],
+)
+def test_goals_that_are_not_reached_and_doubts_are_listed(folder: Path, capsys, result: dict, said: str) -> None:
+    (folder / "results" / "fast.json").write_text(json.dumps({"commit": "0123abc", **result}))
+    code, out, _ = call(capsys, "bench", "--goals", "--folder", folder)
+    assert code == 0
+    assert out.startswith(f"fast, commit 0123abc: {said}other: no result\n")
+
+
+def test_modules_are_named_before_the_compiled_part_is_counted(folder: Path, capsys) -> None:
+    before = json.loads((folder / "results" / "fast.json").read_text())["made_of"]
+    stale = before | {name: "other" for name in before if name.startswith("taxel._core.") or name == "_shared"}
+    (folder / "results" / "fast.json").write_text(json.dumps({"made_of": stale}))
+    compiled = sum(name.startswith("taxel._core.") for name in before)
+    assert compiled > 1
+    assert f"fast: _shared, {compiled} compiled names\n" in call(capsys, "bench", "--stale", "--folder", folder)[1]
 
 
 PEER = "import json, sys\nprint(json.dumps({'cpu_s': float(sys.argv[1]), 'verdict': 'solved'}))\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,11 +23,13 @@ ARRAY = Array(6, 6, pitch_mm=5.0)
 FLOOR = 0.05
 
 
-def touched(seed: int, count: int = 12, begin_s: float = 2.5) -> tuple[Frames, dict[str, np.ndarray]]:
+def touched(
+    seed: int, count: int = 12, begin_s: float = 2.5, hold_s: tuple[float, float] = (0.1, 0.3)
+) -> tuple[Frames, dict[str, np.ndarray]]:
     """Return pictures at 200 Hz of touches that follow each other irregularly, and when each began and ended, us."""
     random = np.random.default_rng(seed)
     begins = begin_s + np.cumsum(random.uniform(0.5, 1.5, count))
-    ends = begins + random.uniform(0.1, 0.3, count)
+    ends = begins + random.uniform(*hold_s, count)
     t = np.arange(0, round(1e6 * (ends[-1] + 2)), 5000)
     values = random.normal(0, 0.002, (len(t), 6, 6))
     for begin, end in zip(begins, ends, strict=True):
@@ -37,7 +40,7 @@ def touched(seed: int, count: int = 12, begin_s: float = 2.5) -> tuple[Frames, d
     return Frames(values, t, unit="V", array=ARRAY), labels
 
 
-def example(seed: int, shift_ms: float, **more: float) -> Example:
+def example(seed: int, shift_ms: float, **more: Any) -> Example:
     """Return touches with their labels so much too late, and the tare before the first label."""
     frames, truth = touched(seed, **more)
     labels = {label: times + round(1000 * shift_ms) for label, times in truth.items()}
@@ -56,6 +59,11 @@ def test_labels_that_are_off_are_measured_and_others_are_not_called_so(seed: int
         for one in found.values():
             assert abs(one.ms - shift_ms) < 6
             assert one.alike >= 10
+
+
+@given(st.integers(0, 1000))
+def test_labels_of_touches_that_all_last_as_long_are_not_off_by_that(seed: int) -> None:
+    assert off_by([example(seed, 0, hold_s=(0.4, 0.4))], ["contact", "lift"], FLOOR) == {}
 
 
 @given(st.integers(0, 1000))

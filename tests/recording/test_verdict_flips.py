@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,10 +19,10 @@ from taxel.recording.verdict import STATUSES
 
 from .making import HEADER, some_events
 
-START_NS = HEADER["started_ns"]
+START_NS = 1_700_000_000_000_000_000
 #: How verdicts name what a file has lost, and what of a recording it is.
-LOST = {
-    "lost_in_file": lambda of: [bytes(one) for one in of.datagrams()],
+LOST: dict[str, Callable[[Recording], list[Any]]] = {
+    "lost_in_file": lambda of: [of.datagrams()[k] for k in range(len(of.datagrams()))],
     "notes_lost_in_file": lambda of: [(n.text, n.at_ns) for n in of.notes] + [(z.x, z.y) for z in of.zeroings],
     "detections_lost_in_file": lambda of: [(d.label, d.t) for d in of.detections],
     "registers_lost_in_file": lambda of: [at for at, _ in of.register_changes],
@@ -35,8 +36,14 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a recording of a few chunks, with a message of every kind that it may lose."""
     path, events = tmp_path_factory.mktemp("whole") / "whole.mcap", some_events(60, intensity=False)
     writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
-    at = lambda k: START_NS + int(events.t[k]) * 1000  # noqa: E731  a short name
-    pause = lambda: time.sleep(0.06)  # noqa: E731  chunks end when nothing comes
+
+    def at(k: int) -> int:
+        return START_NS + int(events.t[k]) * 1000
+
+    def pause() -> None:
+        """Wait until what was written is a chunk."""
+        time.sleep(0.1)
+
     held = np.full(4096, 65_535, np.uint16)
     writer.held(at(0), None, held[:16].repeat(256))
     pause()
@@ -64,11 +71,11 @@ def without_end(data: bytes) -> bytes:
     return data[: data.rindex(b"taxel.end", 0, data.rindex(b"header")) - 13]
 
 
-def held_by(recording: Recording) -> dict[str, list[object]]:
+def held_by(recording: Recording) -> dict[str, list[Any]]:
     return {cause: of(recording) for cause, of in LOST.items()}
 
 
-def assert_told(path: Path, data: bytes, of: dict[str, list[object]], where: str) -> taxel.Verdict | None:
+def assert_told(path: Path, data: bytes, of: dict[str, list[Any]], where: str) -> taxel.Verdict | None:
     """Open a damaged recording, and compare its verdict with what is gone; None of a file that is refused."""
     __tracebackhide__ = True
     path.write_bytes(data)
@@ -77,7 +84,7 @@ def assert_told(path: Path, data: bytes, of: dict[str, list[object]], where: str
         now = held_by(recording)
     except FormatError:
         return None
-    verdict = recording.verdict
+    verdict: taxel.Verdict = recording.verdict
     where = f"{where}: {verdict!r} {verdict.to_dict()}"
     gone = {cause: sum((Counter(map(repr, of[cause])) - Counter(map(repr, now[cause]))).values()) for cause in of}
     more = {cause: sum((Counter(map(repr, now[cause])) - Counter(map(repr, of[cause]))).values()) for cause in of}
@@ -183,6 +190,53 @@ def test_a_damaged_chunk_without_data_has_lost_nothing(whole: Path, tmp_path: Pa
     assert verdict is not None
     assert (verdict.status, verdict.lost, verdict.damaged) == ("damaged", {}, {"bad_chunks": 1})
     assert verdict.startswith("damage in the file: 1 bad chunk skipped; while recording: nothing lost after arrival")
+
+
+def test_of_a_chunk_without_its_index_and_without_the_end_of_the_file_not_all_is_known(
+    whole: Path, tmp_path: Path
+) -> None:
+    data, of = whole.read_bytes(), held_by(taxel.open(whole))
+    # The chunk of the first note, with what follows it.
+    begin, end = next((a, b) for a, b in chunks_of(data) if b"heel" in data[a:b])
+    spoilt = without_end(data[:begin] + bytes(end - begin) + data[end:])
+    verdict = assert_told(tmp_path / "a.mcap", spoilt, of, "a chunk and its index")
+    assert verdict is not None
+    assert (verdict.status, verdict.lost) == ("unfinished", {})
+    assert "what else was there is not known" in verdict
+    # The summary of a finished recording tells.
+    verdict = assert_told(tmp_path / "b.mcap", data[:begin] + bytes(end - begin) + data[end:], of, "as finished")
+    assert verdict is not None
+    assert (verdict.status, verdict.lost) == ("lost", {"notes_lost_in_file": 2})
+    assert "not known" not in verdict
+
+
+def test_datagrams_that_no_index_lists_are_lost_by_their_numbers_or_the_final_counts(
+    whole: Path, tmp_path: Path
+) -> None:
+    data, all_of_them = whole.read_bytes(), taxel.open(whole).datagrams()
+    # A chunk in the middle, with its index.
+    begin, end = next((a, b) for a, b in chunks_of(data) if all_of_them[2] in data[a:b])
+    gone = sum(all_of_them[k] in data[begin:end] for k in range(len(all_of_them)))
+    spoilt = without_end(data[:begin] + bytes(end - begin) + data[end:])
+    verdict = assert_told(tmp_path / "a.mcap", spoilt, held_by(taxel.open(whole)), "a chunk and its index")
+    assert verdict is not None
+    assert 0 < gone < len(all_of_them)
+    assert (verdict.status, verdict.lost) == ("lost", {"lost_in_file": gone})
+    # Where the summary alone is missing, the final counts tell.
+    spoilt = data[:begin] + bytes(end - begin) + data[end:-1]
+    verdict = assert_told(tmp_path / "b.mcap", spoilt, held_by(taxel.open(whole)), "and the summary")
+    assert verdict is not None
+    assert verdict.lost["lost_in_file"] == gone
+
+
+def test_a_chunk_in_the_place_of_another_is_there_twice_and_the_other_lost(whole: Path, tmp_path: Path) -> None:
+    data, all_of_them = whole.read_bytes(), taxel.open(whole).datagrams()
+    (a, b), (c, d), *_ = [(a, b) for a, b in chunks_of(data) if any(all_of_them[k] in data[a:b] for k in range(6))]
+    verdict = assert_told(tmp_path / "a.mcap", data[:a] + data[c:d] + data[b:], held_by(taxel.open(whole)), "instead")
+    assert verdict is not None
+    assert verdict.status == "lost"
+    assert verdict.lost["lost_in_file"] > 0
+    assert verdict.damaged["repeated_in_file"] > 0
 
 
 @pytest.mark.parametrize("cut", [1, 8, 9, 100, 1000, "zeros"])

@@ -177,6 +177,47 @@ def test_loss_in_a_board_s_own_last_second_is_seen_in_a_file_without_its_end(tmp
     assert (verdict.status, verdict.lost) == ("lost", {"lost_on_the_way": 1})
 
 
+def test_datagrams_of_version_1_that_come_again_are_noted(tmp_path: Path) -> None:
+    events = some_events(400, intensity=False)
+    events.markers = ()
+    sent = [taxel.wire.encode(events[k : k + 10]) for k in range(0, 400, 10)]
+    came = [one for k, one in enumerate(sent) for _ in range(2 if k % 8 == 5 else 1)]
+    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
+    for number, one in enumerate(came):
+        writer.datagram(START_NS + number * 1_000_000, number, one)
+    del writer
+    recording = taxel.open(tmp_path / "a.mcap")
+    assert len(recording.events) == 450, "their events are there twice"
+    assert recording.verdict.noted == {"datagrams_repeated": 5}
+    assert "5 datagrams repeated" in recording.verdict
+
+
+@pytest.mark.parametrize("reordered", [False, True])
+def test_what_version_2_lost_right_after_a_reset_is_counted(reordered: bool, tmp_path: Path) -> None:
+    board = Board(Registers(wire_version=2), version_2=Version2(states_us=0))
+    held, parts = np.full(4096, 20, np.uint16), []
+    for _ in range(2):
+        part: list[bytes] = []
+        for k in range(20):
+            held[k * 150 : k * 150 + 150] ^= 64
+            part += board.frame(held)
+        parts.append(part)
+        board.reset()
+    first, second = parts
+    lost = 3
+    came = [*first, *second[lost:]]
+    if reordered:
+        at = len(first)
+        came[at], came[at + 1] = came[at + 1], came[at]
+    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
+    for number, one in enumerate(came):
+        writer.datagram(START_NS + number * 1_000_000, number, one)
+    del writer
+    verdict = taxel.open(tmp_path / "a.mcap").verdict
+    assert (verdict.lost, verdict.noted["resets"]) == ({"lost_on_the_way": lost}, 1)
+    assert verdict.status == "lost"
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_times_after_a_damaged_stamp_are_doubtful(seed: int, tmp_path: Path) -> None:
     draw, path = np.random.default_rng(seed), tmp_path / "a.mcap"

@@ -21,10 +21,12 @@ from taxel._base.provenance import Sources, installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
 
-__all__ = ["bench", "stale_results"]
+__all__ = ["bench", "doubts_of", "goals_of", "stale_results"]
 
 #: Set by --peers: benchmarks then wait for peers that need minutes (benchmarks/_peer.py).
 _PATIENT = "TAXEL_BENCH_PEERS"
+#: How the parts of a result begin that are compiled.
+_COMPILED = "taxel._core."
 
 
 @app.command()
@@ -39,6 +41,10 @@ def bench(
     ] = False,
     stale: Annotated[
         bool, typer.Option("--stale", help="List the results that are older than a change in what they measure.")
+    ] = False,
+    goals: Annotated[
+        bool,
+        typer.Option("--goals", help="List the goals of the saved results, and what speaks against their times."),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -58,6 +64,9 @@ def bench(
     names = list(files) if name == "all" else [name]
     if stale:
         _list_stale(folder, files, names)
+        return
+    if goals:
+        _list_goals(folder, names)
         return
     changed = [] if quick else _changed(folder)
     if changed:
@@ -110,9 +119,48 @@ def stale_results(folder: Path, names: Sequence[str]) -> dict[str, list[str]]:
 def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
     stale = stale_results(folder, names)
     for name, parts in stale.items():
-        more = f" and {len(parts) - 5} more" if len(parts) > 5 else ""
-        typer.echo(f"{name}: {', '.join(parts[:5])}{more}")
+        # A change in the compiled part counts for all names whose Rust module has the changed one below it.
+        compiled = sum(part.startswith(_COMPILED) for part in parts)
+        own = [part for part in parts if not part.startswith(_COMPILED)]
+        more = [f"{len(own) - 5} more modules"] * (len(own) > 5) + [f"{compiled} compiled names"] * bool(compiled)
+        typer.echo(f"{name}: {', '.join([*own[:5], *more])}")
     typer.echo(f"{counted(len(stale), 'stale result')} of {len(files)}" if stale else "no result is stale")
+
+
+def goals_of(result: Mapping[str, Any]) -> dict[str, bool]:
+    """Return the goals that a result states, and whether each is reached."""
+    goals, ratios = result.get("goals", {}), result.get("ratios", {})
+    stated = {name: goal if isinstance(goal, bool) else ratios.get(name, 0.0) >= goal for name, goal in goals.items()}
+    stated |= result.get("reached", {})
+    return {name: bool(reached) for name, reached in stated.items()}
+
+
+def doubts_of(result: Mapping[str, Any]) -> list[str]:
+    """Return what speaks against the times of a result: other programs, other days, times that vary."""
+    machine, kept = result.get("machine", {}), result.get("kept", {})
+    load, cores = machine.get("load", 0.0), machine.get("cores", 1)
+    doubts = [f"load {load:.1f} on {counted(cores, 'core')}"] * (load > cores + 1)
+    doubts += [f"{counted(len(kept), 'time')} of peers of another day"] * bool(kept)
+    return doubts + ["times vary by more than 15 %"] * (result.get("stable") is False)
+
+
+def _list_goals(folder: Path, names: Sequence[str]) -> None:
+    missed = total = 0
+    for name in names:
+        place = folder / "results" / f"{name}.json"
+        if not place.exists():
+            typer.echo(f"{name}: no result")
+            continue
+        result = json.loads(place.read_text(encoding="utf-8"))
+        goals = goals_of(result)
+        lacks = [goal for goal, reached in goals.items() if not reached]
+        missed, total = missed + len(lacks), total + len(goals)
+        said = f"{len(goals) - len(lacks)} of {counted(len(goals), 'goal')} reached" if goals else "no goal stated"
+        doubts = "".join(f"; {doubt}" for doubt in doubts_of(result))
+        typer.echo(f"{name}, commit {result.get('commit', 'unknown')}: {said}{doubts}")
+        for goal in lacks:
+            typer.echo(f"  not reached: {goal}")
+    typer.echo(f"{total - missed} of {counted(total, 'goal')} reached")
 
 
 def _changed(folder: Path) -> list[str]:

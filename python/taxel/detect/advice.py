@@ -18,7 +18,7 @@ from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.scoring import Score
 from taxel.detect.training import Trained
-from taxel.encode import ContactArea, Encoder
+from taxel.encode import ContactArea, Encoder, Moments
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -66,8 +66,9 @@ def advised(
     Other times of the labels where most of them lie at one distance of more than 50 ms from what the sensor felt.
     Another tare where it holds a touch, where taxels read above their rest before touches begin, or where nothing was
     felt of most labels that are missed. Else the plain rule, where it makes at most half the mistakes on the same
-    labels; or the recipe that learns from the same quantities, if this one does not. Other kinds of touch where neither
-    tells more of them than chance would. For contact and lift of channels their distance. Else more labels, where on
+    labels; or the recipe that learns from the same quantities, if this one does not. For contact and lift of channels,
+    and kinds of touch that they do not tell, their distance. Other kinds of touch where neither neuron nor rule tells
+    more of them than chance would. Else more labels, where on
     its own training data the readout makes at most half the mistakes, as it learnt by heart what these data have. Else
     a search of other parameters, if the recipe lists any.
 
@@ -159,13 +160,13 @@ def _advice(
     wrong, learnt = together[label].missed + together[label].false, own.missed + own.false
     if rule is not None and 2 * rule.rank[0] <= wrong:
         return _by_rule(made, rule.rank[0], wrong)
-    if chance:
+    if channels and (_for_touch(made) or chance):
+        because = "channels in a row at a known distance have neighbours; then the recipe touch fits"
+        return Advice("--array", f"{because}, as --array 1x24x5mm")
+    if chance and any(isinstance(one, Moments) for one in made.recipe.encoder._each()):
         return Advice(
             "other kinds", f"{chance}: no input tells these kinds apart, or the labels are too few or mixed up"
         )
-    if channels and _for_touch(made):
-        because = "channels in a row at a known distance have neighbours; then the recipe touch fits"
-        return Advice("--array", f"{because}, as --array 1x24x5mm")
     if search_s is not None and 2 * learnt > wrong and points > 1:
         return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
     return Advice("more labels", f"of those that it learnt {own.missed} are missed, and {own.false} are false")

@@ -28,9 +28,8 @@ _SAME_MS = 5e-4
 #: A neuron that has fired is silent for that share of a picture at least: of stamps that are not regular two pictures
 #: may lie in the time of one.
 _SILENT_SHARE = 0.9
-#: A kernel shorter than this share of a picture, which stamps beside the grid would change by a third, ...
-_SHORT_SHARE = 0.05
-#: ... becomes an exponential one as long as this share, ...
+#: A kernel shorter than a picture, which stamps beside the grid would change, and which is silent between pictures only
+#: where its grid has points, becomes an exponential one as long as this share, ...
 _TAU_SHARE = 0.25
 #: ... with such a step of the grid: from a stamp to the next point of it the potential falls by less than a tenth.
 _STEP_SHARE = 0.02
@@ -155,7 +154,7 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         used.add(pictures)
         refractory = max(float(every.get("refractory", Neuron().refractory)), _SILENT_SHARE * period_ms)
         made = {**values, "delay_ms": begin_ms(pictures), "refractory": refractory}
-        if pictures_ms and float(every.get("tau", Neuron().tau)) < _SHORT_SHARE * period_ms:
+        if pictures_ms and float(every.get("tau", Neuron().tau)) < period_ms:
             made |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": _STEP_SHARE * period_ms}
         return made
 

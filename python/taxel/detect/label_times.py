@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,8 @@ __all__ = ["Off", "held_by_tare", "off_by"]
 _TOUCH = 2.0
 #: Distances between labels and touches are looked at up to this, ms, and are the same that differ by this.
 _FARTHEST_MS, _SAME_MS = 1000.0, 50.0
-#: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so.
+#: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so. They are not
+#: where as many are near.
 _SHARE, _LEAST = 0.8, 5
 #: Touches that are so many times as many as the labels are at some distance of them by chance.
 _MOST_A_LABEL = 4
@@ -67,16 +68,17 @@ def off_by(examples: Sequence[Example], labels: Sequence[str], noise_floor: floa
     found = {}
     for label in labels:
         times = loads.truth(label, loads.every)
-        one = max((_steady(times, edge) for edge in felt), key=lambda one: (one[0].alike, -one[1]))[0]
-        if one.alike >= max(_LEAST, _SHARE * len(times)) and abs(one.ms) > WINDOW_MS:
-            found[label] = one
+        steady = [one for edge in felt for one in _steady(times, edge)]
+        if steady and all(abs(one.ms) > WINDOW_MS for one, _ in steady):
+            found[label], _ = min(steady, key=lambda one: (-one[0].alike, one[1]))
     return found
 
 
-def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[Off, float]:
-    """Return the distance that most labels have from one of these times, the least of equals; and its spread, ms."""
-    if not len(times) or len(felt) > _MOST_A_LABEL * len(times):
-        return Off(0.0, 0, len(times)), np.inf
+def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple[Off, float]]:
+    """Yield the distances that most labels have from one of these times, each with its spread, ms."""
+    least = max(_LEAST, _SHARE * len(times))
+    if len(times) < least or len(felt) > _MOST_A_LABEL * len(times):
+        return
     far = round(to_us(_FARTHEST_MS))
     reach = np.searchsorted(felt, [times - far, times + far])
     which = np.repeat(np.arange(len(times)), reach[1] - reach[0])
@@ -84,14 +86,9 @@ def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[Off, flo
     apart = to_ms(times[which] - felt[beside])
     order = np.argsort(apart, kind="stable")
     apart, which = apart[order], which[order]
-    ends = np.searchsorted(apart, apart + _SAME_MS, side="right")
-    best = Off(0.0, 0, len(times)), np.inf
-    for k, end in enumerate(ends):
-        one = Off(float(np.median(apart[k:end])), len(np.unique(which[k:end])), len(times))
-        spread = float(np.ptp(apart[k:end]))
-        if (one.alike, -abs(one.ms)) > (best[0].alike, -abs(best[0].ms)):
-            best = one, spread
-    return best
+    for k, end in enumerate(np.searchsorted(apart, apart + _SAME_MS, side="right")):
+        if end - k >= least and (alike := len(np.unique(which[k:end]))) >= least:
+            yield Off(float(np.median(apart[k:end])), alike, len(times)), float(apart[end - 1] - apart[k])
 
 
 def held_by_tare(examples: Sequence[Example], noise_floor: float) -> int:

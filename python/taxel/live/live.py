@@ -233,11 +233,11 @@ class Live:
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
         `wire_late` (events of version 2 that arrived after time had passed theirs), `wire_jumps` (of the times of
-        version 1 ahead of this computer's clock), `arrived_ns` (when the latest
-        datagram arrived, ns since 1970, or None), `heartbeat_us` (the longest interval between heartbeats of a board of
-        version 2, or None), `arrival` (state: "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s,
-        heartbeat_us; not of one that has ended), `bridged` (None, or of a board
-        of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
+        version 1 ahead of this computer's clock), `wire_repeated` (datagrams of version 1 that came again),
+        `arrived_ns` (when the latest datagram arrived, ns since 1970, or None), `heartbeat_us` (the longest interval
+        between heartbeats of a board of version 2, or None), `arrival` (state: "nothing", "arriving", "quiet" or
+        "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended), `bridged` (None, or of a board of
+        another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
         ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range

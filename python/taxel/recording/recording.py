@@ -387,12 +387,15 @@ class Recording:
 
     @property
     def truncated(self) -> bool:
-        """Whether the file lacks its end: the writer was killed, or the file was cut."""
+        """Whether what came last is missing: the writer was killed, or the file was cut within its data."""
         return self._contents.truncated
 
     @property
     def rebuilt(self) -> dict[str, int]:
-        """Counts of damage found while reading: cut bytes at the end, gaps, bytes skipped, bad and large chunks."""
+        """Counts of damage found while reading: cut bytes at the end, gaps, bytes skipped, bad and large chunks.
+
+        A missing or damaged summary (`no_summary`) and damaged final counts (`no_end`) count 1.
+        """
         return dict(self._contents.rebuilt)
 
     def between(self, start: float, stop: float) -> Recording:
