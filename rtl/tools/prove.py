@@ -212,7 +212,7 @@ PROOFS = (
             (ARRAY, "ended_fast == number && !open && !begun", "!open && !begun"),
             (ARRAY, "if (nears) inverted_now <= inverted_next;", "inverted_now <= 1'b0;"),
             (ARRAY, "if (step_end) ended <= began;", "if (step_end) ended <= !began;"),
-            (ARRAY, "done_fast <= !done_fast;", "done_fast <= 1'b1;"),
+            (ARRAY, "done_fast <= !done_fast;", "done_fast <= 1'b0;"),
             (ARRAY, "assign over = !copied &&", "assign over ="),
             (ARRAY, "begins_here <= nears", "begins_here <= begins"),
             (ARRAY, "copies_here <= over", "copies_here <= closing"),
