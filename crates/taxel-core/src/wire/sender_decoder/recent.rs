@@ -14,11 +14,14 @@ const DATAGRAMS: usize = 8;
 /// Stamps come again after 6.5536 s: what arrives later than this, us, is another datagram.
 const WITHIN_US: i64 = 3_000_000;
 
+/// First and last eight bytes, and the length.
+type Seen = ([u8; 8], [u8; 8], usize);
+
 /// The last datagrams.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Recent {
-    /// First and last eight bytes, length, and when it arrived.
-    datagrams: [([u8; 8], [u8; 8], usize, Option<i64>); DATAGRAMS],
+    /// Each with the time of its arrival.
+    datagrams: [(Seen, Option<i64>); DATAGRAMS],
     next: usize,
 }
 
@@ -26,15 +29,14 @@ impl Recent {
     /// Adds a datagram; returns whether it was received before.
     pub(super) fn repeats(&mut self, datagram: &[u8], arrived: Option<i64>, array: &Array) -> bool {
         let (Some(first), Some(last)) = (datagram.first_chunk(), datagram.last_chunk()) else { return false };
-        let (first, last, length) = (*first, *last, datagram.len());
-        let again = self.datagrams.iter().any(|&(begin, end, size, then)| {
-            (begin, end, size) == (first, last, length)
-                && then.zip(arrived).is_none_or(|(then, now)| silence(then, now) < WITHIN_US)
+        let seen = (*first, *last, datagram.len());
+        let again = self.datagrams.iter().any(|&(known, then)| {
+            known == seen && then.zip(arrived).is_none_or(|(then, now)| silence(then, now) < WITHIN_US)
         });
         if again && has_two_times(datagram, array) {
             return true;
         }
-        self.datagrams[self.next] = (first, last, length, arrived);
+        self.datagrams[self.next] = (seen, arrived);
         self.next = (self.next + 1) % DATAGRAMS;
         false
     }
