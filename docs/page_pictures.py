@@ -4,7 +4,7 @@
 
 The commands and the Python of a page run in a new folder. Then its recording is opened in Chromium, with its labels and
 its readout: `docs/pictures/NAME.png` is what is seen; the first tables of its training's report are `NAME-report.png`.
-The board is seen while it runs, and its recording as `panel.png`, for the README. Needs what the tests of the page need.
+The board is seen while it runs, and its recording as `panel.png`, for the README.
 """
 
 from __future__ import annotations
