@@ -227,7 +227,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
     values, text = tables(folder)
     for words, reason in (
         (folder, f"{folder}: holds no recording; name a file, or one of its folders"),
-        (folder / "palm.npy", "say in NAME.layout.toml what it holds"),
+        (folder / "palm.npy", "a layout file beside it, palm.layout.toml, or one given by --layout, says what it is"),
     ):
         code, _, errors = call(capsys, "view", words, "--no-open", "--seconds", 1)
         assert (code, len(errors.splitlines())) == (2, 1)
@@ -297,3 +297,19 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
     )
     assert (code, len(json.loads(said)["recordings"])) == (0, 2)
     assert "left out 2 of its 4 trials" in errors
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("plain.csv", "line 1: '0,1,0,2': must be t_us,x,y,p"), ("plain.npy", "not written by taxel")],
+)
+def test_a_table_or_array_of_another_program_is_refused_by_the_command_with_the_name_of_its_layout(
+    name: str, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("plain.csv").write_text("0,1,0,2\n0,2,0,1\n")
+    np.save("plain.npy", np.zeros((20, 4, 4)))
+    status, _, error = call(capsys, "view", name, "--no-open", "--seconds", "0.1")
+    assert status == 2
+    assert says in error
+    assert "a layout file beside it, plain.layout.toml, or one given by --layout, " in error

@@ -209,6 +209,33 @@ def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay:
     shows(replay, "label-count", "^6 label")
 
 
+def test_a_drag_across_the_row_marks_nothing_and_delete_takes_the_newest_label(replay: Any, recording: Path) -> None:
+    table = recording.with_suffix("").with_suffix(".notes.csv")
+    table.write_text("label,t_us\ntoe,6000000\n")
+    replay.reload()
+    shows(replay, "label-count", "^1 label$")
+    still(replay)
+    flag = replay.locator(".flag", has_text="toe")
+    handle = flag.locator("i").bounding_box()
+    replay.mouse.click(handle["x"] + 4, handle["y"] + 4)
+    replay.locator("#label-name").fill("heel")
+    lane = replay.locator("#label-lane").bounding_box()
+    low = lane["y"] + lane["height"] - 4
+    replay.mouse.move(pixel(replay, 3.5), low)
+    replay.mouse.down()
+    replay.mouse.move(pixel(replay, 7.0), low, steps=4)
+    replay.mouse.up()
+    assert replay.evaluate("getSelection().toString()") == ""
+    replay.mouse.click(pixel(replay, 9.0), low)
+    shows(replay, "label-count", "^2 labels$")
+    chosen = replay.locator(".flag.chosen")
+    until(lambda: "label heel at" in chosen.get_attribute("aria-label"), "the new one is chosen")
+    press(replay, "Delete")
+    shows(replay, "label-count", "^1 label$")
+    assert flag.count() == 1
+    table.unlink()
+
+
 def test_flags_stack_and_shrink_to_lines(replay: Any, recording: Path) -> None:
     table = recording.with_suffix("").with_suffix(".notes.csv")
     table.write_text("label,t_us\n" + "".join(f"contact,{5_000_000 + 1000 * k}\n" for k in range(9)))

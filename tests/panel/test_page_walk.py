@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +16,7 @@ from tests.formats import bags
 from tests.formats.bags import BEGIN_NS, PALM
 from tests.formats.making import write_gaitpdb
 from tests.panel.browser import running
-from tests.panel.pages import clock, opened, shown, shows, span, until
+from tests.panel.pages import clock, opened, press, shown, shows, span, until
 
 import taxel
 from taxel import Array, Frames
@@ -255,12 +256,12 @@ def test_values_that_fall_are_said_above_the_maps_with_what_to_do(chromium: Any,
 
 
 def test_why_a_file_was_not_opened_stays_in_sight(chromium: Any, tmp_path: Path) -> None:
-    (tmp_path / "plain.csv").write_text("0,1,0,2\n0,2,0,1\n")
+    (tmp_path / "worn.csv").write_text("t_us,a,b\n0,1,2\n10000,x,1\n")
     with (
-        running("view", "plain.csv", "--no-open", folder=tmp_path) as server,
+        running("view", "worn.csv", "--no-open", folder=tmp_path) as server,
         opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
     ):
-        shows(page, "silence", r"plain\.csv, line 1: .* a layout file beside it, plain\.layout\.toml")
+        shows(page, "silence", r"worn\.csv, line 3")
         page.locator("#notice-close").click()
         assert page.locator("#silence").is_visible()
         shows(page, "state-word", "^No recording$")
@@ -285,3 +286,28 @@ def test_notes_have_the_room_of_their_tab(chromium: Any, tmp_path: Path) -> None
     with shown(chromium, tmp_path / "mat.npz") as page:
         last = page.locator("#note-list li").nth(11)
         assert last.evaluate(LOW) < page.locator(".detections-block").bounding_box()["y"], "without scrolling"
+
+
+def test_the_head_of_pictures_has_their_number_and_each_foot_and_no_words_on_losses_that_no_such_file_counts(
+    chromium: Any, tmp_path: Path
+) -> None:
+    file = write_gaitpdb(tmp_path)
+    feet = taxel.open(file)
+    assert {foot.verdict.status for foot in feet} == {"unknown"}
+    with shown(chromium, file) as page:
+        count = f"{sum(len(foot.frames()) for foot in feet):,}"
+        shows(page, "source", rf"^{re.escape(file.name)} · {count} pictures, left 1 × 8, right 1 × 8$")
+
+
+def test_the_values_above_the_lanes_are_in_full_on_a_phone(chromium: Any, tmp_path: Path) -> None:
+    values = np.zeros((60, 64, 64))
+    values[20:40, 10:34, 25:49] = 50.0
+    frames = Frames(values, np.arange(60) * 20_000, unit="kPa", array=Array(64, 64, pitch_mm=2.67))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    with shown(chromium, tmp_path / "mat.npz", **SIZES[1]) as page:
+        press(page, "c", "ArrowRight")
+        until(lambda: page.locator("#taxel-block").is_visible(), "the taxel's lane")
+        for name in ("taxel", "force", "centre"):
+            head = page.locator(f"#{name}-block h2")
+            assert head.evaluate("e => e.scrollWidth <= e.clientWidth"), head.inner_text()
+        assert "mm)" in page.locator("#centre-now").inner_text()

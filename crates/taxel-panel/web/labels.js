@@ -61,8 +61,10 @@ export class Labels {
     this.name.value = settings.values.label;
     this.name.oninput = () => settings.set("label", this.name.value);
     this.lane = part("label-lane", HTMLElement);
+    let from = 0;
+    this.lane.addEventListener("pointerdown", (event) => (from = event.clientX));
     this.lane.addEventListener("click", (event) => {
-      if (event.target === this.lane) this.click(event);
+      if (event.target === this.lane && Math.abs(event.clientX - from) < DRAG) this.click(event);
     });
     part("mark", HTMLButtonElement).onclick = () => this.markHere();
     part("label-form", HTMLFormElement).onsubmit = (event) => {
@@ -137,7 +139,16 @@ export class Labels {
       notify("type the label's name, then Enter");
       return;
     }
-    if (t_us !== null) this.server.request({ type: "mark", label, t_us }).catch(this.failed);
+    if (t_us !== null) this.add({ label, t_us });
+  }
+
+  /** Makes a label and chooses it. @param {{ label: string, t_us: number, source?: string, replaces_us?: number | null }} label */
+  add(label) {
+    const before = new Set(this.labels.map(({ label_id }) => label_id));
+    this.server.request({ type: "mark", ...label }).then(() => {
+      this.chosen = this.labels.find(({ label_id }) => !before.has(label_id))?.label_id ?? this.chosen;
+      this.show();
+    }, this.failed);
   }
 
   /** @param {number} label_id @param {number} t_us */
@@ -153,7 +164,7 @@ export class Labels {
     const gone = this.labels.find((label) => label.label_id === label_id);
     if (!gone) return;
     const { label, t_us, source, replaces_us } = gone;
-    const undo = () => this.server.request({ type: "mark", label, t_us, ...(source ? { source } : {}), replaces_us }).catch(this.failed);
+    const undo = () => this.add({ label, t_us, ...(source ? { source } : {}), replaces_us });
     this.server.request({ type: "delete", label_id }).then(() => notify(`deleted ${label} at ${seconds(t_us)}`, false, { text: "Undo", action: undo }), this.failed);
   }
 

@@ -1,7 +1,7 @@
 // The header's first words: what is shown, and which board or recording it is; and whether anything arrives.
 
 import { part, write } from "./dom.js";
-import { seconds, short } from "./words.js";
+import { counted, seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Counters} Counters */
 /** @typedef {import("./protocol.js").Hello} Hello */
@@ -39,6 +39,14 @@ function fall(opened) {
   return `The values${which} fall from their rest, so that no pressure is shown. If less means more pressure, write the line “falls = true” into ${opened.name.replace(/\.[^.]+$/, "")}.layout.toml beside the recording, and start taxel view again.`;
 }
 
+/** @param {Opened | null} opened @param {Hello | null} hello @returns {string} how many pictures there are, and rows and columns of each sensor */
+function shape(opened, hello) {
+  const array = opened?.array ?? hello?.array;
+  const { count, sources } = opened?.pictures ?? { count: 0, sources: [] };
+  const sensors = sources.length > 1 ? sources.map(({ name, rows, columns }) => `${name} ${rows} × ${columns}`).join(", ") : array ? `${array.rows} × ${array.columns}` : "";
+  return [opened?.pictures && counted(count, "picture"), sensors].filter(Boolean).join(", ");
+}
+
 /**
  * Writes them.
  * @param {{ connected: boolean, why: string }} connection
@@ -71,10 +79,8 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const banner = part("silence", HTMLElement);
   write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && fall(opened)].filter(Boolean).join(" "));
   banner.hidden = !banner.textContent;
-  const array = opened?.array ?? hello?.array;
-  const shape = array ? `${array.rows} × ${array.columns}` : "";
-  const place = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? `${source} · ${opened?.verdict ?? ""}` : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
-  const text = [place, shape].filter(Boolean).join(" · ");
+  const place = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
+  const text = [place, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
   write(part("source", HTMLElement), text);
   part("source", HTMLElement).title = text;
   document.documentElement.classList.toggle("recording", recording !== null);

@@ -242,10 +242,15 @@ def advice(path: Path, says: str) -> str:
 
     Examples
     --------
-    >>> advice(Path("data/walk.csv.gz"), "describes a table of another program")
-    'a layout file beside it, walk.layout.toml, describes a table of another program (docs/files.md)'
+    >>> advice(Path("data/walk.csv.gz"), "describes a table")
+    'a layout file beside it, walk.layout.toml, or one given by --layout, describes a table (docs/files.md)'
     """
-    return f"a layout file beside it, {_name(path)}, {says} (docs/files.md)"
+    return f"a layout file {or_given(path)}, {says} (docs/files.md)"
+
+
+def or_given(path: Path) -> str:
+    """Return which layout file is read with a recording, as part of a sentence."""
+    return f"beside it, {_name(path)}, or one given by --layout"
 
 
 def _name(path: Path) -> str:

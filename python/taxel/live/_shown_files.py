@@ -194,7 +194,7 @@ def _sources(recording: Recording) -> dict[str, Recording]:
 
 
 def _pictures(recording: Recording) -> tuple[Any, ...]:
-    """Return array, sources, unit, distance of numbered pictures, remarks and verdict for the panel's server."""
+    """Return array, sources, unit, distance of numbered pictures, remarks and verdict (empty if unknown)."""
     sources = _sources(recording)
     frames = {name: _in_its_unit(one) for name, one in sources.items()}
     units = {one.unit for one in frames.values()}
@@ -214,7 +214,8 @@ def _pictures(recording: Recording) -> tuple[Any, ...]:
     notes = {note for note in notes if note[:2] not in labels}
     found = [(d.label, d.t, d.known) for one in sources.values() for d in one.detections]
     remarks = json.dumps([sorted(notes, key=lambda note: (note[0] or 0, note[1])), found])
-    return array._parts(), parts, units.pop(), None if us == 1 else us, remarks, recording.verdict
+    verdict = "" if recording.verdict.status == "unknown" else recording.verdict
+    return array._parts(), parts, units.pop(), None if us == 1 else us, remarks, verdict
 
 
 def _labels_beside(recording: Recording) -> tuple[Any, ...]:

@@ -29,7 +29,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Contents
 from taxel.recording.npz import around
 
-__all__ = ["array_in_csv", "read_csv", "write_csv"]
+__all__ = ["array_in_csv", "check_head", "read_csv", "write_csv"]
 
 _EVENTS = ("t_us", "x", "y", "p")
 _MORE = ("intensity", "repaired")
@@ -104,10 +104,24 @@ def read_csv(path: Path, array: Array | None) -> Contents:
     return Contents(path, path.name, "csv", table.array, events=events, frames=frames)
 
 
+def check_head(path: Path) -> None:
+    """Refuse a table whose first line is none of a recording.
+
+    Raises
+    ------
+    FormatError : another header
+    """
+    with path.open("rb") as file:
+        _head(path, file)
+
+
+def _head(path: Path, file: BinaryIO) -> list[str]:
+    return _names(path, file.readline().removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n"))
+
+
 def _table(path: Path, array: Array | None) -> Events | Frames:
     with path.open("rb") as file:
-        head = file.readline().removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n")
-        names = _names(path, head)
+        names = _head(path, file)
         if tuple(names[:4]) == _EVENTS:
             return _csv_events(path, names, _blocks(file), array)
         return _csv_frames(path, names, _blocks(file), array)

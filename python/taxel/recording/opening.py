@@ -20,7 +20,7 @@ from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording.contents import Contents, several
-from taxel.recording.csv import read_csv
+from taxel.recording.csv import check_head, read_csv
 from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, is_label_table, is_own_table, kind_of
 from taxel.recording.layout import laid_out, on_array
@@ -362,10 +362,16 @@ def check_recording(file: Path, layout: str | os.PathLike[str] | None = None) ->
 
     Raises
     ------
-    FormatError : no recording (names the kind of file if it is known); an invalid layout file
+    FormatError : no recording (names the kind of file if it is known); an invalid layout file; a table or arrays of
+        another program that no layout file describes
     """
-    if _kind(file, layout) == "mcap":
+    if not _formats(file) and _layout(file, layout) is None:
+        refuse_without_layout(file)
+    kind = _kind(file, layout)
+    if kind == "mcap":
         _core.RecordingReader(file)
+    elif kind == "csv":
+        check_head(file)
 
 
 def is_recording(file: Path, layout: str | os.PathLike[str] | None = None) -> bool:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.times import beginning_us
+from taxel.formats.layout import or_given
 from taxel.frames import Frames
 
 __all__ = [
@@ -81,6 +83,10 @@ class Rest:
 
     def __str__(self) -> str:
         """Return the line of ``taxel info``."""
+        return self.text()
+
+    def text(self, path: Path | None = None) -> str:
+        """Return the line of ``taxel info``; of the recording of a path it names the layout file."""
         words = {
             "tare": "the given tare",
             "calibration": "the calibration's",
@@ -93,6 +99,7 @@ class Rest:
             text = f"a quiet stretch, {first:.3f} to {end:.3f} s, tracked from there"
         if self.falls:
             text += "; values fall from it: if less means more pressure, say falls = true in a layout file"
+            text += "" if path is None else f" {or_given(path)}"
         return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
 
     def described(self) -> dict[str, object]:
