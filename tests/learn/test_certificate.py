@@ -73,6 +73,14 @@ def test_a_certificate_that_was_touched_is_refused():
     silent = next(k for k, row in enumerate(proof.rows) if row.kind == "silence")
     turned[silent] *= -1
     assert not check_certificate(problem, dataclasses.replace(proof, multipliers=turned))
+    # A multiplier of a silent row may not be negative at all, even where the rest would carry the proof.
+    for slight in (0.0, -1e-300, -1e-12):
+        more = dataclasses.replace(
+            proof,
+            rows=[*proof.rows, proof.rows[silent]],
+            multipliers=np.append(proof.multipliers, slight),
+        )
+        assert check_certificate(problem, more) == (slight == 0.0)
     assert not check_certificate(problem, dataclasses.replace(proof, multipliers=0 * proof.multipliers))
     assert not check_certificate(problem, dataclasses.replace(proof, multipliers=-proof.multipliers))
     target = next(k for k, row in enumerate(proof.rows) if row.kind == "target")

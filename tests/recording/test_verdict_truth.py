@@ -362,6 +362,9 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         {"status": "lost"},
         [],
         {"status": "lost", "text": "", "lost": 3},
+        {"status": "lost", "text": "", "lost": {"a": True}},
+        {"status": "damaged", "text": "", "doubtful_after_us": True},
+        {"status": "complete", "text": "nothing lost", "lost": {"lost_on_the_way": 5}},
     ):
         with pytest.raises(taxel.ProblemError, match="verdict"):
             Verdict.from_dict(nonsense)  # type: ignore[arg-type]

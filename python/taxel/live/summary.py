@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from taxel.recording import open_recording
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 
@@ -66,7 +67,11 @@ def summary_of(text: str) -> Summary:
     values = json.loads(text)
     path = None if values["path"] is None else Path(values["path"])
     tare = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
-    return Summary(values["counters"], Verdict._from(values["verdict"]), path, tare)
+    verdict = Verdict._from(values["verdict"])
+    if verdict.damaged and path is not None and path.suffix == ".mcap":
+        # From when on times are doubtful is known by the file's own times alone.
+        verdict = open_recording(path).verdict
+    return Summary(values["counters"], verdict, path, tare)
 
 
 def delays(measured: dict[str, Any]) -> str:

@@ -161,10 +161,12 @@ def _stated(held: Any) -> dict[str, Any]:
         own.get("status") not in STATUSES
         or not isinstance(own.get("text"), str)
         or not all(isinstance(each, Mapping) for each in (*numbers, parts))
-        or not all(isinstance(count, int) and 0 <= count < 2**64 for count in counts)
-        or not isinstance(own.get(doubtful), int | None)
+        or not all(type(count) is int and 0 <= count < 2**64 for count in counts)
+        or type(own.get(doubtful, None)) not in (int, type(None))
     ):
         raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
+    if own["status"] in STATUSES[: STATUSES.index("lost")] and any(own.get("lost", {}).values()):
+        raise ProblemError(f"verdict: its status is {own['status']}, but its lost is not empty: must be lost, or worse")
     made = {"status": own["status"], "text": own["text"], doubtful: own.get(doubtful)}
     made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
     return made | {"parts": [(str(name), _stated(part)) for name, part in parts.items()]}
