@@ -14,7 +14,7 @@ REST = ("results", "at rest")
 AT_5_KHZ, BYTE = "64 x 64 at 5.2 kHz", ("callback_us_from", "last byte", "p50")
 STREAM = "decoded, {}, version 2 / version 1 as one stream"
 QUOTED = [
-    ("README.md", r"\(([\d.]+) ms at the median\)", "latency", (*REST, AT_5_KHZ, *BYTE), 1e3),
+    ("README.md", r"\(([\d.]+) ms at the median from", "latency", (*REST, AT_5_KHZ, *BYTE), 1e3),
     ("README.md", r"takes ([\d.]+) ms to be sure", "latency", (*REST, f"version 1, {AT_5_KHZ}", *BYTE), 1e3),
     ("README.md", r"([\d.]+) s on the thesis' time grid", "learn_cone_x", ("growth", "grid"), 1.0),
     ("README.md", r"([\d.]+) s in continuous time", "learn_cone_x", ("growth", "continuous"), 1.0),

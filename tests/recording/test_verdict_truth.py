@@ -331,6 +331,8 @@ def test_a_lsa_without_its_lss_is_unfinished_and_with_damage_still(tmp_path: Pat
         ("nothing lost; 1 resets of the board", "complete after arrival"),
         ("the .csv does not say what was lost", "unknown"),
         ("nothing lost; in the bytes that came: 3 bytes skipped", "damaged"),
+        ("damage in the file: 1 bad chunk skipped; while recording: nothing lost", "damaged"),
+        ("nothing lost; times after 5 us are doubtful", "damaged"),
         ("not finished: what came last is missing; until then: nothing lost", "unfinished"),
         ("a.mcap: nothing lost; b.mcap: LOST: 3 messages dropped by the kernel", "lost"),
         ("converted from a.mcap, a recording that says: nothing lost", "complete"),
@@ -365,6 +367,7 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         {"status": "lost", "text": "", "lost": {"a": True}},
         {"status": "damaged", "text": "", "doubtful_after_us": True},
         {"status": "complete", "text": "nothing lost", "lost": {"lost_on_the_way": 5}},
+        {"status": "complete", "text": "nothing lost", "parts": {"left": {"status": "lost", "text": "LOST"}}},
     ):
         with pytest.raises(taxel.ProblemError, match="verdict"):
             Verdict.from_dict(nonsense)  # type: ignore[arg-type]

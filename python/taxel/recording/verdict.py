@@ -167,6 +167,10 @@ def _stated(held: Any) -> dict[str, Any]:
         raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
     if own["status"] in STATUSES[: STATUSES.index("lost")] and any(own.get("lost", {}).values()):
         raise ProblemError(f"verdict: its status is {own['status']}, but its lost is not empty: must be lost, or worse")
+    for name, part in parts.items():
+        inner = _stated(part)["status"]
+        if STATUSES.index(inner) > STATUSES.index(own["status"]):
+            raise ProblemError(f"verdict: its status is {own['status']}, that of {name} is {inner}: must be no better")
     made = {"status": own["status"], "text": own["text"], doubtful: own.get(doubtful)}
     made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
     return made | {"parts": [(str(name), _stated(part)) for name, part in parts.items()]}

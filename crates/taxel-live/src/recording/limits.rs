@@ -2,6 +2,8 @@
 //! verdict, and documented in docs/files.md. A file may come from an untrusted source or a damaged disk, and a few
 //! bytes can claim a size of 2^64.
 
+use mcap::records::op;
+
 /// Largest unpacked size of a chunk, bytes: 64 MiB. Our chunks have 1 MiB, those of other tools 1 to 8.
 pub(super) const CHUNK: u32 = 1 << 26;
 
@@ -37,4 +39,29 @@ pub(super) fn unpacked(length: u64) -> u64 {
 /// times its length.
 pub(super) fn datagrams(length: u64) -> u64 {
     length.saturating_mul(100).saturating_add(1 << 26)
+}
+
+/// Whether the strings in a channel or metadata record end within it: the parser allocates their memory before it
+/// checks.
+pub(super) fn texts_fit(opcode: u8, data: &[u8]) -> bool {
+    fn text(data: &[u8]) -> Option<&[u8]> {
+        let (length, rest) = data.split_first_chunk::<4>()?;
+        rest.get(u32::from_le_bytes(*length) as usize..)
+    }
+    /// A table of strings by name, whose size in bytes precedes it.
+    fn table(data: &[u8]) -> Option<()> {
+        let (length, rest) = data.split_first_chunk::<4>()?;
+        let mut pairs = rest.get(..u32::from_le_bytes(*length) as usize)?;
+        while !pairs.is_empty() {
+            pairs = text(text(pairs)?)?;
+        }
+        Some(())
+    }
+    match opcode {
+        // Two 16-bit numbers, topic, encoding, table.
+        op::CHANNEL => data.get(4..).and_then(text).and_then(text).and_then(table).is_some(),
+        // Name, table.
+        op::METADATA => text(data).and_then(table).is_some(),
+        _ => true,
+    }
 }

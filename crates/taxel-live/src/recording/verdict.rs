@@ -554,7 +554,13 @@ impl Verdict {
             Status::Lost
         } else if has(&["not finished", "what came last is missing"]) {
             Status::Unfinished
-        } else if has(&["in the bytes that came", "could not be read"]) {
+        } else if has(&[
+            "in the bytes that came",
+            "could not be read",
+            "damage in the file",
+            "counts are damaged",
+            "are doubtful",
+        ]) {
             Status::Damaged
         } else if has(&["does not say"]) {
             Status::Unknown

@@ -111,7 +111,7 @@ pub(super) fn records(
             }
             // The content of other records is not used, so an error in them is ignored.
             Ok(LinearReadEvent::Record { opcode, .. }) if !matches!(opcode, op::CHANNEL | op::MESSAGE) => {}
-            Ok(LinearReadEvent::Record { data, opcode }) if !texts_fit(opcode, data) => return Ok(false),
+            Ok(LinearReadEvent::Record { data, opcode }) if !limits::texts_fit(opcode, data) => return Ok(false),
             Ok(LinearReadEvent::Record { data, opcode }) => match parse_record(opcode, data) {
                 Ok(record) => {
                     if !take(record) {
@@ -136,29 +136,4 @@ pub(super) fn indexed_from(path: &Path, file: &File, length: u64, mut at: u64) -
         at += 15 + 16 * messages;
     }
     Ok(all)
-}
-
-/// Whether the strings in a channel or metadata record end within it: the parser allocates their memory before it
-/// checks.
-pub(super) fn texts_fit(opcode: u8, data: &[u8]) -> bool {
-    fn text(data: &[u8]) -> Option<&[u8]> {
-        let (length, rest) = data.split_first_chunk::<4>()?;
-        rest.get(u32::from_le_bytes(*length) as usize..)
-    }
-    /// A table of strings by name, whose size in bytes precedes it.
-    fn table(data: &[u8]) -> Option<()> {
-        let (length, rest) = data.split_first_chunk::<4>()?;
-        let mut pairs = rest.get(..u32::from_le_bytes(*length) as usize)?;
-        while !pairs.is_empty() {
-            pairs = text(text(pairs)?)?;
-        }
-        Some(())
-    }
-    match opcode {
-        // Two 16-bit numbers, topic, encoding, table.
-        op::CHANNEL => data.get(4..).and_then(text).and_then(text).and_then(table).is_some(),
-        // Name, table.
-        op::METADATA => text(data).and_then(table).is_some(),
-        _ => true,
-    }
 }

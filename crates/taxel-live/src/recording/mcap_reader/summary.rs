@@ -8,7 +8,6 @@ use mcap::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::blocks::texts_fit;
 use crate::recording::limits;
 use crate::recording::metadata::END;
 
@@ -40,7 +39,7 @@ impl Summary {
                     at += more as u64;
                 }
                 LinearReadEvent::Record { opcode: op::STATISTICS, data } => counts = Some(counted(data)?),
-                LinearReadEvent::Record { opcode: op::CHANNEL, data } if texts_fit(op::CHANNEL, data) => {
+                LinearReadEvent::Record { opcode: op::CHANNEL, data } if limits::texts_fit(op::CHANNEL, data) => {
                     if let Ok(Record::Channel(channel)) = parse_record(op::CHANNEL, data) {
                         names.insert(channel.id, channel.topic);
                     }

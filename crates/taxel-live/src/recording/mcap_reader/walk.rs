@@ -8,7 +8,7 @@ use std::path::Path;
 use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 
-use super::blocks::{Block, Indexed, indexed, indexed_from, records, texts_fit};
+use super::blocks::{Block, Indexed, indexed, indexed_from, records};
 use super::summary::Summary;
 use crate::recording::metadata::{BEGIN, CHECK, END, check};
 use crate::recording::{Counts, Ending, Header, Rebuilt, limits};
@@ -275,7 +275,7 @@ impl<'a> Walk<'a> {
             return Ok(());
         }
         let body = self.bytes(at + RECORD_HEAD, length)?;
-        if !texts_fit(op::METADATA, &body) {
+        if !limits::texts_fit(op::METADATA, &body) {
             return Ok(());
         }
         let Ok(Record::Metadata(record)) = parse_record(op::METADATA, &body) else { return Ok(()) };
