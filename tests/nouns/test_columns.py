@@ -157,5 +157,7 @@ print((resident("VmHWM") - before) / size)
 @pytest.mark.parametrize("work", ["encode", "stream", "encode frames", "tare", "check"])
 def test_columns_are_read_in_place(work: str) -> None:
     """The peak of work that says little is a fraction of the columns: a copy of one of them would show."""
-    said = subprocess.run([sys.executable, "-c", PEAK, work], capture_output=True, text=True, check=True).stdout
-    assert float(said) < 0.1, f"{work}: {float(said):.2f} of the columns' bytes"
+    # What else the process takes only adds to the peak; a copy is in each of the three.
+    command = [sys.executable, "-c", PEAK, work]
+    peaks = [float(subprocess.run(command, capture_output=True, text=True, check=True).stdout) for _ in range(3)]
+    assert min(peaks) < 0.1, f"{work}: {min(peaks):.2f} of the columns' bytes"
