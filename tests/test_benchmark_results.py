@@ -29,10 +29,6 @@ def git(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
 
 
-#: Commits whose results are kept although only their work was handed on, in 91919491, and not they themselves. A
-#: result that is measured again leaves the list.
-HANDED_ON = {"c0682af3": "rtl"}
-
 NAMED = sorted(
     (str(path.relative_to(RESULTS)), commit)
     for path in RESULTS.rglob("*.json")
@@ -49,8 +45,6 @@ def test_there_are_results_that_name_commits() -> None:
 @pytest.mark.parametrize(("file", "commit"), NAMED)
 def test_a_result_names_a_clean_commit_of_this_history(file: str, commit: str) -> None:
     assert re.fullmatch(r"[0-9a-f]{7,40}", commit), f"{file}: {commit}"
-    if HANDED_ON.get(commit) == file.removesuffix(".json"):
-        commit = "91919491"
     shallow = git("rev-parse", "--is-shallow-repository")
     if shallow.stdout.strip() != "false":
         pytest.skip("the history is not whole here")
