@@ -1,10 +1,12 @@
 // The queue of events: a ring in block memory, with a register before it, as whether an event comes is known late in a clock and
-// the blocks lie far apart, and two behind it, as its output comes late.
+// the blocks lie far apart, and three behind it: the blocks' own, whose output comes late, one beside each block, and one where
+// an event is used, which may lie as far away as the blocks from each other.
 //
-// It gives one every other clock at most: nothing but `ready` waits for `pop`, which is known late in a clock.
+// It gives one every other clock at most: a register takes the next event the clock after it gave one on, so that no register
+// but the last waits for `pop`, which is known late in a clock.
 //
 // Throughput: an event a clock in, one every other clock out.
-// Latency: four clocks from `push` to `ready`, where nothing waits.
+// Latency: five clocks from `push` to `ready`, where nothing waits.
 // Loses nothing: it is full before it would. Who pushes counts what found no room.
 module taxel_event_fifo #(
     parameter int DEPTH = 4096,
@@ -31,13 +33,14 @@ module taxel_event_fifo #(
   logic [PLACES:0] waiting;  // in the ring and before it
   logic [BITS-1:0] held;     // before it
   logic stored;              // into the ring, in this clock
-  logic [SLICES-1:0][WIDTH-1:0] fetched;
-  logic fetched_valid, fetch, move;
+  logic [SLICES-1:0][WIDTH-1:0] fetched, landed;
+  logic fetched_valid, landed_valid, fetch, land, move;
   logic none;  // in the ring
 
-  assign empty = none && !stored && !fetched_valid && !ready;
-  assign move  = fetched_valid && !ready;
-  assign fetch = !none && (!fetched_valid || move);
+  assign empty = none && !stored && !fetched_valid && !landed_valid && !ready;
+  assign fetch = !none && !fetched_valid;
+  assign land  = fetched_valid && !landed_valid;
+  assign move  = landed_valid && !ready;
 
   for (genvar k = 0; k < SLICES; k++) begin : g_slice
     logic [WIDTH-1:0] ring[DEPTH];
@@ -57,11 +60,14 @@ module taxel_event_fifo #(
       waiting <= push ? waiting + (PLACES + 1)'(1) : waiting - (PLACES + 1)'(1);
       full    <= push && waiting == (PLACES + 1)'(DEPTH - 1);
     end
-    // A word that is pushed now is in the ring after the next clock.
-    none <= waiting == (PLACES + 1)'(fetch);
+    // A word that is pushed now is in the ring after the next clock; after a fetch no other follows in the next.
+    none <= waiting == '0;
     if (fetch) fetched_valid <= 1'b1;
-    else if (move) fetched_valid <= 1'b0;
-    if (move) oldest <= BITS'(fetched);
+    else if (land) fetched_valid <= 1'b0;
+    if (land) landed <= fetched;
+    if (land) landed_valid <= 1'b1;
+    else if (move) landed_valid <= 1'b0;
+    if (move) oldest <= BITS'(landed);
     if (move) ready <= 1'b1;
     else if (pop) ready <= 1'b0;
     if (reset) begin
@@ -72,6 +78,7 @@ module taxel_event_fifo #(
       full          <= 1'b0;
       none          <= 1'b1;
       fetched_valid <= 1'b0;
+      landed_valid  <= 1'b0;
       ready         <= 1'b0;
     end
   end

@@ -112,6 +112,7 @@ module taxel_status_sender #(
   logic letter_last;
   logic zeros;    // only zeros so far
   logic further;  // a count of the line follows
+  logic in_number, in_value;  // `at` lies in a count, in an answer's value
 
   always_ff @(posedge clk) begin
     if (at < 6'(NAME)) of_counts <= plain(NAMES[part][5'(at)]);
@@ -150,6 +151,9 @@ module taxel_status_sender #(
     if (look_again) look <= 3'b111;
     for (int k = 0; k < 3; k++) differs[k] <= counts[k] != given[k];
     further <= part >= 3'd3 && part != 3'd7;
+    // `at` stays from before LOOK until NEXT.
+    in_number <= counting && at >= 6'(NAME);
+    in_value  <= !counting && line.kind == ANSWER_OK && at >= 6'd10;
     case (state)
       IDLE: begin
         at        <= '0;
@@ -207,8 +211,8 @@ module taxel_status_sender #(
       default: begin  // NEXT
         at    <= at + 6'd1;
         state <= letter_last ? IDLE : LOOK;
-        if (!counting && line.kind == ANSWER_OK && at >= 6'd10) line.value <= line.value << 4;
-        if (counting && at >= 6'(NAME)) begin
+        if (in_value) line.value <= line.value << 4;
+        if (in_number) begin
           if (letter != 8'd0) zeros <= 1'b0;
           digits <= digits << 4;
         end
