@@ -101,8 +101,16 @@ def draw_board(browser: Any) -> None:
     ):
         shows(page, "state-word", "^Live$")
         until(lambda: clock(page) > WATCHED_S, "the lanes are full")
-        loaded = page.locator("#force-area")
-        until(lambda: int((loaded.inner_text() or "0").split()[0]) > TOUCHED, "a press")
+        # A press is shorter than the way of a screenshot: the page itself stops at it.
+        page.wait_for_function(
+            """(touched) => {
+                const pressed = parseInt(document.getElementById("force-area").textContent) > touched;
+                if (pressed) document.getElementById("play").click();
+                return pressed;
+            }""",
+            arg=TOUCHED,
+        )
+        page.wait_for_timeout(500)
         save(page, "start-board")
 
 
