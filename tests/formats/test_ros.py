@@ -298,7 +298,7 @@ def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "error", "said"),
     [
-        ({}, FormatError, "say what to open of it: --topic NAME --field NAME"),
+        ({}, FormatError, "say what to open of it: --topic NAME .*; taxel info .*grasp.* lists its topics"),
         ({"topic": "/foot"}, FormatError, "has no topic /foot; its topics are /hand, /palm"),
         ({"topic": "/hand"}, FormatError, "topic /hand: say which field .*; there are thumb, index"),
         ({"topic": "/palm", "field": "thumb"}, FormatError, "field thumb: no field with numbers; there are taxels"),
