@@ -33,7 +33,7 @@ SHOWN = {
     "start-board": (["ball.mcap"], "touch.json"),
     "start-insole": (["walk.npz"], "gait.json"),
     "start-nothing": (["disc.npz"], ""),
-    "start-plate": (["plate.npz"], "touch.json"),
+    "start-plate": (["plate.npz"], "plate.json"),
     "start-robot": (["grasps", "--topic", "/finger", "--field", "data", "--array", "8x8"], "grasp.json"),
 }
 #: Loaded taxels from which on the board is drawn.
@@ -78,8 +78,8 @@ def draw_recording(browser: Any, name: str, picture: str) -> None:
     """Draw a page's recording with its labels and what its readout detects."""
     (file, *options), readout = SHOWN[name]
     place = Path(file)
-    if Path("labels.csv").exists():
-        shutil.copy("labels.csv", place.with_suffix(".notes.csv"))
+    for labels in Path().glob("*labels.csv"):
+        shutil.copy(labels, place.with_suffix(".notes.csv"))
     with seen(browser, Path.cwd(), "view", file, *options, "--no-open") as page:
         shows(page, "state-word", "^Replay$")
         if readout:
@@ -97,12 +97,20 @@ def draw_board(browser: Any) -> None:
     port = str(shell.port)
     with (
         seen(browser, Path.cwd(), "live", "--panel", "--host", "127.0.0.1", "--port", port) as page,
-        running("emulate", "--port", port, "--seed", "1", folder=Path.cwd()),
+        running("emulate", "--port", port, "--wire", "2", "--seed", "1", folder=Path.cwd()),
     ):
         shows(page, "state-word", "^Live$")
         until(lambda: clock(page) > WATCHED_S, "the lanes are full")
-        loaded = page.locator("#force-area")
-        until(lambda: int((loaded.inner_text() or "0").split()[0]) > TOUCHED, "a press")
+        # A press is shorter than the way of a screenshot: the page itself stops at it.
+        page.wait_for_function(
+            """(touched) => {
+                const pressed = parseInt(document.getElementById("force-area").textContent) > touched;
+                if (pressed) document.getElementById("play").click();
+                return pressed;
+            }""",
+            arg=TOUCHED,
+        )
+        page.wait_for_timeout(500)
         save(page, "start-board")
 
 

@@ -207,7 +207,10 @@ def _maps(pid: int) -> str:
 
 def test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work(capsys) -> None:
     code, out, _ = call(capsys, "--help")
-    lines = dict(line.split(maxsplit=1) for line in out.partition("Commands:\n")[2].splitlines())
+    listed, _, epilog = out.partition("Commands:\n")[2].partition("\n\n")
+    assert "Begin with: taxel demo" in epilog
+    assert "docs/start.md" in epilog
+    lines = dict(line.split(maxsplit=1) for line in listed.splitlines())
     assert code == 0
     assert {*lines} == {*OWN, *ADDED}
     assert {name: text for name, text in lines.items() if len(text) > 60 or not text.endswith(".")} == {}

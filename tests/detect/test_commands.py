@@ -334,7 +334,7 @@ def test_labels_that_lie_outside_are_left_out_and_said(folder: Path, trained: Pa
     assert (code, json.loads(out)["score"]["missed"]) == (0, 0)
     assert f"1 of the 13 events of {late} left out: outside {folder / '9.npz'}" in error
     late.write_text("label,t_us\ncontact,3600000000\n")
-    assert "holds 1 event, none within" in call(capsys, *arguments, late)[2]
+    assert "holds 1 event (3600.000 s), none within" in call(capsys, *arguments, late)[2]
 
 
 @pytest.mark.parametrize(

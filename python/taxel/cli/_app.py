@@ -110,6 +110,7 @@ app = App(
     cls=WithAdded,
     help="Touch as events: from the bytes of a tactile array to detections with exact times.",
     no_args_is_help=True,
+    epilog="Begin with: taxel demo. Pages by what you have are in docs/ of the repository, from docs/start.md on.",
 )
 
 

@@ -335,7 +335,9 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
         )
     inside = _inside(events, recording, str(table.path))
     if any(map(len, events.values())) and not any(map(len, inside.values())):
-        held = f"{option} {table.path}: holds {counted(sum(map(len, events.values())), 'event')}"
+        times = np.concatenate(list(events.values()))
+        ends = " to ".join(f"{t / 1e6:.3f}" for t in np.unique([times.min(), times.max()]))
+        held = f"{option} {table.path}: holds {counted(len(times), 'event')} ({ends} s)"
         raise ProblemError(f"{held}, none within {_span(recording)}")
     return inside
 

@@ -92,7 +92,7 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     if not topics.topic:
         raise FormatError(
             f"{path}: a ROS bag; say what to open of it: --topic NAME --field NAME (topic=, field=), or [ros] in a "
-            "layout file; taxel info lists its topics"
+            f"layout file; taxel info {path} lists its topics"
         )
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
     sources: dict[str, Contents] = {}
