@@ -181,7 +181,7 @@ def test_three_processes_lose_nothing_and_a_killed_one_comes_back(tmp_path, plac
     # the board's own sequence.
     assert summary.counters["bridged"]["missing"] == 0
     assert summary.counters["wire_v2"]["missing"] > 0
-    assert "began anew 1 times" in summary.verdict
+    assert "began anew 1 time" in summary.verdict
     recording = taxel.open(tmp_path / "far.mcap")
     assert (np.diff(recording.events.t) >= 0).all()
 

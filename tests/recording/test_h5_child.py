@@ -139,6 +139,24 @@ def test_a_damaged_file_is_one_error_or_reads(tmp_path: Path) -> None:
             taxel.open(path)
 
 
+def test_a_flipped_bit_of_the_values_is_told(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    taxel.convert(some_events(3000), path)
+    with h5py.File(path) as file:
+        chunks = [file[name].id.get_chunk_info(0) for name in file if file[name].chunks and file[name].size]
+    whole, draw = path.read_bytes(), np.random.default_rng(5)
+    assert len(chunks) >= 4
+    for chunk in chunks:
+        data = bytearray(whole)
+        data[chunk.byte_offset + int(draw.integers(chunk.size))] ^= 1 << int(draw.integers(8))
+        path.write_bytes(bytes(data))
+        with pytest.raises(FormatError, match=r"a\.h5") as raised:
+            taxel.open(path)
+        # What the memory of a failed read still holds is no cause.
+        assert "exported pointers" not in str(raised.value)
+
+
 def test_the_library_is_not_asked_whose_a_file_without_our_name_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     h5py = pytest.importorskip("h5py")
     taxel.convert(some_events(), tmp_path / "ours.h5")

@@ -102,7 +102,7 @@ def test_each_source_is_a_recording_that_holds_what_was_sent(several: tuple[Path
     assert not imu.has_events
     assert imu.columns == ["ax", "ay"]
     assert imu.counts["lines_that_could_not_be_read"] == 1
-    assert "1 lines that could not be read" in imu.verdict
+    assert "1 line that could not be read" in imu.verdict
     frames = imu.frames()
     np.testing.assert_array_equal(frames.t, np.arange(50) * 10_000)
     np.testing.assert_array_equal(frames.values[:, 0, 0], np.arange(50, dtype=np.float32) / 8)

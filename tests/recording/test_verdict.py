@@ -25,11 +25,12 @@ def of_counts(counts: dict[str, object]) -> str:
 
 
 def wordings() -> list[re.Pattern[str]]:
-    """The wordings of the page's table: N stands for a number, WHAT for anything."""
+    """The wordings of the page's table: N stands for a number, of 1 with its noun in the singular, WHAT for anything."""
     table = PAGE.read_text().partition("A verdict, here, of")[2].partition("Of several sources")[0]
     rows = re.findall(r"^\| `(.+?)` \|", table, re.MULTILINE)
     assert len(rows) > 8
-    known = [re.escape(row).replace("WHAT", ".+").replace(r"N\ ", r"\d+ ") for row in rows]
+    numbered = [re.sub(r"N\\ (\w+)s\b", r"(?:(?!1 )\\d+ \1s|1 \1)", re.escape(row)) for row in rows]
+    known = [row.replace("WHAT", ".+").replace(r"N\ ", r"\d+ ") for row in numbered]
     return [re.compile(row) for row in [*known, "no counts were saved yet"]]
 
 

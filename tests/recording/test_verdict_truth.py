@@ -340,6 +340,7 @@ def test_a_lsa_without_its_lss_is_unfinished_and_with_damage_still(tmp_path: Pat
             "complete after arrival",
         ),
         ("nothing lost; 1 resets of the board", "complete after arrival"),
+        ("nothing lost; 1 reset of the board", "complete after arrival"),
         ("the .csv does not say what was lost", "unknown"),
         ("nothing lost; in the bytes that came: 3 bytes skipped", "damaged"),
         ("damage in the file: 1 bad chunk skipped; while recording: nothing lost", "damaged"),
@@ -356,12 +357,31 @@ def test_the_line_of_an_earlier_version_has_a_status(line: str, status: str) -> 
     assert verdict == line.rpartition("says: ")[2]
 
 
+@pytest.mark.parametrize(
+    ("decoder", "words"),
+    [
+        (
+            {"short_events": 1, "unpaired_intensities": 1, "outside_the_array": 1},
+            "1 outside the array, 1 short event, 1 unpaired intensity",
+        ),
+        ({"short_events": 2, "unpaired_intensities": 2}, "2 short events, 2 unpaired intensities"),
+        ({"events_repaired": 1}, "1 value repaired from the board's refresh"),
+        ({"resets": 1}, "1 reset of the board"),
+        ({"times_that_the_board_dropped_events": 1}, "LOST: 1 time that the board dropped events"),
+        ({"jumps_of_time": 1}, "1 jump of time"),
+    ],
+)
+def test_what_there_is_one_of_is_in_the_singular(decoder: dict[str, int], words: str) -> None:
+    assert words in Verdict._of({"counts": {"received": 5, "recorded": 5, "decoder": decoder}})
+
+
 def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
     import copy
     import pickle
 
     verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
-    for again in (copy.deepcopy(verdict), pickle.loads(pickle.dumps(verdict)), Verdict.from_dict(verdict.to_dict())):
+    copies = (copy.deepcopy(verdict), pickle.loads(pickle.dumps(verdict)), Verdict(verdict))
+    for again in (*copies, Verdict.from_dict(verdict.to_dict())):
         assert (again, again.to_dict()) == (verdict, verdict.to_dict())
         assert type(again) is Verdict
     assert json.loads(json.dumps([verdict])) == ["LOST: 2 messages dropped by the kernel"]
@@ -378,6 +398,8 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         {"status": "lost", "text": "", "lost": {"a": True}},
         {"status": "damaged", "text": "", "doubtful_after_us": True},
         {"status": "complete", "text": "nothing lost", "lost": {"lost_on_the_way": 5}},
+        {"status": "complete after arrival", "text": "nothing lost", "damaged": {"bytes_skipped": 1}},
+        {"status": "unknown", "text": "nothing lost", "doubtful_after_us": 5},
         {"status": "complete", "text": "nothing lost", "parts": {"left": {"status": "lost", "text": "LOST"}}},
     ):
         with pytest.raises(taxel.ProblemError, match="verdict"):

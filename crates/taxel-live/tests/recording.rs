@@ -265,7 +265,7 @@ fn the_verdict_states_what_was_lost_where() {
     let lossy = Counts { received: 10, recorded: 6, dropped_by_kernel: 2, dropped_by_queue: 3, ..Counts::default() };
     let verdict = lossy.verdict().text;
     for part in
-        ["LOST: 2 messages dropped by the kernel", "3 datagrams dropped by taxel's queue", "1 datagrams received"]
+        ["LOST: 2 messages dropped by the kernel", "3 datagrams dropped by taxel's queue", "1 datagram received"]
     {
         assert!(verdict.contains(part), "{verdict}");
     }

@@ -94,18 +94,18 @@ def read(data: Any, memory: int, at: int, size: int) -> None:
     import numpy as np  # noqa: PLC0415  h5py has loaded it
 
     if size:
-        with mmap.mmap(memory, at + size) as shared:
-            array = np.frombuffer(shared, data.dtype, data.size, at).reshape(data.shape)
-            if data.ndim == 0:
-                array[()] = data[()]
-            else:
-                # A piece is at least one chunk of the file, as chunks are unpacked whole.
-                rows = max(1, PIECE // max(1, size // len(data)), (data.chunks or (1,))[0])
-                for k in range(0, len(data), rows):
-                    part = np.s_[k : k + rows]
-                    data.read_direct(array, part, part)
-                    send(read=k)
-            del array
+        # It is unmapped with the array's last reference, which an error's traceback may hold.
+        shared = mmap.mmap(memory, at + size)
+        array = np.frombuffer(shared, data.dtype, data.size, at).reshape(data.shape)
+        if data.ndim == 0:
+            array[()] = data[()]
+        else:
+            # A piece is at least one chunk of the file, as chunks are unpacked whole.
+            rows = max(1, PIECE // max(1, size // len(data)), (data.chunks or (1,))[0])
+            for k in range(0, len(data), rows):
+                part = np.s_[k : k + rows]
+                data.read_direct(array, part, part)
+                send(read=k)
     send(done=None)
 
 

@@ -29,7 +29,7 @@ class Verdict(str):
     Parameters
     ----------
     line : str
-        A line that an earlier version wrote: only its status is known, and no numbers.
+        A line that an earlier version wrote: only its status is known, and no numbers. A verdict keeps its numbers.
 
     Raises
     ------
@@ -63,6 +63,8 @@ class Verdict(str):
 
     def __new__(cls, line: str) -> Self:
         """Return the verdict of a line."""
+        if isinstance(line, Verdict):
+            return cls._from(line._held)
         return cls._of({"line": text("line", line)})
 
     @classmethod
@@ -165,8 +167,15 @@ def _stated(held: Any) -> dict[str, Any]:
         or type(own.get(doubtful, None)) not in (int, type(None))
     ):
         raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
-    if own["status"] in STATUSES[: STATUSES.index("lost")] and any(own.get("lost", {}).values()):
-        raise ProblemError(f"verdict: its status is {own['status']}, but its lost is not empty: must be lost, or worse")
+    for name, least in (("lost", "lost"), ("damaged", "damaged")):
+        if STATUSES.index(own["status"]) < STATUSES.index(least) and any(own.get(name, {}).values()):
+            raise ProblemError(
+                f"verdict: its status is {own['status']}, but its {name} is not empty: must be {least}, or worse"
+            )
+    if STATUSES.index(own["status"]) < STATUSES.index("damaged") and own.get(doubtful) is not None:
+        raise ProblemError(
+            f"verdict: its status is {own['status']}, but its times are doubtful: must be damaged, or worse"
+        )
     for name, part in parts.items():
         inner = _stated(part)["status"]
         if STATUSES.index(inner) > STATUSES.index(own["status"]):

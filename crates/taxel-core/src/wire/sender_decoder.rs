@@ -143,7 +143,11 @@ impl SenderDecoder {
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> DatagramInfo {
         let (before, rows) = (self.version, out.len());
         let mut info = DatagramInfo::default();
-        let second = datagram.first() == Some(&v2::MAGIC) && (self.version == 2 || Header::read(datagram).is_ok());
+        // An empty datagram is a short one of version 2, and no words of version 1.
+        let second = match datagram.first() {
+            None => self.version == 2,
+            Some(&first) => first == v2::MAGIC && (self.version == 2 || Header::read(datagram).is_ok()),
+        };
         if second {
             if self.version == 1 {
                 self.change(2, out);

@@ -329,7 +329,7 @@ impl Verdict {
         let mut words = vec![];
         for (n, cause, what) in std::iter::once(board).chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
             verdict.lost.insert(cause.to_owned(), n);
-            words.push(format!("{n} {what}"));
+            words.push(numbered(n, what));
         }
         if words.is_empty() && counts.missing.is_none() && counts.received + counts.recorded == 0 {
             return Self::nothing_arrived("nothing arrived".to_owned());
@@ -355,15 +355,16 @@ impl Verdict {
         ] {
             if n > 0 {
                 verdict.noted.insert(cause.to_owned(), n);
-                pieces.push(format!("{n} {what}"));
+                pieces.push(numbered(n, what));
             }
         }
         if bridged.silences > 0 || bridged.restarts > 0 {
             verdict.noted.insert("silences_of_other_computer".to_owned(), bridged.silences);
             verdict.noted.insert("restarts_of_other_computer".to_owned(), bridged.restarts);
             pieces.push(format!(
-                "the other computer was silent for a second or more {} times, and began anew {} times",
-                bridged.silences, bridged.restarts
+                "the other computer was silent for a second or more {}, and began anew {}",
+                counted(bridged.silences, "time"),
+                counted(bridged.restarts, "time")
             ));
         }
         verdict.text = pieces.join("; ");
@@ -382,7 +383,7 @@ impl Verdict {
         if !self.damaged.is_empty() {
             self.status = self.status.max(Status::Damaged);
         }
-        let words: Vec<String> = found().map(|(cause, n)| format!("{n} {}", cause.replace('_', " "))).collect();
+        let words: Vec<String> = found().map(|(cause, n)| numbered(*n, &cause.replace('_', " "))).collect();
         (!words.is_empty()).then(|| format!("in the bytes that came: {}", words.join(", ")))
     }
 
@@ -564,7 +565,7 @@ impl Verdict {
             Status::Damaged
         } else if has(&["does not say"]) {
             Status::Unknown
-        } else if has(&["nothing lost after arrival", "resets of the board"]) {
+        } else if has(&["nothing lost after arrival", "resets of the board", "reset of the board"]) {
             Status::CompleteAfterArrival
         } else if has(&["nothing lost"]) {
             Status::Complete
@@ -593,7 +594,21 @@ fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64) -> Counts
 
 /// A number and what it counts, in the plural unless it is 1.
 fn counted(n: u64, what: &str) -> String {
-    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+    numbered(n, &format!("{what}s"))
+}
+
+/// A number and what it counts, which is given in the plural: of 1 the first word that ends in s, its noun, is in the singular.
+fn numbered(n: u64, plural: &str) -> String {
+    let mut words: Vec<String> = plural.split(' ').map(str::to_owned).collect();
+    if n == 1
+        && let Some(noun) = words.iter_mut().find(|word| word.ends_with('s'))
+    {
+        *noun = match noun.strip_suffix("ies") {
+            Some(stem) => format!("{stem}y"),
+            None => noun.trim_end_matches('s').to_owned(),
+        };
+    }
+    format!("{n} {}", words.join(" "))
 }
 
 /// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
