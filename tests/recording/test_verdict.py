@@ -25,7 +25,7 @@ def of_counts(counts: dict[str, object]) -> str:
 
 
 def wordings() -> list[re.Pattern[str]]:
-    """The wordings of the page's table: N stands for a number, of 1 with its noun in the singular, WHAT for anything."""
+    """The wordings of the page: N stands for a number, of 1 with its noun in the singular, WHAT for anything."""
     table = PAGE.read_text().partition("A verdict, here, of")[2].partition("Of several sources")[0]
     rows = re.findall(r"^\| `(.+?)` \|", table, re.MULTILINE)
     assert len(rows) > 8
