@@ -73,14 +73,12 @@ def compare(
     numpy: Mapping[str, Callable[[], list[Any]]],
     *,
     quick: bool,
-    goals: Mapping[str, float],
     more: int = 0,
     **facts: Any,
 ) -> dict[str, Any]:
     """Measure an encoder beside NumPy; return seconds, real-time factors and ratios.
 
-    `about` describes the benchmark; `goals`, by name, are in times real time on one core. Our encoder may have `more`
-    spikes, as it holds the last sample for its latency.
+    `about` describes the benchmark. Our encoder may have `more` spikes, as it holds the last sample for its latency.
     """
     for name, baseline in numpy.items():
         mine, theirs = len(ours[name]().times), len(baseline())
@@ -95,8 +93,6 @@ def compare(
         **stamp(),
         "seconds": seconds,
         **facts,
-        "goals, times real time": dict(goals),
-        "reached": {name: bool(results[f"taxel, {name}"]["rate"] >= goal) for name, goal in goals.items()},
         "results": results,
         "ratios": ratios,
         "stable": all(result["stable"] for result in results.values()),

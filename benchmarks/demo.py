@@ -7,13 +7,23 @@ Peer: the plain rule, two loaded taxels. Unit: touches found; ms from the touch 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from _goals import Goal, at_least, at_most
 from _rounds import stamp
 from rich.console import Console
 
 from taxel.demo.showing import show
+
+
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    first = result["neuron"]["classes"]["first impact"]
+    known = {f"first impact, {name}: known, p95, ms": one["known_ms"]["p95"] for name, one in first.items()}
+    found = {f"first impact, {name}: found, of all": one["found"] / one["touches"] for name, one in first.items()}
+    return at_least(dict.fromkeys(found, 1.0), found) + at_most(dict(zip(known, (1.0, 1.5), strict=True)), known)
 
 
 def run(*, quick: bool) -> dict[str, Any]:

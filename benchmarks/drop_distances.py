@@ -12,6 +12,7 @@ equal to rounding.
 import time
 
 import numpy as np
+from _goals import at_most, not_slower
 from _rounds import measure, ratio, stamp
 
 from taxel import Array, SpikeTrains
@@ -80,6 +81,12 @@ def beside_metrics(count):
     )
     off = np.abs(distances["ours"] - distances["theirs"]).max() / distances["theirs"].max()
     return {"patterns": count, "results": results, "largest difference": float(off)}
+
+
+def goals(result):
+    """Return the goals with what a result reached."""
+    apart = {"largest relative difference": result["beside taxel.metrics"]["largest difference"]}
+    return not_slower(result) + at_most(dict.fromkeys(apart, 1e-6), apart)
 
 
 def run(*, quick, share=1.0):

@@ -5,9 +5,11 @@ Peer: the obvious NumPy. Unit: times real time, on one core. Goal: 20.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from _goals import Goal, times_real_time
 from _instructions import beside_avx2
 from _touch import FLOOR, compare, scene
 
@@ -27,6 +29,11 @@ def numpy_change(frames: Frames) -> list[Any]:
     return spikes
 
 
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    return times_real_time({"change events": 20}, result)
+
+
 @beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
@@ -37,4 +44,4 @@ def run(*, quick: bool) -> dict[str, Any]:
         "change events, events": lambda: ChangeEvents(noise_floor=2 * FLOOR).encode(events),
     }
     numpy = {"change events": lambda: numpy_change(ticks)}
-    return compare(__doc__, seconds, ours, numpy, quick=quick, goals={"change events": 20}, events=len(events))
+    return compare(__doc__, seconds, ours, numpy, quick=quick, events=len(events))

@@ -5,9 +5,11 @@ Peer: the obvious NumPy. Unit: times real time, on one core. Goal: 20.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from _goals import Goal, times_real_time
 from _instructions import beside_avx2
 from _touch import FLOOR, compare, loaded, scene
 
@@ -30,6 +32,11 @@ def numpy_area(frames: Frames, tare: Tare) -> list[Any]:
     return spikes
 
 
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    return times_real_time({"contact area": 20}, result)
+
+
 @beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
@@ -40,7 +47,7 @@ def run(*, quick: bool) -> dict[str, Any]:
         "contact area, events": lambda: ContactArea(noise_floor=FLOOR, tare=tare).encode(events),
     }
     numpy = {"contact area": lambda: numpy_area(ticks, tare)}
-    found = compare(__doc__, seconds, ours, numpy, quick=quick, goals={"contact area": 20}, events=len(events))
+    found = compare(__doc__, seconds, ours, numpy, quick=quick, events=len(events))
     rate = found["results"]["taxel, contact area, events"]["rate"]
     found["ratios"]["contact area, million events/s"] = len(events) / seconds * rate / 1e6
     return found

@@ -5,9 +5,11 @@ Peer: the obvious NumPy. Unit: times real time, on one core. Goal: 20; with two 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from _goals import Goal, times_real_time
 from _instructions import beside_avx2
 from _touch import FLOOR, PERIOD_US, compare, scene
 
@@ -58,6 +60,11 @@ def numpy_load(frames: Frames, tare: Tare) -> list[Any]:
     return spikes
 
 
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    return times_real_time({"local load": 20, "local load, two running means": 5}, result)
+
+
 @beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
@@ -72,5 +79,4 @@ def run(*, quick: bool) -> dict[str, Any]:
         "local load, events": lambda: load.encode(events),
     }
     numpy = {"local load": lambda: numpy_load(ticks, tare)}
-    goals = {"local load": 20, "local load, two running means": 5}
-    return compare(__doc__, seconds, ours, numpy, quick=quick, goals=goals, events=len(events))
+    return compare(__doc__, seconds, ours, numpy, quick=quick, events=len(events))

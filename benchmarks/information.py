@@ -24,11 +24,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _goals import Goal, at_most
 from _rounds import stamp
 
 import taxel
@@ -103,6 +105,14 @@ def timed(arguments: list[str]) -> dict[str, Any]:
     cpu = after.children_user + after.children_system - before.children_user - before.children_system
     full = next(line for line in done.stdout.splitlines() if line.startswith("full: "))
     return {"wall_s": wall, "cpu_s": cpu, "found": full}
+
+
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    return at_most(
+        {f"{name}, s": limit for name, limit in GOALS_S.items()},
+        {f"{name}, s": one["wall_s"] for name, one in result["results"].items()},
+    )
 
 
 def run(*, quick: bool) -> dict[str, Any]:

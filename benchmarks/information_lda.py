@@ -15,6 +15,7 @@ import time
 import warnings
 
 import numpy as np
+from _goals import at_least, not_slower
 from _peer import missing
 from _rounds import measure, ratio, stamp
 
@@ -122,6 +123,15 @@ def full_size(share, features=5000):
         "largest_memory_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
         "right": float(np.mean(predicted == y)),
     }
+
+
+def goals(result):
+    """Return the goals with what a result reached."""
+    same = {
+        f"equal predictions, {name}": one.get("equal predictions")
+        for name, one in result["against scikit-learn"].items()
+    }
+    return not_slower(result) + at_least(dict.fromkeys(same, 1.0), same)
 
 
 def run(*, quick, share=1.0):

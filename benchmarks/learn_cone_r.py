@@ -12,6 +12,7 @@ import warnings
 
 import numpy as np
 import scipy.sparse as sp
+from _goals import at_most, not_slower
 from _peer import missing
 from _rounds import measure, ratio, stamp
 
@@ -135,6 +136,12 @@ def whole(cone, pattern, targets):
         stated.objective = problem.solve(solver=cvxpy.CLARABEL, max_threads=1) / scale
 
     return solve, stated
+
+
+def goals(result):
+    """Return the goals with what a result reached."""
+    above = {name: one for name, one in result["objective"].items() if name.startswith("relative difference")}
+    return not_slower(result) + at_most(dict.fromkeys(above, 1e-6), above)
 
 
 def run(*, quick):

@@ -17,6 +17,7 @@ import warnings
 
 import numpy as np
 import scipy.sparse as sp
+from _goals import at_least
 from _peer import ask, kept_of, missing
 from _rounds import WIDEST, measure, stamp
 
@@ -287,6 +288,18 @@ WHY = (
     "out, pricing) and overheads show at small N and N^3 only at large. Rounds hardly grow. "
     "Continuous time has slope rows besides, and finds its cuts between inputs: about as many."
 )
+
+
+def goals(result):
+    """Return the goals with what a result reached."""
+    # A peer that was stopped is at least so many times slower.
+    times = {
+        f"{size}, {peer}, times ConeX": found.get("times ConeX", found.get("times ConeX, at least"))
+        for size, case in result["cases"].items()
+        for peer, found in case.items()
+        if peer in PEERS
+    }
+    return at_least(dict.fromkeys(times, 1.0), times)
 
 
 def run(*, quick):

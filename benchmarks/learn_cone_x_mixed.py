@@ -14,6 +14,7 @@ import time
 import warnings
 
 import numpy as np
+from _goals import at_least
 from _peer import ask, kept_of, missing
 from _rounds import WIDEST, measure, stamp
 
@@ -95,6 +96,18 @@ def case(trains, patterns, lambdas, rounds, *, asked, quick):
         out["CVXPY + Clarabel"] = found
     print(f"{trains}/{patterns} {lambdas}: {out}", file=sys.stderr)
     return out
+
+
+def goals(result):
+    """Return the goals with what a result reached."""
+    # A peer that was stopped is at least so many times slower.
+    times = {
+        f"{size}, times ConeX": found.get("times ConeX", found.get("times ConeX, at least"))
+        for size, case in result["cases"].items()
+        for peer, found in case.items()
+        if peer in PEERS
+    }
+    return at_least(dict.fromkeys(times, 1.0), times)
 
 
 def run(*, quick):

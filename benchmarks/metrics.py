@@ -14,6 +14,7 @@ import time
 import warnings
 
 import numpy as np
+from _goals import at_most, not_slower
 from _peer import missing
 from _rounds import measure, ratio, stamp
 
@@ -152,6 +153,16 @@ def large(*, quick):
             "cpu_minutes for all pairs, scaled": took * whole / pairs,
         }
     return {"matrix": MATRIX, "taxels": TAXELS, "spikes a taxel": SPIKES, "results": found}
+
+
+def goals(result):
+    """Return the goals with what a result reached."""
+    apart = {
+        f"difference, {name}, {spikes}": off
+        for spikes, part in result["against peers"].items()
+        for name, off in part["largest difference"].items()
+    }
+    return not_slower(result) + at_most(dict.fromkeys(apart, 1e-9), apart)
 
 
 def run(*, quick):

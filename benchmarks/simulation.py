@@ -15,19 +15,17 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from _goals import Goal, not_slower
 from _rounds import measure, ratio, stamp
 from numpy.typing import NDArray
 
 import taxel
 from taxel import Neuron, SpikeTrains
-
-#: The goal: at most as long as the peer.
-GOALS = {"taxel, grid / numpy, 1 ms": 1.0, "taxel, continuous / brian2, 1 ms": 1.0}
 
 TAU_MS, THETA, LENGTH_MS = 15.0, 0.3, 1000.0
 
@@ -133,6 +131,11 @@ def snntorch_loop(weights: Weights, trains: SpikeTrains, *, gathered: bool) -> C
     return loop
 
 
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    return not_slower(result, "taxel, grid / numpy, 1 ms", "taxel, continuous / brian2, 1 ms")
+
+
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, ratios, and the number of output spikes of each."""
     neurons, inputs, rounds = (500, 100, 2) if quick else (10_000, 1000, 7)
@@ -193,8 +196,6 @@ def run(*, quick: bool) -> dict[str, Any]:
         "spikes": spikes,
         "set up and compiled, CPU s": setup,
         "left out": absent,
-        "goals": GOALS,
-        "reached": {name: bool(ratios[name] >= goal) for name, goal in GOALS.items() if name in ratios},
         "results": results,
         "ratios": ratios,
         "stable": all(result["stable"] for result in results.values()),

@@ -14,11 +14,12 @@ import ctypes
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _goals import Goal, at_least, not_slower
 from _instructions import beside_avx2
 from _peer import missing
 from _rounds import measure, ratio, stamp
@@ -150,6 +151,13 @@ def evt2(folder: Path, words: int) -> dict[str, Callable[[], Any]]:
             len(chunk)
 
     return runs | {"expelliarmus, EVT2": by_expelliarmus}
+
+
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    plain = [name for name in result["ratios"] if " / " in name and "fresh" not in name]
+    twice = {"AVX2: taxel, mix, warm / C loop, mix, warm": 2.0}
+    return not_slower(result, *(name for name in plain if name not in twice)) + at_least(twice, result["ratios"])
 
 
 @beside_avx2

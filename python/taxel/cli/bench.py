@@ -21,12 +21,14 @@ from taxel._base.provenance import Sources, installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
 
-__all__ = ["bench", "doubts_of", "goals_of", "stale_results"]
+__all__ = ["bench", "doubts_of", "stale_results"]
 
 #: Set by --peers: benchmarks then wait for peers that need minutes (benchmarks/_peer.py).
 _PATIENT = "TAXEL_BENCH_PEERS"
 #: How the parts of a result begin that are compiled.
 _COMPILED = "taxel._core."
+#: The share of all cores that other programs may use while times are measured.
+_BUSY = 0.1
 
 
 @app.command()
@@ -65,8 +67,10 @@ def bench(
     if stale:
         _list_stale(folder, files, names)
         return
+    # The modules that benchmarks share lie in the same folder; their names begin with an underscore.
+    sys.path.insert(0, str(folder.resolve()))
     if goals:
-        _list_goals(folder, names)
+        _list_goals(folder, files, names)
         return
     changed = [] if quick else _changed(folder)
     if changed:
@@ -74,14 +78,13 @@ def bench(
             f"{', '.join(changed[:3])}{' ...' * (len(changed) > 3)}: changed since the last commit, "
             "which a result names; commit first, or give --quick"
         )
-    # The modules that benchmarks share lie in the same folder; their names begin with an underscore.
-    sys.path.insert(0, str(folder.resolve()))
     if peers:
         os.environ[_PATIENT] = "1"
     for stem in names:
-        begun = time.monotonic()
-        result = _load(files[stem]).run(quick=quick)
+        begun, others, benchmark = time.monotonic(), _Others(), _load(files[stem])
+        result = benchmark.run(quick=quick)
         result["took_s"] = round(time.monotonic() - begun, 1)
+        result["machine"]["others"] = others.cores()
         if not quick:
             result["made_of"] = _sources(folder).parts(stem)
             place = folder / "results" / f"{stem}.json"
@@ -93,7 +96,7 @@ def bench(
         if as_json:
             typer.echo(json.dumps(result))
         else:
-            typer.echo(_table(stem, result))
+            typer.echo(_table(stem, result, benchmark.goals(result)))
 
 
 def _sources(folder: Path) -> Sources:
@@ -127,24 +130,26 @@ def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
     typer.echo(f"{counted(len(stale), 'stale result')} of {len(files)}" if stale else "no result is stale")
 
 
-def goals_of(result: Mapping[str, Any]) -> dict[str, bool]:
-    """Return the goals that a result states, and whether each is reached."""
-    goals, ratios = result.get("goals", {}), result.get("ratios", {})
-    stated = {name: goal if isinstance(goal, bool) else ratios.get(name, 0.0) >= goal for name, goal in goals.items()}
-    stated |= result.get("reached", {})
-    return {name: bool(reached) for name, reached in stated.items()}
-
-
 def doubts_of(result: Mapping[str, Any]) -> list[str]:
     """Return what speaks against the times of a result: other programs, other days, times that vary."""
     machine, kept = result.get("machine", {}), result.get("kept", {})
-    load, cores = machine.get("load", 0.0), machine.get("cores", 1)
-    doubts = [f"load {load:.1f} on {counted(cores, 'core')}"] * (load > cores + 1)
+    others, cores = machine.get("others", 0.0) or 0.0, machine.get("cores", 1)
+    doubts = [f"other programs used {others:.1f} of {counted(cores, 'core')}"] * (others > _BUSY * cores)
     doubts += [f"{counted(len(kept), 'time')} of peers of another day"] * bool(kept)
-    return doubts + ["times vary by more than 15 %"] * (result.get("stable") is False)
+    # With AVX2 alone a row has the same name.
+    vary = list(dict.fromkeys(name for name, one in _measured(result) if one.get("stable") is False))
+    more = f" and {len(vary) - 2} more" * (len(vary) > 2)
+    return doubts + [f"times vary by more than 15 %: {'; '.join(vary[:2])}{more}"] * bool(vary)
 
 
-def _list_goals(folder: Path, names: Sequence[str]) -> None:
+def _measured(part: Mapping[str, Any], name: str = "result") -> list[tuple[str, Mapping[str, Any]]]:
+    """Return the measured rows within a result, by their names."""
+    rows = [(name, part)] if "cpu_s" in part else []
+    inner = ((key, one) for key, one in part.items() if isinstance(one, dict))
+    return rows + [row for key, one in inner for row in _measured(one, key)]
+
+
+def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
     missed = total = 0
     for name in names:
         place = folder / "results" / f"{name}.json"
@@ -152,15 +157,40 @@ def _list_goals(folder: Path, names: Sequence[str]) -> None:
             typer.echo(f"{name}: no result")
             continue
         result = json.loads(place.read_text(encoding="utf-8"))
-        goals = goals_of(result)
-        lacks = [goal for goal, reached in goals.items() if not reached]
+        goals = _load(files[name]).goals(result)
+        lacks = [goal for goal in goals if not goal.reached]
         missed, total = missed + len(lacks), total + len(goals)
-        said = f"{len(goals) - len(lacks)} of {counted(len(goals), 'goal')} reached" if goals else "no goal stated"
         doubts = "".join(f"; {doubt}" for doubt in doubts_of(result))
-        typer.echo(f"{name}, commit {result.get('commit', 'unknown')}: {said}{doubts}")
+        reached = f"{len(goals) - len(lacks)} of {counted(len(goals), 'goal')} reached"
+        typer.echo(f"{name}, commit {result.get('commit', 'unknown')}: {reached}{doubts}")
         for goal in lacks:
             typer.echo(f"  not reached: {goal}")
     typer.echo(f"{total - missed} of {counted(total, 'goal')} reached")
+
+
+class _Others:
+    """How many cores other programs use, from here on; on Linux, else None."""
+
+    def __init__(self) -> None:
+        self._begun, self._before = time.monotonic(), self._used()
+
+    def cores(self) -> float | None:
+        """Return the mean number since the beginning."""
+        used = self._used()
+        if used is None or self._before is None:
+            return None
+        return max(0.0, (used - self._before) / (time.monotonic() - self._begun))
+
+    @staticmethod
+    def _used() -> float | None:
+        """Return the CPU time of this computer less that of this process and its ended children, s."""
+        try:
+            line = Path("/proc/stat").read_text(encoding="ascii").splitlines()[0]
+        except OSError:
+            return None
+        # user, nice, system, -, -, interrupts, soft interrupts, stolen by another virtual machine: proc(5)
+        busy = sum(int(line.split()[1 + k]) for k in (0, 1, 2, 5, 6, 7)) / os.sysconf("SC_CLK_TCK")
+        return busy - sum(os.times()[:4])
 
 
 def _changed(folder: Path) -> list[str]:
@@ -185,12 +215,13 @@ def _load(path: Path) -> Any:
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # as an import does: a dataclass looks its module up
     spec.loader.exec_module(module)
-    if not hasattr(module, "run"):
-        raise ProblemError(f"{path}: defines no run(quick=...)")
+    for name, arguments in (("run", "quick=..."), ("goals", "result")):
+        if not hasattr(module, name):
+            raise ProblemError(f"{path}: defines no {name}({arguments})")
     return module
 
 
-def _table(stem: str, result: dict[str, Any]) -> str:
+def _table(stem: str, result: dict[str, Any], goals: Sequence[Any]) -> str:
     ratios = result.get("ratios", {})
     rows = [
         f"  {key}: {value:.3g}" if isinstance(value, float) else f"  {key}: {value}" for key, value in ratios.items()
@@ -198,4 +229,6 @@ def _table(stem: str, result: dict[str, Any]) -> str:
     left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
     saved = [f"  saved, not measured in this run: {peer}: of {when}" for peer, when in result.get("kept", {}).items()]
     head = f"{stem}: ratios (ours over the peer's, above 1 is faster); {result['took_s']:g} s"
-    return "\n".join([head, *rows, *left_out, *saved])
+    lacks = [f"  not reached: {goal}" for goal in goals if not goal.reached]
+    doubts = [f"  {doubt}" for doubt in doubts_of(result)]
+    return "\n".join([head, *rows, *left_out, *saved, *lacks, *doubts])
