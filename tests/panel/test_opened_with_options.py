@@ -61,6 +61,25 @@ def test_a_bag_is_walked_to_the_page_by_the_options_of_its_topic(name, tmp_path)
     assert [note.t for note in taxel.open(bag, topic="/palm").notes] == [t + 200_000]
 
 
+def test_the_command_that_trains_in_a_shell_has_the_options_and_quotes_what_needs_it(tmp_path):
+    folder = tmp_path / "two words"
+    folder.mkdir()
+    palms(folder, "grasp one.bag")
+    with viewed(tmp_path, "two words/grasp one.bag", "--topic", "/palm", "--array", "24x32") as page:
+        assert opened(page, "grasp one.bag")["train"] == (
+            "taxel train 'two words/grasp one.bag' --labels notes -o 'two words/grasp one.readout.json'"
+            " --array 24x32 --topic /palm"
+        )
+    with viewed(folder, "grasp one.bag", "--topic", "/palm", "--array", "24x32") as page:
+        assert opened(page, "grasp one.bag")["train"].startswith("taxel train 'grasp one.bag' --labels notes ")
+    shown = tmp_path / "elsewhere.npz"
+    taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="N", array=Array(3, 2)), shown)
+    with viewed(folder, shown) as page:
+        assert opened(page, shown.name)["train"] == (
+            f"taxel train {shown} --labels notes -o {tmp_path / 'elsewhere.readout.json'}"
+        )
+
+
 def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
     bag, _ = palms(tmp_path, "grasp.bag")
     opened_as, joined = [], FileOptions.joined

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +123,14 @@ def test_play_label_train_and_watch_the_new_readout(
         heard = [(float(t), label) for label, t, *_ in found]
         missed = [(t, label) for t, label in wanted if not any(abs(t - s) < 0.05 and label == of for s, of in heard)]
         assert (missed, len(heard) - len(wanted)) in (([], 0), ([], extra))
+        command = page.locator("#train-command").inner_text()
         low = page.locator("#detection-list").bounding_box()
         assert low["y"] + 40 < 900, "detections are in sight"
-    assert taxel.Readout.load(tmp_path / "played.readout.json").labels == ("contact", "lift")
+    trained = tmp_path / "played.readout.json"
+    assert taxel.Readout.load(trained).labels == ("contact", "lift")
+    # What the page says for a shell trains the same.
+    before = trained.read_bytes()
+    trained.unlink()
+    _, *words = shlex.split(command)
+    subprocess.run([sys.executable, "-m", "taxel", *words], cwd=tmp_path, check=True, capture_output=True)
+    assert trained.read_bytes() == before

@@ -404,3 +404,19 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
     ):
         with pytest.raises(taxel.ProblemError, match="verdict"):
             Verdict.from_dict(nonsense)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("appended", [1, 100, "recording"])
+def test_what_stands_behind_the_end_of_a_file_is_told(tmp_path: Path, appended: int | str) -> None:
+    whole, longer = tmp_path / "whole.mcap", tmp_path / "longer.mcap"
+    record(whole, some_events(3000))
+    data = whole.read_bytes()
+    more = data if appended == "recording" else bytes(int(appended))
+    longer.write_bytes(data + more)
+    assert taxel.open(whole).verdict.damaged == {}
+    recording = taxel.open(longer)
+    assert len(recording.events) == 3000
+    assert recording.verdict.damaged == {"bytes_after_end": len(more)}
+    assert recording.verdict.status == "damaged"
+    bytes_ = "1 byte" if len(more) == 1 else f"{len(more)} bytes"
+    assert recording.verdict.startswith(f"damage in the file: {bytes_} behind its end not read; while recording: ")

@@ -156,6 +156,9 @@ pub trait RequestHandler: Send + Sync {
     /// Trains a readout on the labels of a recording, writes it to `out`, and returns how well it detects, in words.
     fn train(&self, recording: &Path, out: &Path) -> Reply<String>;
 
+    /// Returns what does the same in a shell.
+    fn train_command(&self, recording: &Path, out: &Path) -> Reply<String>;
+
     /// Ends the training that runs.
     fn end_training(&self) -> Reply<()>;
 

@@ -86,8 +86,8 @@ impl Indexed {
         })
     }
 
-    /// The `opened` message; `bytes` is the size of the file.
-    pub(super) fn opened(&self, name: &str, bytes: u64, begun: Instant) -> Value {
+    /// The `opened` message; `bytes` is the size of the file, `train` the command that trains on its labels.
+    pub(super) fn opened(&self, name: &str, bytes: u64, train: &str, begun: Instant) -> Value {
         let index = self.index();
         let range = index.range();
         // The end of the column, which has all of its force.
@@ -106,6 +106,7 @@ impl Indexed {
             "stop_us": range.map(|(_, last)| last),
             "touch_us": touch_us,
             "bytes": bytes,
+            "train": train,
             "index_ms": begun.elapsed().as_secs_f64() * 1e3,
         });
         let (remarks, more) = match self {

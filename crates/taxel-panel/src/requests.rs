@@ -245,11 +245,16 @@ async fn change_label(hub: &Hub, shown: Option<&Shown>, change: LabelChange) -> 
 /// Trains a readout on the labels of the recording that is shown.
 async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
     let name = &shown.ok_or("train: open a recording with labels first")?.name;
-    let readout = format!("{}.readout.json", name.rsplit_once('.').map_or(&**name, |(stem, _)| stem));
+    let readout = readout_of(name);
     let (recording, out) = (hub.folder.file(name)?, hub.folder.file(&readout)?);
     let text = hub.ask(move |handler| handler.train(&recording, &out)).await?;
     hub.clients.send_json(&hub.recordings_message().await);
     Ok(json!({ "type": "trained", "name": name, "readout": readout, "text": text }))
+}
+
+/// The name of the readout that is trained on a recording.
+pub(super) fn readout_of(recording: &str) -> String {
+    format!("{}.readout.json", recording.rsplit_once('.').map_or(recording, |(stem, _)| stem))
 }
 
 /// Runs a readout: on the recording that is shown, or on the live source from now on.

@@ -193,7 +193,6 @@ export class Labels {
     const place = table ? `Saved in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
     write(part("label-place", HTMLElement), place);
     part("train-line", HTMLElement).hidden = !labels.length;
-    if (this.file) write(part("train-command", HTMLElement), `taxel train ${this.file} --labels notes -o ${this.file.replace(/\.[^.]+$/, "")}.readout.json`);
     const list = part("label-list", HTMLElement);
     // A row in which a person types stays what it is.
     const typing = list.contains(document.activeElement) ? document.activeElement?.closest("li")?.dataset.id : undefined;

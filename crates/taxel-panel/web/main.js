@@ -386,7 +386,7 @@ function open(message) {
     // It opens on something: the first touch.
     if (message.touch_us !== null) player.seek(message.touch_us);
   }
-  training.choose(message.name);
+  training.choose(message.name, message.train);
   board.array = message.array;
   const noisy = message.pictures?.flickering ?? [];
   maps.flickering = noisy.length;

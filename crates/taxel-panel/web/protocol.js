@@ -34,7 +34,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ t_us: number | null, text: string, source: string }} RecordedNote
  * @typedef {{ type: "loading", name: string, share: number }} Loading
  * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null,
- *   touch_us: number | null, events: number, bytes: number, pictures: Pictures | null,
+ *   touch_us: number | null, events: number, bytes: number, train: string, pictures: Pictures | null,
  *   verdict: string, unfinished: boolean, pace: Pace | null, registers: Record<string, number | boolean> | null,
  *   frame_us: number | null, markers: { t_us: number, start: boolean }[],
  *   notes: RecordedNote[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened

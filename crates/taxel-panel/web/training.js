@@ -70,8 +70,10 @@ export class Training {
     this.show();
   }
 
-  /** @param {string | null} source a recording, or null: the live source */
-  choose(source) {
+  /** @param {string | null} source a recording, or null: the live source @param {string} [command] what trains on it in a shell */
+  choose(source, command = "") {
+    part("train-shell", HTMLElement).hidden = !command;
+    write(part("train-command", HTMLElement), command);
     if (source === this.source) return;
     this.source = source;
     this.readout.value = "";

@@ -125,6 +125,10 @@ impl RequestHandler for PythonHandler {
         self.call(|handler| handler.call_method1("train", (recording, out))?.extract())
     }
 
+    fn train_command(&self, recording: &Path, out: &Path) -> Reply<String> {
+        self.call(|handler| handler.call_method1("train_command", (recording, out))?.extract())
+    }
+
     fn end_training(&self) -> Reply<()> {
         self.call(|handler| handler.call_method0("end_training").map(drop))
     }

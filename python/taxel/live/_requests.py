@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import json
 import os
+import shlex
 import socket
 import struct
 import subprocess
@@ -254,8 +255,7 @@ class RequestHandler:
 
     def train(self, recording: Path, out: Path) -> str:
         """Train a readout on the labels of a recording, as ``taxel train`` does; return what it prints."""
-        command = [sys.executable, "-m", "taxel", "train", str(recording), "--labels", "notes", "-o", str(out)]
-        command += self._opening.options_of(recording)
+        command = [sys.executable, "-m", "taxel", *self._training_words(recording, recording, out)]
         with self._training_lock:
             if self._training is not None:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
@@ -274,6 +274,17 @@ class RequestHandler:
             lines = [line for line in errors.splitlines() if line.strip()]
             raise ProblemError(lines[-1].removeprefix("taxel: ") if lines else f"the training ended with code {code}")
         return printed.strip()
+
+    def train_command(self, recording: Path, out: Path) -> str:
+        """Return the command that trains the same in a shell, in the folder where taxel was started."""
+        here = Path.cwd()
+        near = (path.relative_to(here) if path.is_relative_to(here) else path for path in (recording, out))
+        return shlex.join(["taxel", *self._training_words(recording, *near)])
+
+    def _training_words(self, recording: Path, named: Path, out: Path) -> list[str]:
+        """Return the words of a training on a recording, which they name as they are told."""
+        options = self._opening.options_of(recording)
+        return ["train", str(named), "--labels", "notes", "-o", str(out), *options]
 
     def end_training(self) -> None:
         """End the training that runs, if one does."""

@@ -94,6 +94,11 @@ impl Decoder {
         }
     }
 
+    /// Whether intensities are values, not differences.
+    pub(super) fn has_values(&self) -> bool {
+        self.held.is_none()
+    }
+
     /// Each taxel's current value, by index; none if it is unknown, and always none if intensities are values.
     #[must_use]
     pub fn held(&self) -> Vec<Option<u16>> {

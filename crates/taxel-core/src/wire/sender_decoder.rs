@@ -162,7 +162,7 @@ impl SenderDecoder {
             if self.version == 2 {
                 self.change(1, out);
             }
-            self.repeated += u64::from(self.recent.repeats(datagram, arrived, &self.array));
+            self.repeated += u64::from(self.recent.repeats(datagram, arrived, &self.array, self.one.has_values()));
             let rows = out.len();
             let markers = out.markers.len();
             let before = self.one.times();

@@ -228,7 +228,7 @@ impl Reader {
         };
         let mut unread = unread.clone();
         if let Some((0, indexed)) = self.blocks.skipped.first() {
-            unread.add(&self.listed(&Place::default(), indexed, &Indexed::new()));
+            unread.add(&self.listed(&Place::default(), indexed.as_ref(), &Indexed::new()));
         }
         let (mut lost, mut repeated) = (BTreeMap::new(), 0);
         for topic in Topic::ALL.into_iter().filter(|topic| topic.lost_in_file().is_some()) {
@@ -257,10 +257,10 @@ impl Reader {
         }
     }
 
-    /// The messages of this source that message indexes list beyond those that were read.
-    fn listed(&self, place: &Place, indexed: &Indexed, read: &Indexed) -> Unread {
+    /// The messages of this source that message indexes list beyond those that were read; not known without such indexes.
+    fn listed(&self, place: &Place, indexed: Option<&Indexed>, read: &Indexed) -> Unread {
         let mut unread = Unread { unknown: true, ..Unread::default() };
-        for (channel, n) in indexed {
+        for (channel, n) in indexed.into_iter().flatten() {
             let n = n.saturating_sub(read.get(channel).copied().unwrap_or(0));
             unread.unknown &= n == 0;
             if let Some(topic) = self.topic(place, *channel).filter(|_| n > 0) {
@@ -351,10 +351,10 @@ impl Reader {
             return Err(wrong);
         }
         let mut unread = match (skipped, sound) {
-            (Ok(k), _) => self.listed(place, &self.blocks.skipped[k].1, &read),
+            (Ok(k), _) => self.listed(place, self.blocks.skipped[k].1.as_ref(), &read),
             (Err(_), true) => Unread::default(),
             (Err(_), false) => match self.blocks.indexed(block)? {
-                Some(indexed) => Unread { unknown: false, ..self.listed(place, &indexed, &read) },
+                Some(indexed) => Unread { unknown: false, ..self.listed(place, Some(&indexed), &read) },
                 None => Unread { unknown: true, ..Unread::default() },
             },
         };

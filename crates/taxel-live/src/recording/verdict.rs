@@ -143,6 +143,8 @@ pub struct Rebuilt {
     pub unfinished: bool,
     /// Number of bytes of an incomplete record at the end of the file.
     pub torn_bytes: u64,
+    /// Number of bytes behind the end of a whole file.
+    pub bytes_after_end: u64,
     /// Number of places where the walk met an invalid record and resynchronised.
     pub gaps: u64,
     /// Number of bytes skipped there.
@@ -438,6 +440,11 @@ impl Verdict {
                 ),
             ),
             (rebuilt.torn_bytes, "torn_bytes", format!("{} at the end", counted(rebuilt.torn_bytes, "torn byte"))),
+            (
+                rebuilt.bytes_after_end,
+                "bytes_after_end",
+                format!("{} behind its end not read", counted(rebuilt.bytes_after_end, "byte")),
+            ),
             (repeated, "repeated_in_file", format!("{} there twice", counted(repeated, "message"))),
             (rebuilt.no_summary.into(), "no_summary", "the summary at the end missing or damaged".to_owned()),
         ] {
@@ -461,9 +468,9 @@ impl Verdict {
             bad.push("what else was there is not known".to_owned());
         }
         let whole = why.is_none() || rebuilt.no_end;
-        if !whole && verdict.status == Status::NothingArrived {
-            // It may have come after what is left of the file.
-            verdict.status = Status::Unfinished;
+        if (why.is_some() || lost_here) && verdict.status == Status::NothingArrived {
+            // It may have come after what is left of the file, or is lost there.
+            verdict.status = Status::Complete;
         }
         if !bad.is_empty() || rebuilt.no_end {
             verdict.status = verdict.status.max(Status::Damaged);

@@ -20,6 +20,7 @@ use crate::opening;
 use crate::picture::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::player::{Player, ViewOptions};
 use crate::request::{Answer, Refusal, Request, taxel};
+use crate::requests::readout_of;
 use crate::requests::{Shown, read_labels};
 use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
 
@@ -506,7 +507,10 @@ impl Viewport {
         let indexed = opening::index(hub, &name, trial.as_deref()).await.map_err(refused)?;
         let labels = read_labels(hub, &name, indexed.us()).await;
         let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;
-        let mut answer = vec![indexed.opened(&name, bytes, begun)];
+        let (file, out) =
+            (hub.folder.file(&name).map_err(refused)?, hub.folder.file(&readout_of(&name)).map_err(refused)?);
+        let train = hub.ask(move |handler| handler.train_command(&file, &out)).await?;
+        let mut answer = vec![indexed.opened(&name, bytes, &train, begun)];
         let index = indexed.index();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
         (self.recording, self.window_us) = (Some(Shown { name: name.clone(), trial, indexed }), None);

@@ -1,10 +1,14 @@
 //! Tells datagrams of version 1 that come again, as a network may deliver one twice.
 //!
 //! Version 1 does not number its datagrams, but a board's stamps never step back: after a datagram with events at two times,
-//! or more, the next one begins no earlier than it ended. One that begins and ends as it did, and is as long, is the same
-//! one. Datagrams with events at one time only may legitimately equal each other, where two frames fall into one stamp.
+//! or more, the next one begins no earlier than it ended, so that an equal one is the same one. Datagrams with events at one
+//! time only may legitimately equal each other, where two frames fall into one stamp; not those whose events all have values,
+//! if no event of their taxels came since: a board sends a value only where it is not the one it sent last.
+
+use std::collections::VecDeque;
 
 use crate::Array;
+use crate::Events;
 use crate::wire::silence::silence;
 use crate::wire::{Pairing, decode};
 
@@ -14,38 +18,48 @@ const DATAGRAMS: usize = 8;
 /// Stamps come again after 6.5536 s: what arrives later than this, us, is another datagram.
 const WITHIN_US: i64 = 3_000_000;
 
-/// First and last eight bytes, and the length.
-type Seen = ([u8; 8], [u8; 8], usize);
-
-/// The last datagrams.
+/// The last datagrams, the latest first, each with the time of its arrival.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Recent {
-    /// Each with the time of its arrival.
-    datagrams: [(Seen, Option<i64>); DATAGRAMS],
-    next: usize,
-}
+pub(super) struct Recent(VecDeque<(Vec<u8>, Option<i64>)>);
 
 impl Recent {
-    /// Adds a datagram; returns whether it was received before.
-    pub(super) fn repeats(&mut self, datagram: &[u8], arrived: Option<i64>, array: &Array) -> bool {
-        let (Some(first), Some(last)) = (datagram.first_chunk(), datagram.last_chunk()) else { return false };
-        let seen = (*first, *last, datagram.len());
-        let again = self.datagrams.iter().any(|&(known, then)| {
-            known == seen && then.zip(arrived).is_none_or(|(then, now)| silence(then, now) < WITHIN_US)
+    /// Adds a datagram; returns whether it was received before. `values`: intensities are values, not differences.
+    pub(super) fn repeats(&mut self, datagram: &[u8], arrived: Option<i64>, array: &Array, values: bool) -> bool {
+        let before = self.0.iter().position(|(known, then)| {
+            known == datagram && then.zip(arrived).is_none_or(|(then, now)| silence(then, now) < WITHIN_US)
         });
-        if again && has_two_times(datagram, array) {
-            return true;
+        if let Some(before) = before {
+            let events = |datagram| decode(datagram, array.clone(), Pairing::Direct).0;
+            let again = events(datagram);
+            let since = self.0.iter().take(before).map(|(known, _)| events(known));
+            if has_two_times(&again) || (values && has_values(&again) && touches_none(&again, since)) {
+                return true;
+            }
         }
-        self.datagrams[self.next] = (seen, arrived);
-        self.next = (self.next + 1) % DATAGRAMS;
+        let mut room = if self.0.len() == DATAGRAMS { self.0.pop_back() } else { None }.unwrap_or_default();
+        room.0.clear();
+        room.0.extend_from_slice(datagram);
+        self.0.push_front((room.0, arrived));
         false
     }
 }
 
-/// Whether a datagram has events at two times, or more.
-fn has_two_times(datagram: &[u8], array: &Array) -> bool {
-    let (events, _) = decode(datagram, array.clone(), Pairing::Direct);
+fn has_two_times(events: &Events) -> bool {
     events.t.iter().any(|t| *t != events.t[0])
+}
+
+/// Whether there are events, and all have values.
+fn has_values(events: &Events) -> bool {
+    events.intensity.as_ref().is_some_and(|intensity| intensity.present.iter().all(|&present| present))
+}
+
+/// Whether no taxel has a second event, among these or those that came since.
+fn touches_none(events: &Events, since: impl Iterator<Item = Events>) -> bool {
+    let taxels = |events: &Events| events.x.iter().copied().zip(events.y.iter().copied()).collect::<Vec<_>>();
+    let mut own = taxels(events);
+    own.sort_unstable();
+    own.windows(2).all(|pair| pair[0] != pair[1])
+        && !since.flat_map(|events| taxels(&events)).any(|taxel| own.binary_search(&taxel).is_ok())
 }
 
 #[cfg(test)]
@@ -67,8 +81,27 @@ mod tests {
         all
     }
 
+    /// A datagram of one time with the values of some taxels.
+    fn frame(values: &[(u16, u16)]) -> Vec<u8> {
+        let mut events = Events::empty(Array::thesis());
+        for &(x, ticks) in values {
+            events.t.push(300);
+            events.x.push(x);
+            events.y.push(7);
+            events.p.push(true);
+            let intensity = events.intensity.get_or_insert_default();
+            intensity.ticks.push(ticks);
+            intensity.present.push(true);
+        }
+        encode(events.view()).unwrap()
+    }
+
     fn repeated(datagrams: &[(&[u8], Option<i64>)]) -> u64 {
-        let mut sender = SenderDecoder::new(Decoder::new(Array::thesis()), 1);
+        repeated_of(datagrams, false)
+    }
+
+    fn repeated_of(datagrams: &[(&[u8], Option<i64>)], differences: bool) -> u64 {
+        let mut sender = SenderDecoder::new(Decoder::new(Array::thesis()).differences(differences), 1);
         let mut events = Events::empty(Array::thesis());
         for (datagram, arrived) in datagrams {
             sender.push(datagram, *arrived, &mut events);
@@ -93,6 +126,22 @@ mod tests {
         let mut in_turn = all.clone();
         in_turn.swap(3, 4);
         assert_eq!(repeated(&in_turn.iter().map(|one| (&one[..], None)).collect::<Vec<_>>()), 0);
+    }
+
+    #[test]
+    fn a_frame_with_values_that_comes_again_is_counted_unless_its_taxels_moved_since() {
+        let (one, other, back) = (frame(&[(3, 90), (4, 80)]), frame(&[(9, 90)]), frame(&[(4, 60)]));
+        assert_eq!(repeated(&[(&one, Some(0)), (&other, Some(10)), (&one, Some(20))]), 1);
+        assert_eq!(repeated(&[(&other, None), (&other, None), (&other, None)]), 2);
+        // One of its taxels had another value between them.
+        assert_eq!(repeated(&[(&one, Some(0)), (&back, Some(48)), (&one, Some(96))]), 0);
+        assert_eq!(repeated(&[(&one, Some(0)), (&one, Some(6_553_600))]), 0);
+        // Two equal differences in one stamp are two frames, and so are two of a taxel in one datagram.
+        assert_eq!(repeated_of(&[(&one, Some(0)), (&one, Some(48))], true), 0);
+        let twice = frame(&[(3, 90), (3, 80)]);
+        assert_eq!(repeated(&[(&twice, Some(0)), (&twice, Some(48))]), 0);
+        // Without values nothing tells them apart.
+        assert_eq!(repeated(&[(&one[..5], Some(0)), (&one[..5], Some(48))]), 0);
     }
 
     #[test]

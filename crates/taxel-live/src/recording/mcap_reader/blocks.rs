@@ -39,7 +39,7 @@ pub(super) struct Blocks {
     pub(super) length: u64,
     pub(super) places: Vec<Block>,
     /// Of each place where something was skipped, the number of blocks before it and what the message indexes around it list.
-    pub(super) skipped: Vec<(usize, Indexed)>,
+    pub(super) skipped: Vec<(usize, Option<Indexed>)>,
     pub(super) summary: Option<Summary>,
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Summary {
     pub(super) messages: Option<BTreeMap<String, u64>>,
     /// Whether the file had the record that ends a recording.
     pub(super) finished: bool,
+    /// Where the file ends by what it states.
+    pub(super) end: u64,
 }
 
 impl Summary {
@@ -57,6 +59,7 @@ impl Summary {
             let by_name = names.into_iter().map(|(id, name)| (name, counts.get(&id).copied().unwrap_or(0)));
             summary.messages = Some(by_name.collect());
         }
+        summary.end = at;
         whole.then_some(summary)
     }
 }

@@ -20,6 +20,17 @@ const RECORD_HEAD: u64 = 9;
 /// Size of a footer and of the magic bytes behind it, with which a file ends.
 const FOOTER: u64 = RECORD_HEAD + 20 + MAGIC.len() as u64;
 
+/// What was skipped between two blocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+enum Skipped {
+    #[default]
+    Nothing,
+    /// Records that end where one of their lengths says.
+    Records,
+    /// Bytes that are no whole record.
+    Bytes,
+}
+
 /// The state of the walk.
 pub(super) struct Walk<'a> {
     path: &'a Path,
@@ -32,10 +43,10 @@ pub(super) struct Walk<'a> {
     pub(super) ends: BTreeMap<String, Counts>,
     pub(super) blocks: Vec<Block>,
     /// Of each place where something was skipped, the number of blocks before it and what the message indexes between these
-    /// blocks and the next one list.
-    pub(super) skipped: Vec<(usize, Indexed)>,
-    /// What message indexes list since the last block, and whether anything was skipped since.
-    since: (Indexed, bool),
+    /// blocks and the next one list; none where bytes are missing or too many, as these indexes may be of other chunks.
+    pub(super) skipped: Vec<(usize, Option<Indexed>)>,
+    /// What message indexes list since the last block, and what was skipped since.
+    since: (Indexed, Skipped),
     pub(super) summary: Option<Summary>,
     /// Unpacked size of the chunks so far, as they state it, bytes.
     unpacked: u64,
@@ -55,7 +66,7 @@ impl<'a> Walk<'a> {
             ends: BTreeMap::new(),
             blocks: vec![],
             skipped: vec![],
-            since: (Indexed::new(), false),
+            since: (Indexed::new(), Skipped::Nothing),
             summary: None,
             unpacked: 0,
             rebuilt,
@@ -105,8 +116,10 @@ impl<'a> Walk<'a> {
     /// Ends the part of the file that follows the last block.
     fn next_block(&mut self) {
         let (indexed, skipped) = std::mem::take(&mut self.since);
-        if skipped {
-            self.skipped.push((self.blocks.len(), indexed));
+        match skipped {
+            Skipped::Nothing => {}
+            Skipped::Records => self.skipped.push((self.blocks.len(), Some(indexed))),
+            Skipped::Bytes => self.skipped.push((self.blocks.len(), None)),
         }
     }
 
@@ -122,10 +135,16 @@ impl<'a> Walk<'a> {
         self.blocks.pop();
         // What follows the block before it.
         let again = self.skipped.pop_if(|(before, _)| *before == self.blocks.len());
-        self.since.0 = match (again, self.blocks.last()) {
-            (Some((_, indexed)), _) => indexed,
-            (None, Some(block)) => indexed_from(self.path, self.file, self.length, block.offset + block.length)?,
-            (None, None) => Indexed::new(),
+        self.since = match (again, self.blocks.last()) {
+            (Some((_, indexed)), _) => {
+                let skipped = if indexed.is_some() { Skipped::Records } else { Skipped::Bytes };
+                (indexed.unwrap_or_default(), skipped)
+            }
+            (None, Some(block)) => {
+                let indexed = indexed_from(self.path, self.file, self.length, block.offset + block.length)?;
+                (indexed, Skipped::Nothing)
+            }
+            (None, None) => (Indexed::new(), Skipped::Nothing),
         };
         Ok(block.offset)
     }
@@ -139,7 +158,8 @@ impl<'a> Walk<'a> {
                     Some(next) => {
                         self.rebuilt.gaps += 1;
                         self.rebuilt.skipped_bytes += next - from;
-                        self.since.1 = true;
+                        let skipped = if self.ends_at(from, next)? { Skipped::Records } else { Skipped::Bytes };
+                        self.since.1 = self.since.1.max(skipped);
                         at = next;
                         continue;
                     }
@@ -153,12 +173,14 @@ impl<'a> Walk<'a> {
                 op::DATA_END => {
                     self.rebuilt.unfinished = false;
                     self.summary = Summary::read(self.file, at, self.length);
+                    let end = self.summary.as_ref().map_or(self.length, |summary| summary.end);
+                    self.rebuilt.bytes_after_end = self.length - end;
                     return Ok(());
                 }
                 op::METADATA => self.metadata(at, length)?,
                 op::CHUNK if size.max(length) > u64::from(limits::CHUNK) => {
                     self.rebuilt.large_chunks += 1;
-                    self.since.1 = true;
+                    self.since.1 = self.since.1.max(Skipped::Records);
                 }
                 op::MESSAGE_INDEX => {
                     if let Some((channel, messages)) = indexed(&self.bytes(at, 15)?) {
@@ -195,6 +217,14 @@ impl<'a> Walk<'a> {
             at += RECORD_HEAD + length;
         }
         Ok(())
+    }
+
+    /// Whether one of the lengths that a damaged chunk or record at `at` states says that it ends at `end`.
+    fn ends_at(&self, at: u64, end: u64) -> Result<bool> {
+        let head = self.bytes(at, 80)?;
+        let length = number(&head, 1).and_then(|length| length.checked_add(RECORD_HEAD));
+        let packed = packed(&head).and_then(|(before, packed)| packed.checked_add(before));
+        Ok([length, packed].into_iter().flatten().any(|length| at.checked_add(length) == Some(end)))
     }
 
     /// Opcode and length of the record at `at`, where they make sense, and the size that it states to unpack to.
@@ -306,12 +336,16 @@ impl<'a> Walk<'a> {
 
 /// The unpacked size that a chunk states, if the lengths inside its header agree with the record's length.
 fn chunk(head: &[u8], length: u64) -> Option<u64> {
+    let (before, packed) = packed(head)?;
+    if packed.checked_add(before - RECORD_HEAD) == Some(length) { number(head, 25) } else { None }
+}
+
+/// Where the packed messages of a chunk begin, and their size, as its header states.
+fn packed(head: &[u8]) -> Option<(u64, u64)> {
     // opcode 1, length 8, start 8, end 8, size 8, checksum 4, name of the compression, packed size 8
     const NAME: usize = 37;
     let name_bytes = head.get(NAME..NAME + 4).map(|b| word(b) as usize).filter(|&n| n <= 16)?;
-    let packed = number(head, NAME + 4 + name_bytes)?;
-    let rest = (NAME + 4 + name_bytes + 8) as u64 - RECORD_HEAD;
-    if packed.checked_add(rest) == Some(length) { number(head, 25) } else { None }
+    Some(((NAME + 4 + name_bytes + 8) as u64, number(head, NAME + 4 + name_bytes)?))
 }
 
 /// The 64-bit number at `place`.
