@@ -145,6 +145,9 @@ quiet = {
 }[work]
 columns = [frames.values] if "frames" in work else [events.t, events.x, events.y, events.p]
 size = sum(column.nbytes for column in columns)
+# Pages that the system took away while nobody read them come back here, and not while it is measured.
+for column in columns:
+    column.max()
 with open("/proc/self/clear_refs", "w") as reset:
     reset.write("5")
 before = resident("VmRSS")
