@@ -128,6 +128,13 @@ def test_a_flipped_bit_anywhere_is_told_exactly(whole: Path, tmp_path: Path, end
         assert statuses["damaged"] > 5
 
 
+@pytest.mark.parametrize("place", [*range(8, 17), *range(17, 60, 5)])
+def test_a_flip_in_the_first_record_hides_nothing_behind_it(whole: Path, tmp_path: Path, place: int) -> None:
+    data = bytearray(without_end(whole.read_bytes()))
+    data[place] ^= 1 << place % 8
+    assert assert_told(tmp_path / "a.mcap", bytes(data), held_by(taxel.open(whole)), f"byte {place}") is not None
+
+
 def spoilt(data: bytes, draw: np.random.Generator) -> Iterator[tuple[str, bytes]]:
     """Yield the bytes with a part of them cut, dropped, repeated, replaced or set to 0."""
     size = len(data)

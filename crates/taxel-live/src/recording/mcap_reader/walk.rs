@@ -246,7 +246,8 @@ impl<'a> Walk<'a> {
                 content.and_then(|content| content.checked_add(before + 12)) == Some(length)
             }
             op::DATA_END => length == 4,
-            op::HEADER => at == MAGIC.len() as u64,
+            // Profile and library.
+            op::HEADER => at == MAGIC.len() as u64 && self.two_parts(at + RECORD_HEAD)? == length,
             op::SCHEMA | op::CHANNEL | op::MESSAGE => self.blocks.last().is_none_or(|block| block.bare),
             _ => false,
         };
