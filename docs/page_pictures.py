@@ -10,7 +10,6 @@ The board is seen while it runs, and its recording as `panel.png`, for the READM
 from __future__ import annotations
 
 import contextlib
-import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -77,9 +76,6 @@ def walk(name: str) -> None:
 def draw_recording(browser: Any, name: str, picture: str) -> None:
     """Draw a page's recording with its labels and what its readout detects."""
     (file, *options), readout = SHOWN[name]
-    place = Path(file)
-    for labels in Path().glob("*labels.csv"):
-        shutil.copy(labels, place.with_suffix(".notes.csv"))
     with seen(browser, Path.cwd(), "view", file, *options, "--no-open") as page:
         shows(page, "state-word", "^Replay$")
         if readout:

@@ -116,7 +116,8 @@ def test_the_readmes_way_works_as_printed(tmp_path: Path, monkeypatch: pytest.Mo
     [quoted] = re.findall(r"^```text\n(.*?)^```", README.read_text(), re.MULTILINE | re.DOTALL)
     for line in quoted.splitlines():
         assert " ".join(line.split()) in found, f"README: {line!r}"
-    again = emulate.replace("labels.csv", "again.csv")
+    again = emulate.replace(" --truth ball.notes.csv", "")
+    assert again != emulate
     assert "detections" in shell.beside(live, again)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")
