@@ -91,7 +91,7 @@ def write(path: Path, came: list[bytes], draw: np.random.Generator, told: Told, 
         causes = {
             "jumps_of_time": 0,
             "datagrams_damaged": found.checksum + found.short + found.foreign,
-            "datagrams_repeated": found.repeated + found.old,
+            "datagrams_repeated": found.repeated,
             "events_repaired": found.repaired,
         }
         known = {"received": received, "recorded": recorded, "dropped_by_queue": told.dropped}

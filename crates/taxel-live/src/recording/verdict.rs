@@ -258,14 +258,17 @@ pub fn damage(
     two: &wire::v2::Counts,
 ) -> (BTreeMap<String, u64>, Option<u64>) {
     let mut causes = damage_of_version_1(counts);
-    causes.extend([(JUMPS.to_owned(), jumps), (REPEATED.to_owned(), again + two.repeated + two.old)]);
+    causes.extend([(JUMPS.to_owned(), jumps), (REPEATED.to_owned(), again + two.repeated)]);
     if two.datagrams == 0 {
         return (causes, None);
     }
     let of_version_2 = [
-        ("datagrams_damaged", two.checksum + two.short + two.foreign),
+        ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign),
+        ("datagrams_too_late", two.old),
         ("taxels_outside_the_array", two.outside),
         ("datagrams_of_an_unknown_kind", two.unknown_kind),
+        ("datagrams_with_unknown_flags", two.unknown_flags),
+        ("markers_with_an_unknown_code", two.unknown_marker),
         ("malformed_bodies", two.malformed),
         (BOARD_DROPPED, two.dropped),
         (BOARD_RESET, two.resets),
@@ -449,7 +452,8 @@ impl Verdict {
             (rebuilt.no_summary.into(), "no_summary", "the summary at the end missing or damaged".to_owned()),
         ] {
             if n > 0 {
-                verdict.damaged.insert(cause.to_owned(), n);
+                // What it was converted from may have been damaged too.
+                *verdict.damaged.entry(cause.to_owned()).or_default() += n;
                 bad.push(text);
             }
         }
@@ -459,7 +463,7 @@ impl Verdict {
         lost.retain(|_, n| *n > 0);
         for (topic, n) in &lost {
             if let Some((cause, what)) = topic.lost_in_file() {
-                verdict.lost.insert(cause.to_owned(), *n);
+                *verdict.lost.entry(cause.to_owned()).or_default() += *n;
                 bad.push(format!("{} lost", counted(*n, what)));
             }
         }

@@ -22,6 +22,9 @@ use session::{Session, WINDOW};
 use taken::Taken;
 pub use words::stream_rows;
 
+/// Number of repeated datagrams in turn after which a session has begun again.
+const IN_TURN: u32 = 32;
+
 /// Number of sessions that are kept, for datagrams that arrive after a reset.
 const SESSIONS: usize = 4;
 
@@ -65,6 +68,8 @@ pub struct Decoder {
     status: Option<Status>,
     /// Sequence number of the datagram with the latest status, in the latest session.
     status_number: i64,
+    /// The number after that of the last repeated datagram, and how many were repeated in turn since an intact one.
+    again: (i64, u32),
     counts: Counts,
 }
 
@@ -85,6 +90,7 @@ impl Decoder {
             held,
             status: None,
             status_number: i64::MIN,
+            again: (0, 0),
             counts: Counts::default(),
         }
     }
@@ -219,10 +225,13 @@ impl Decoder {
                 return Outcome::Repeated;
             }
             Some(false) => {
+                let number = session.number_of(header.sequence);
+                let in_turn = if number == self.again.0 { self.again.1 + 1 } else { 1 };
+                self.again = (number + 1, in_turn);
                 self.counts.repeated += 1;
                 return Outcome::Repeated;
             }
-            Some(true) => {}
+            Some(true) => self.again.1 = 0,
         }
         session.latest = session.latest.max(header.base);
         let (base, missing) = (session.offset + header.base as i64, session.missing());
@@ -262,7 +271,7 @@ impl Decoder {
         if self.instructions >= Instructions::Avx2
             && let (Some(first), Some(board), Some(session)) =
                 (datagrams.clone().next(), self.board, self.sessions.last_mut())
-            && let Self { held, counts, latest, .. } = self
+            && let Self { held, counts, latest, again, .. } = self
             && let Some((mut run, value)) = Run::new(first, board, session, held, latest, counts)
             && (value == 0 || out.paired())
         {
@@ -275,6 +284,9 @@ impl Decoder {
                     _ => run.take::<16>(datagrams, room, row, paired),
                 });
             }
+            if run.taken.datagrams > 0 {
+                again.1 = 0;
+            }
             return run.taken;
         }
         Taken::default()
@@ -285,14 +297,18 @@ impl Decoder {
         // The latest session with this number, in case two resets drew the same one.
         if let Some(which) = self.sessions.iter().rposition(|session| session.number == header.session) {
             let session = &self.sessions[which];
-            // Two successive resets drew the same number: the session begins again.
-            let again = session.number_of(header.sequence) <= session.highest - WINDOW as i64
+            // Two successive resets drew the same number: the session begins again. Its first datagrams are told from ones
+            // that a network repeats by their number, or as so many of them come in turn long after those.
+            let behind = session.highest - session.number_of(header.sequence);
+            let in_turn = self.again.0 == session.number_of(header.sequence) && self.again.1 >= IN_TURN;
+            let again = (behind >= WINDOW as i64 || (in_turn && behind >= 8 * i64::from(IN_TURN)))
                 && header.sequence < 1024
                 && header.base < session.latest;
             if !again {
                 return (which, false);
             }
         }
+        self.again.1 = 0;
         let began = self.sessions.is_empty();
         let offset = if began && !self.goes_on {
             0

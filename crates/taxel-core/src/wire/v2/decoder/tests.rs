@@ -99,3 +99,31 @@ fn a_straggler_of_before_a_reset_changes_nothing_that_is_held_since() {
     assert!(events.len() > heard, "its events are events");
     assert_eq!(decoder.held(), held);
 }
+
+#[test]
+fn a_board_that_begins_again_with_the_same_session_is_not_taken_for_repetition() {
+    let sent = |sequence: u32| datagram(Kind::Changes, 7, sequence, u64::from(sequence) * 192, &[]);
+    let (mut decoder, mut events) = (Decoder::new(Array::thesis()), Events::empty(Array::thesis()));
+    let mut came = |decoder: &mut Decoder, sequence: u32| decoder.push(&sent(sequence), None, &mut events);
+    for sequence in 0..2000 {
+        came(&mut decoder, sequence);
+    }
+    for sequence in 0..500 {
+        came(&mut decoder, sequence);
+    }
+    let counts = decoder.counts();
+    assert_eq!((counts.resets, counts.repeated, counts.intact), (1, u64::from(IN_TURN), 2500 - u64::from(IN_TURN)));
+    assert_eq!(counts.missing, u64::from(IN_TURN));
+
+    // A network repeats: each once, some behind others, the first ones long after, a part in turn.
+    let mut decoder = Decoder::new(Array::thesis());
+    for sequence in 0..2000 {
+        came(&mut decoder, sequence);
+        came(&mut decoder, sequence);
+        came(&mut decoder, sequence / 2);
+    }
+    for sequence in (0..1000).step_by(3).chain(0..IN_TURN).chain(1900..2000) {
+        came(&mut decoder, sequence);
+    }
+    assert_eq!((decoder.counts().resets, decoder.counts().missing, decoder.counts().intact), (0, 0, 2000));
+}
