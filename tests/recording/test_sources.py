@@ -469,3 +469,16 @@ def test_a_recording_begun_in_mid_stream_begins_with_what_the_taxels_held(tmp_pa
     again = taxel.open(tmp_path / "again.mcap")
     np.testing.assert_array_equal(again.held, recording.held)
     assert again.frames(100) == frames
+
+
+def test_a_silent_source_of_a_finished_recording_is_said_to_be_silent_also_by_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "quiet.mcap"
+    sources = {"imu": "given,columns=ax", "left": f"udp:{LOOPBACK}:0,array=4x4"}
+    with Live(0, host=LOOPBACK, array=SMALL, record=path, name="right", sources=sources) as live:
+        play(presses(9, 1), live.address)
+        until(lambda: live.counters["decoded"] == 9)
+        summary = live.stop()
+    for name in sources:
+        told = taxel.open(path).sources[name].verdict
+        assert (told, told.status) == ("nothing arrived", "nothing arrived")
+        assert summary.verdict.parts[name].status == "nothing arrived"

@@ -77,6 +77,15 @@ impl Unread {
     }
 }
 
+/// The topic of what a source sends.
+fn data_of(source: &Header) -> Topic {
+    match (&source.stream, &source.pictures) {
+        (Some(_), _) => Topic::Samples,
+        (_, Some(_)) => Topic::Pictures,
+        _ => Topic::Datagrams,
+    }
+}
+
 /// A recording's datagrams as they arrived, stored one after the other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Datagrams {
@@ -185,11 +194,22 @@ impl Reader {
         };
         let ending = match &self.ending {
             Some(Ending::Finished { .. }) if source != 0 => {
-                self.ends.get(name).map(|counts| Ending::Finished { counts: counts.clone() })
+                // A source of which nothing came has no counts.
+                let silent = self.is_silent(source).then(Counts::default);
+                self.ends.get(name).cloned().or(silent).map(|counts| Ending::Finished { counts })
             }
             whole => whole.clone(),
         };
         Ok(Self { source, ending, ..self.clone() })
+    }
+
+    /// Whether the summary lists no datagram, line or picture of a source.
+    fn is_silent(&self, source: usize) -> bool {
+        let header = &self.header.sources[source - 1];
+        let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
+        totals.is_some_and(|totals| {
+            totals.get(&data_of(header).channel_name(source, &header.name)).is_none_or(|&n| n == 0)
+        })
     }
 
     /// The source's header.
@@ -213,12 +233,7 @@ impl Reader {
     /// What is known of the file and of this source's messages, of which `remarks` and `unread` were found.
     #[must_use]
     pub fn condition(&self, remarks: &Remarks, unread: &Unread) -> Condition {
-        let Header { name, stream, pictures, .. } = self.header();
-        let data = match (stream, pictures) {
-            (Some(_), _) => Topic::Samples,
-            (_, Some(_)) => Topic::Pictures,
-            _ => Topic::Datagrams,
-        };
+        let (name, data) = (&self.header().name, data_of(self.header()));
         let read = |topic: Topic| remarks.messages.get(&topic).copied().unwrap_or(0);
         let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
         let total = |topic: Topic| match (totals, &self.ending) {
