@@ -348,8 +348,10 @@ impl Verdict {
         };
         let mut pieces = vec![if !words.is_empty() {
             format!("LOST: {}", words.join(", "))
-        } else if counts.missing.is_some() {
+        } else if knows {
             "nothing lost".to_owned()
+        } else if counts.missing.is_some() {
+            "nothing lost but for what resets hide".to_owned()
         } else {
             nothing_lost.to_owned()
         }];
