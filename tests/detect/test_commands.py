@@ -133,6 +133,16 @@ def test_taxels_whose_rest_is_not_in_the_tare_are_said(folder: Path, trained: Pa
     assert (code, error) == (0, "")
 
 
+def test_a_tare_that_holds_a_touch_is_said(folder: Path, trained: Path, capsys) -> None:
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare")
+    code, _, error = call(capsys, *arguments, 0.2)
+    assert (code, error.count("\n")) == (0, 1)
+    assert re.search(
+        r"warning: --tare 0\.2: the beginning of .*9\.npz is not quiet but holds a touch of \d+ taxels", error
+    )
+    assert call(capsys, *arguments, 0.05)[2] == ""
+
+
 def test_a_readout_as_a_tare_is_called_what_it_is(folder: Path, trained: Path, capsys) -> None:
     code, _, error = call(capsys, "detect", folder / "9.npz", "--readout", trained, "--tare", trained)
     assert (code, error) == (
@@ -314,8 +324,10 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     events = taxel.open(folder / "9.npz").events
     plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0")
     arguments = ("train", folder / "9.npz", "--labels", folder / "truth.csv", *plan)
-    assert call(capsys, *arguments, "-o", tmp_path / "by_itself.json")[0] == 0
+    code, said, _ = call(capsys, *arguments, "-o", tmp_path / "by_itself.json")
     first = min(row.t_us for row in taxel.Labels(folder / "truth.csv").rows)
+    assert code == 0
+    assert f"tare: what the recording holds from 0 to {first / 1000 - 20:g} ms; --tare gives another" in said
     taxel.Tare.take(events, stop_us=first - 20_000).save(tmp_path / "tare.json")
     assert call(capsys, *arguments, "--tare", tmp_path / "tare.json", "-o", tmp_path / "said.json")[0] == 0
     assert taxel.Readout.load(tmp_path / "by_itself.json") == taxel.Readout.load(tmp_path / "said.json")

@@ -45,6 +45,8 @@ _RESTS_AT_0 = ("N", "kPa")
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
+#: The note of a tare that was not measured.
+BY_UNIT = "0, by the unit"
 TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest at the beginning of the recording."
 SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
 
@@ -100,7 +102,24 @@ def tare_of(value: str | None, recording: Recording) -> Tare | None:
     stop = first + int(seconds * 1e6)
     if isinstance(source, Events):
         stop = min([stop, *(t for t, start in source.markers if start and t > first)])
-    return _measured(recording, source, stop)
+    tare = _measured(recording, source, stop)
+    _warn_of_touch(value, recording, source, tare)
+    return tare
+
+
+def _warn_of_touch(value: str, recording: Recording, source: Events | Frames, tare: Tare) -> None:
+    """Warn of a tare in which something was touched, by which lifts are missed or false."""
+    from taxel.detect import Example  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect.label_times import TOUCH, held_by_tare  # noqa: PLC0415
+    from taxel.recording.rest import NOISE_FLOOR  # noqa: PLC0415
+
+    held = held_by_tare([Example(source, {}, tare)], NOISE_FLOOR)
+    if held >= TOUCH:
+        warnings.warn(
+            f"--tare {value}: the beginning of {recording.path} is not quiet but holds a touch of {held} taxels; give "
+            "the seconds before it, or --tare FILE",
+            stacklevel=2,
+        )
 
 
 def _seconds(value: str) -> float | None:
@@ -162,7 +181,7 @@ def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     source = recorded(recording)
     if isinstance(source, Frames) and source.unit in _RESTS_AT_0:
         nothing = np.zeros((2, *source.array.shape))
-        return Tare.take(Frames(nothing, [0, 1], unit=source.unit, array=source.array), note="0, by the unit")
+        return Tare.take(Frames(nothing, [0, 1], unit=source.unit, array=source.array), note=BY_UNIT)
     try:
         return _before(labels, recording)
     except ProblemError:

@@ -74,8 +74,11 @@ class Result:
             result["neurons"] = {label: dict(self.made.recipe.neurons[label]) for label in self.made.readout.labels}
         return result
 
-    def page(self, out: Path, recipe: str | None, report: Path | None) -> str:
-        """Return the result as lines for people; the first says whether the scores are held out."""
+    def page(self, out: Path, recipe: str | None, report: Path | None, tares: str = "") -> str:
+        """Return the result as lines for people; the first says whether the scores are held out.
+
+        One line of them, if any, is `tares`: which were taken from the recordings.
+        """
         window = f"(window {self.window_ms:g} ms)"
         lines = [f"not held out, on its own training data {window}: {self.why}"]
         if not self.why:
@@ -86,7 +89,7 @@ class Result:
         if recipe is not None:
             about = self.made.recipe.about
             lines.append(f"\nrecipe {recipe}" + (f": {about}" if about else ""))
-        lines.append(repr(self.made.readout))
+        lines += [*([tares] if tares else []), repr(self.made.readout)]
         for label in self.made.readout.labels if self.searched else ():
             point = self.made.recipe.neurons[label]
             chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))

@@ -16,6 +16,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import (
+    BY_UNIT,
     SET_HELP,
     TARE_HELP,
     assignments,
@@ -149,7 +150,25 @@ def train(
         title, held_out = f"Training of {out}", () if result.why else result.scored.scores
         more: dict[str, Any] = {"held_out": held_out, "alignments": result.made.alignments, "scored": result.scored}
         write_listening(report, result.made.readout, outcomes, title=title, judged=result.how, **more)
-    typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else result.page(out, recipe, report))
+    page = result.page(out, recipe, report, _tares(examples) if tare is None else "")
+    typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else page)
+
+
+def _tares(examples: Sequence[Example]) -> str:
+    """Return the line of which tares were taken from the recordings; of those whose rest is 0 by their unit nothing."""
+    from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
+    from taxel.spikes import SpikeTrains, to_ms  # noqa: PLC0415
+
+    spans = []
+    for one in examples:
+        source = recorded(one.source)
+        if one.tare is not None and one.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
+            spans.append([to_ms(us - int(source.t[0])) for us in (one.tare.start_us, one.tare.stop_us)])
+    lengths = [end - begin for begin, end in spans]
+    said = f"of each of {len(spans)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long" if spans else ""
+    if len(spans) == 1:
+        said = "what the recording holds from {:g} to {:g} ms".format(*spans[0])
+    return f"tare: {said}; --tare gives another" if said else ""
 
 
 def _planned(

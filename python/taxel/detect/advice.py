@@ -13,7 +13,7 @@ from taxel._base.messages import counted
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example, checked
-from taxel.detect.label_times import Off, held_by_tare, off_by
+from taxel.detect.label_times import TOUCH, Off, held_by_tare, off_by
 from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.scoring import Score
@@ -33,8 +33,6 @@ _MANY = 0.05
 _BEFORE_US = 20_000
 #: How many labels at either end of a recording are looked at.
 _LABELS = 4
-#: So many taxels above the rest are a touch.
-_TOUCH = 2
 #: Into so many parts a recording is divided to see a drift, at so many pictures of each.
 _PARTS, _LOOKS = 8, 40
 #: A touched taxel reads so many times its drift.
@@ -129,11 +127,11 @@ def _of_times(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advi
     if label in times.off:
         because = f"{times.off[label]}, and are aligned within {WINDOW_MS:.0f} ms only"
         return Advice("other times of the labels", because)
-    if times.held >= _TOUCH:
+    if times.held >= TOUCH:
         late_ms = 0.0 if alignment is None or alignment.train is None else -alignment.median_ms
         why = f", as labels lie {late_ms:.0f} ms after what was felt (median)" * (late_ms > to_ms(_BEFORE_US))
         return Advice("another tare", f"it holds a touch of {times.held} taxels{why}; give --tare SECONDS or FILE")
-    if times.loaded >= _TOUCH:
+    if times.loaded >= TOUCH:
         return Advice("another tare", f"{times.loaded} taxels read above theirs while nothing touches them")
     unfelt = 0 if alignment is None else int(alignment.unpaired.sum())
     if 2 * unfelt > scored.missed + scored.false:
@@ -273,4 +271,4 @@ def drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
     least = np.quantile(values.reshape(_PARTS, looks, *most.shape), 0.1, axis=1)
     slowly = np.diff(least, axis=0).max(axis=0) <= least[-1] / 2
     count = np.count_nonzero((least[0] < above) & (least[-1] >= above) & slowly & (most >= _TIMES * least[-1]))
-    return int(count) if count >= max(_TOUCH, np.count_nonzero(most >= _TIMES * above) / _TIMES) else 0
+    return int(count) if count >= max(TOUCH, np.count_nonzero(most >= _TIMES * above) / _TIMES) else 0

@@ -16,10 +16,10 @@ from taxel.detect.loads import Loads, clock_of, lacks_neighbours
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
-__all__ = ["Off", "held_by_tare", "off_by"]
+__all__ = ["TOUCH", "Off", "held_by_tare", "off_by"]
 
 #: So many loaded taxels are a touch, the smallest that there is.
-_TOUCH = 2.0
+TOUCH = 2.0
 #: Distances between labels and touches are looked at up to this, ms, and are the same that differ by this.
 _FARTHEST_MS, _SAME_MS = 1000.0, 50.0
 #: Labels are off where this share of them has the same distance, and so many; of fewer chance may do so. They are not
@@ -64,7 +64,7 @@ def off_by(examples: Sequence[Example], labels: Sequence[str], noise_floor: floa
     early = [one if (tare := _early(one)) is None else one._replace(tare=tare) for one in examples]
     floor = measured_floor(early) or noise_floor
     loads = Loads(early, [clock_of(one) for one in early], floor, lambda _: None, ("area",))
-    felt = [edge.t for edge in loads.edges("area", _TOUCH, 1.0, 1)]
+    felt = [edge.t for edge in loads.edges("area", TOUCH, 1.0, 1)]
     found = {}
     for label in labels:
         times = loads.truth(label, loads.every)

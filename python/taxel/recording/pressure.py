@@ -31,6 +31,8 @@ MOST_PICTURES = 2000
 PICTURES_HZ = 100.0
 #: Number of values of pictures that are computed at once.
 _BLOCK = 1 << 21
+#: So many events are looked at at once for where area, peak and sum are largest, in so many moments of each.
+_EVENTS, _MOMENTS = 1 << 16, 32
 #: The rest of events is tracked this often, us.
 _TRACKED_US = 50_000
 #: Largest rectangle around the taxels with events whose rest is tracked with regard to neighbours.
@@ -60,6 +62,8 @@ class Series:
         What was subtracted.
     force : float64, shape (n,), N
         Of values in kPa, if the area of each taxel is known.
+    largest : Series, optional
+        Of events: the same at the moments between the pictures where area, peak and sum are largest.
     """
 
     t: NDArray[np.int64]
@@ -73,6 +77,7 @@ class Series:
     centre_unit: str
     rest: Rest
     force: NDArray[np.float64] | None = None
+    largest: Series | None = None
 
     @classmethod
     def of(cls, frames: Frames, above: float, rest: Rest) -> Series:
@@ -119,12 +124,18 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     events = recording.events
     if events.present is None or events.intensity is None or not events.present.any():
         return None
-    floor = ContactArea().above
     drawn = _Drawn.of(recording)
     rest = _rest_of(recording, drawn, tare)
-    array, n = events.array, len(drawn.t)
-    areas = array.area_mm2
-    each = (np.ones(array.shape) if areas is None else areas).reshape(-1)[drawn.taxels]
+    of = _series_of(drawn, rest, events.array)
+    moments = _moments(events, drawn, rest, of)
+    # They are pictures more, at which the rest is tracked as at the others.
+    both = replace(drawn, t=np.union1d(drawn.t, moments))
+    return replace(of, largest=_series_of(both, rest, events.array)) if len(both.t) > len(drawn.t) else of
+
+
+def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
+    floor = ContactArea().above
+    n, each = len(drawn.t), drawn.areas(array)
     area, peak, total, centre = np.zeros(n), np.zeros(n), np.zeros(n), np.full((n, 2), np.nan)
     places = None if array.is_channels else [axis.reshape(-1)[drawn.taxels] for axis in array.positions()]
     for first, over in drawn.above(rest):
@@ -139,8 +150,78 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
         moments = np.stack([weights @ axis for axis in places], axis=1)
         np.divide(moments, all_of_them, out=centre[part], where=all_of_them > 0)
     of = (area, centre) if places is not None else (None, None)
-    unit = "taxels" if areas is None else "mm2"
+    unit = "taxels" if array.area_mm2 is None else "mm2"
     return Series(drawn.t, "ticks", floor, of[0], peak, total, of[1], unit, array.centre_unit or "", rest)
+
+
+def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[np.int64]:
+    """Return the times of events at which area, peak and sum may be largest, us.
+
+    Each event changes them by what its taxel changes, above a rest that stands still from one picture to the next:
+    from each picture's own values on, that tells where to look, not what is there.
+    """
+    assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
+    events = events if np.all(np.diff(events.t) >= 0) else events.sorted()
+    assert events.present is not None and events.intensity is not None  # noqa: PT018  the same events
+    size, each = len(drawn.taxels), drawn.areas(events.array)
+    column = np.zeros(events.array.rows * events.array.columns, np.uint16 if size <= 1 << 16 else np.uint32)
+    column[drawn.taxels] = np.arange(size)
+    base = np.where(np.isnan(rest.values) & (rest.source not in ("quiet", "none")), np.inf, rest.values)
+    for k, _, zero in drawn.zeroed:
+        base[k] = zero
+    held = np.where(drawn.since <= drawn.t[0], drawn.held.at(drawn.t[:1]).reshape(-1), np.nan)
+    base = np.where(np.isnan(base), held, base)
+    load = np.where(held - base > of.above, held - base, 0.0)
+    sums = {"total": float(load.sum())} | ({} if of.area is None else {"area": float(each @ (load > 0))})
+    offs, seen = dict.fromkeys(sums, 0.0), -1
+    found: dict[str, list[tuple[float, int]]] = {name: [] for name in ("peak", *sums)}
+    later = int(np.searchsorted(events.t, drawn.t[0], side="right"))
+    for first in range(later, len(events), _EVENTS):
+        part = slice(first, first + _EVENTS)
+        there = events.present[part]
+        t, values = events.t[part][there], events.intensity[part][there].astype(np.float64)
+        if not len(t):
+            continue
+        of_taxel = column[events.array.index(events.x[part][there], events.y[part][there])]
+        order = np.argsort(of_taxel, kind="stable")
+        taxel, value = of_taxel[order], values[order]
+        begins = np.flatnonzero(np.diff(taxel, prepend=-1))
+        # A taxel whose rest is not known is above its first value.
+        base[taxel[begins]] = np.where(np.isnan(base[taxel[begins]]), value[begins], base[taxel[begins]])
+        above = value - base[taxel]
+        now = np.where(above > of.above, above, 0.0)
+        before = np.concatenate([[0.0], now[:-1]])
+        before[begins] = load[taxel[begins]]
+        load[taxel[begins]] = now[np.append(begins[1:], len(now)) - 1]
+        steps = {"peak": above, "total": now - before}
+        if of.area is not None:
+            steps["area"] = each[taxel] * ((now > 0) - 1.0 * (before > 0))
+        # Only what is there once all of a moment's events are read.
+        last = np.append(np.diff(t) > 0, True)
+        picture = np.searchsorted(drawn.t, t, side="right") - 1
+        starts = np.flatnonzero(np.diff(picture, prepend=-1))
+        for name, step in steps.items():
+            curve = np.empty(len(t))
+            curve[order] = step
+            if name in sums:
+                curve = sums[name] + np.cumsum(curve)
+                at_picture = np.append(sums[name], curve[:-1])[starts]
+                off = getattr(of, name)[picture[starts]] - at_picture
+                if picture[0] == seen:
+                    off[0] = offs[name]
+                sums[name], offs[name] = curve[-1], off[-1]
+                curve += np.repeat(off, np.diff(starts, append=len(t)))
+            curve[~last] = -np.inf
+            found[name] = sorted(found[name] + _largest(curve, starts, t))[:_MOMENTS]
+        seen = picture[-1]
+    return np.array(sorted({moment for each in found.values() for _, moment in each}), np.int64)
+
+
+def _largest(curve: NDArray[np.float64], starts: NDArray[np.int64], t: NDArray[np.int64]) -> list[tuple[float, int]]:
+    """Return the largest value of a curve after each picture, negative, and its time; of few pictures."""
+    most, ends = np.maximum.reduceat(curve, starts), np.append(starts[1:], len(t))
+    few = np.argsort(-most, kind="stable")[:_MOMENTS]
+    return [(-most[k], int(t[starts[k] + np.argmax(curve[starts[k] : ends[k]])])) for k in few]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +264,11 @@ class _Drawn:
         zeroings = [(of.get(z.y * events.array.columns + z.x), z.t, z.rest) for z in recording.zeroings]
         zeroed = tuple((k, t, rest) for k, t, rest in zeroings if k is not None)
         return cls(_times(recording), taxels, since, values, places, (rows, columns), zeroed)
+
+    def areas(self, array: Array) -> NDArray[np.float64]:
+        """Return the area of each of the taxels, mm2; 1 each where it is not known."""
+        areas = array.area_mm2
+        return np.asarray((np.ones(array.shape) if areas is None else areas).reshape(-1)[self.taxels], np.float64)
 
     def blocks(self) -> Iterator[tuple[NDArray[np.bool_], Picture]]:
         """Yield the held values in the rectangle, at the pictures' times and often enough between them.

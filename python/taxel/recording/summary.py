@@ -110,12 +110,12 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     if not len(pressed.t):
         return None
     facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
-    curves: dict[str, Any] = {f"area_{pressed.area_unit}": pressed.area, "peak": pressed.peak, "sum": pressed.total}
-    curves["force_n"] = pressed.force
+    of = pressed if pressed.largest is None else pressed.largest
+    curves: dict[str, Any] = {f"area_{of.area_unit}": of.area, "peak": of.peak, "sum": of.total, "force_n": of.force}
     for name, values in curves.items():
         if values is not None:
             k = int(values.argmax())
-            facts[name] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
+            facts[name] = {"most": float(values[k]), "t_us": int(of.t[k])}
     if pressed.centre is None:
         return facts
     centre = pressed.centre[~np.isnan(pressed.centre).any(axis=1)]
