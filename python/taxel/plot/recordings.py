@@ -8,13 +8,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
+from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
 from taxel._base.times import beginning_us, begun
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
-from taxel.recording.pressure import Series
+from taxel.recording.pressure import Series, above_rest
 from taxel.recording.rest import Rest
 
 __all__ = ["health_map", "overview", "pressure"]
@@ -29,7 +30,7 @@ def overview(recording: Recording, figure: None = None) -> Figure: ...
 @overload
 def overview(recording: Recording, figure: F) -> F: ...
 def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBase:
-    """Draw events a second (or the sum of pressure) over time, and the activity of each taxel.
+    """Draw events a second (or the sum of pressure) over time, and each taxel's activity (or largest pressure).
 
     Parameters
     ----------
@@ -76,18 +77,26 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         over.set_yscale("symlog", linthresh=1 / width)
         over.set_ylabel("events/s")
         over.legend(loc="upper right")
-        taxel_health = health(events)
+        health_map(health(events), where)
     else:
         frames = recording.frames()
         begin_us = beginning_us(frames.t)
         over.plot((frames.t - begin_us) / 1e6, frames.total(), color="black", linewidth=0.8)
         over.set_ylabel(f"sum of taxels ({frames.unit})")
-        taxel_health = health(frames)
+        above = above_rest(recording)
+        assert above is not None  # of pictures
+        pressed, _, rest = above
+        if rest.falls:
+            # Above the rest of readings that fall is nothing but noise.
+            health_map(health(frames), where)
+        else:
+            largest = np.fmax.reduce(pressed.values, axis=0, initial=0.0)
+            known = " above rest" * (rest.source not in ("unit", "none"))
+            _map(largest, f"largest{known} ({pressed.unit})", health(frames), where)
     for note in recording.notes:
         if note.t is not None:
             over.axvline((note.t - begin_us) / 1e6, color="grey", linestyle=":", linewidth=0.8)
     over.set(xlabel=_time(begin_us), title=recording.path.name)
-    health_map(taxel_health, where)
     return figure
 
 
@@ -178,8 +187,13 @@ def health_map(health: Health, ax: Axes | None = None) -> Axes:
     """
     instance("health", health, Health)
     ax = axes(ax, (5, 4.4))
-    image = ax.imshow(np.log10(1.0 + health.activity), origin="upper", cmap="Greys", interpolation="nearest")
-    ax.figure.colorbar(image, ax=ax, label="log10 (1 + changes)")
+    return _map(np.log10(1.0 + health.activity), "log10 (1 + changes)", health, ax)
+
+
+def _map(values: NDArray[np.floating], label: str, health: Health, ax: Axes) -> Axes:
+    """Draw a value of each taxel, with those marked that are dead, stuck or noisy."""
+    image = ax.imshow(values, origin="upper", cmap="Greys", interpolation="nearest")
+    ax.figure.colorbar(image, ax=ax, label=label)
     for name, places in health.named().items():
         if places:
             x, y = np.array(places).T
