@@ -74,6 +74,8 @@ class _Command(TyperCommand):
             text = options[first[1]] + text[first.end() :]
         if "tare" in options:
             text = re.sub(r"without a tare: .*", "without the taxels' rest: give --tare SECONDS or --tare FILE", text)
+        if "rate_hz" in options and ", says what it is: rate_hz" in text:
+            text += f"; or give {options['rate_hz']} HZ"
         return f"{text}{_laid_out(text)}" if "array" in options else text
 
 
