@@ -400,3 +400,13 @@ def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: 
     assert FileOptions(rate_hz=100.0, array=["2x3"]).one(palm).array.shape == (2, 3)
     refused = CliRunner().invoke(app, ["info", str(palm)])
     assert str(refused.exception).endswith("or give --rate-hz HZ")
+
+
+@pytest.mark.parametrize(
+    ("encoder", "end"),
+    [("fa1", "; give --set period_ms=10"), ("level_crossing", "levels is missing; give --set levels=...")],
+)
+def test_an_error_of_an_encoder_names_the_option_that_sets_the_value(tmp_path: Path, encoder: str, end: str) -> None:
+    np.save(tmp_path / "palm.npy", VALUES.reshape(3, 2, 3))
+    words = ["encode", str(tmp_path / "palm.npy"), str(tmp_path / "o.npz"), "--encoder", encoder, "--rate-hz", "100"]
+    assert str(CliRunner().invoke(app, words).exception).endswith(end)
