@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import taxel
 from taxel import Array, Events, FormatError, Frames, Places
+from taxel.cli import app
+from taxel.cli._opening import FileOptions
 from taxel.formats.layout import Layout, packaged
 
 from .making import write_gaitpdb
@@ -364,3 +367,46 @@ def test_a_layout_is_found_by_the_recording_s_name_first(tmp_path: Path) -> None
         (tmp_path / name).write_text("")
     assert Layout.beside(tmp_path / "walk.csv.gz") == tmp_path / "walk.layout.toml"
     assert Layout.beside(tmp_path / "run.csv") == tmp_path / "layout.toml"
+
+
+@pytest.mark.parametrize("name", ["time", "Time (ms)", "time_s", "timestamp", "t", "t [us]"])
+@pytest.mark.parametrize("layout", ["rate_hz = 100", "rows = 2\ncolumns = 3"])
+def test_a_time_that_the_layout_does_not_name_is_no_channel(tmp_path: Path, name: str, layout: str) -> None:
+    text = f"{name},a,b,c,d,e,f\n" + lines(np.column_stack([[0.01, 0.02, 0.03], VALUES]))
+    with pytest.raises(FormatError, match=r"line 1: column .* time_column = ") as refused:
+        table(tmp_path, text, layout)
+    said = str(refused.value)
+    assert f'time_column = "{name}"' in said
+    assert "\n" not in said
+    assert (
+        table(tmp_path, text, f'{layout.replace("rate_hz = 100", "")}\n[table]\ntime_column = "{name}"').array.taxels
+        == 6
+    )
+    assert table(tmp_path, text, "[table]\nskip_lines = 1").array.taxels == 7
+
+
+def test_a_taxel_may_be_named_by_the_letter_t(tmp_path: Path) -> None:
+    text = "o,p,q,r,s,t\n" + lines(VALUES)
+    assert table(tmp_path, text, "rate_hz = 100").array.taxels == 6
+
+
+def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: Path) -> None:
+    palm = tmp_path / "palm.npy"
+    np.save(palm, VALUES.reshape(3, 2, 3))
+    opened = FileOptions(rate_hz=100.0).one(palm)
+    assert opened.frames().t.tolist() == [0, 10_000, 20_000]
+    assert opened.array.shape == (2, 3)
+    np.save(palm, VALUES)
+    assert FileOptions(rate_hz=100.0, array=["2x3"]).one(palm).array.shape == (2, 3)
+    refused = CliRunner().invoke(app, ["info", str(palm)])
+    assert str(refused.exception).endswith("or give --rate-hz HZ")
+
+
+@pytest.mark.parametrize(
+    ("encoder", "end"),
+    [("fa1", "; give --set period_ms=10"), ("level_crossing", "levels is missing; give --set levels=...")],
+)
+def test_an_error_of_an_encoder_names_the_option_that_sets_the_value(tmp_path: Path, encoder: str, end: str) -> None:
+    np.save(tmp_path / "palm.npy", VALUES.reshape(3, 2, 3))
+    words = ["encode", str(tmp_path / "palm.npy"), str(tmp_path / "o.npz"), "--encoder", encoder, "--rate-hz", "100"]
+    assert str(CliRunner().invoke(app, words).exception).endswith(end)

@@ -81,7 +81,7 @@ class FileOptions:
         opened = open_any(
             path,
             array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
-            layout=self.layout,
+            layout=self.layout or self._instead_of_layout(path),
             topic=self.topic,
             field=self.field,
             types=self.types,
@@ -106,6 +106,15 @@ class FileOptions:
 
         place = self.layout or Layout.beside(bag)
         return bool(self.topic) or (place is not None and "topic" in Layout.read(place).ros)
+
+    def _instead_of_layout(self, path: Path) -> Any:
+        """Return an empty layout for an array without one, whose rate ``--rate-hz`` says; else None."""
+        if self.rate_hz is None:
+            return None
+        from taxel.formats.layout import Layout  # noqa: PLC0415  the command line starts quickly
+        from taxel.recording.read_foreign import is_lone_array  # noqa: PLC0415
+
+        return Layout(path) if Layout.beside(path) is None and is_lone_array(path) else None
 
     def _on_array(self, recording: Recording) -> Recording:
         """Return a recording on the sensor of ``--array``; refuse one that holds a sensor that differs from it."""

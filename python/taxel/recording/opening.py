@@ -315,8 +315,10 @@ def _laid_out_in(files: Sequence[Path], given: str | os.PathLike[str] | None) ->
     return [file for file in foreign if given is not None or Layout.beside(file) is not None]
 
 
-def _layout(place: Path, given: str | os.PathLike[str] | None) -> Layout | None:
+def _layout(place: Path, given: str | os.PathLike[str] | Layout | None) -> Layout | None:
     """Return what the given layout file says, or the one beside a recording; None if there is none."""
+    if isinstance(given, Layout):
+        return given
     file = Layout.beside(place) if given is None else Path(arguments.path("layout", given))
     return None if file is None else Layout.read(file)
 

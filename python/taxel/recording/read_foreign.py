@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -28,11 +30,16 @@ from taxel.recording.contents import Contents
 from taxel.recording.h5 import is_ours
 from taxel.recording.kinds import is_label_table, is_own_table, kind_of
 
-__all__ = ["is_foreign", "read_foreign", "refuse_without_layout"]
+__all__ = ["is_foreign", "is_lone_array", "read_foreign", "refuse_without_layout"]
 
 #: The endings of tables of text, also compressed by gzip, and of files of arrays.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 _DATA = (".npy", ".npz", ".h5", ".hdf5")
+
+_UNIT = r"(s|secs?|seconds?|ms|us|µs|ns)"
+
+#: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
+_TIMES = re.compile(rf"(t|time|timestamps?)([ _.]*[\[(/] *{_UNIT} *[\])]?|[ _.]+{_UNIT})?", re.IGNORECASE)
 
 
 def is_foreign(path: Path) -> bool:
@@ -47,6 +54,14 @@ def is_foreign(path: Path) -> bool:
     if ending == ".csv":
         return not (is_own_table(path) or is_label_table(path))
     return True
+
+
+def is_lone_array(path: Path) -> bool:
+    """Return whether a file that taxel did not write holds one array only, of the shape of pictures."""
+    if path.suffix.lower() not in _DATA or not is_foreign(path):
+        return False
+    there = _shapes(path)
+    return len(there) == 1 and all(len(shape) in (2, 3) for shape in there.values())
 
 
 def read_foreign(path: Path, layout: Layout) -> Contents:
@@ -146,6 +161,14 @@ def _table(path: Path, how: Table) -> tuple[NDArray[np.float64], NDArray[np.floa
     names = names if named else [f"column {k}" for k in range(1, len(names) + 1)]
     first += named
     column = _time_column(path, how, names, named)
+    # A letter may be the name of a taxel too: t is the time only where it comes first.
+    times = (name for k, name in enumerate(names) if _TIMES.fullmatch(name.strip("\"'")) and (k == 0 or len(name) > 1))
+    if column is None and (time := next(times, None)) is not None:
+        raise FormatError(
+            f"{path.name}, line {first - 1}: column {shown(time)} holds times by its name; say in the layout: [table] "
+            f"time_column = {json.dumps(time, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, skip "
+            f"the names: skip_lines = {first - 1}"
+        )
     missing = frozenset() if how.missing is None else frozenset({how.missing, "nan"})
     rows = (_cells(line, how) for line in islice(lines, int(named), None))
     values = text.numbers(rows, path, first, names, missing, unmarked=how.missing is None)
