@@ -401,6 +401,14 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         {"status": "complete after arrival", "text": "nothing lost", "damaged": {"bytes_skipped": 1}},
         {"status": "unknown", "text": "nothing lost", "doubtful_after_us": 5},
         {"status": "complete", "text": "nothing lost", "parts": {"left": {"status": "lost", "text": "LOST"}}},
+        {"status": "complete", "text": "LOST: 5 datagrams lost or damaged on the way"},
+        {
+            "status": "lost",
+            "text": "",
+            "lost": {"a": 1},
+            "parts": {"b": {"status": "lost", "text": "", "lost": {"a": 2}}},
+        },
+        {"status": "lost", "text": "", "parts": {"b": {"status": "complete", "text": "", "noted": {"resets": 1}}}},
     ):
         with pytest.raises(taxel.ProblemError, match="verdict"):
             Verdict.from_dict(nonsense)  # type: ignore[arg-type]

@@ -4,7 +4,8 @@ The root has the attribute ``taxel`` (1, the layout's version). Events are the d
 (uint16), ``p`` (bool), optionally ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
 ``markers`` (int64, two columns: us, whether a start); pictures are ``values`` (float32, pictures x rows x columns)
 with ``t`` and ``unit`` (text). ``held`` (uint16, rows x columns, 65 535 for unknown) is the values of the taxels at the
-beginning. ``about`` is JSON: the sensor, the source, registers, notes, detections and lost information.
+beginning. ``about`` is JSON: the sensor, the source, registers, notes, detections and lost information. ``digest``
+(uint8) is the checksum over all data sets, of which `taxel.recording.npz` states the order.
 """
 
 from __future__ import annotations

@@ -2,10 +2,13 @@
 
 Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and ``markers``; pictures are
 ``values t unit``. ``held`` is the values of the taxels at the beginning; ``about`` is JSON with all other fields.
+``digest`` is a checksum over all of these, by which damage is found that the formats themselves do not notice.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -29,10 +32,14 @@ _EVENTS = ("t", "x", "y", "p")
 _COLUMNS = (*_EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
 #: The columns that are a single text.
 TEXTS = ("about", "unit")
+#: The entry with the checksum over all columns; earlier versions wrote none, and ignore it.
+_DIGEST = "digest"
+#: Bytes of a column that are taken into the checksum at once.
+_PIECE_BYTES = 1 << 20
 
 
 def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
-    """Return a recording as columns by name."""
+    """Return a recording as columns by name, with their checksum."""
     table = contents.table
     columns: dict[str, Any]
     if isinstance(table, Frames):
@@ -46,7 +53,26 @@ def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
         columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
     if contents.held is not None:
         columns["held"] = contents.held
-    return {**columns, "about": np.array(json_of(contents))}
+    columns["about"] = np.array(json_of(contents))
+    return {**columns, _DIGEST: _digest_of(columns)}
+
+
+def _digest_of(columns: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
+    """Return BLAKE2b (16 bytes) over the columns by name: of each a line of JSON (name, dtype, shape), then its bytes.
+
+    Bytes are in C order, little-endian; texts are UTF-32. Entries that are no columns of a recording do not count.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    for name in sorted(columns.keys() & set(_COLUMNS)):
+        column = columns[name]
+        little = column.dtype.newbyteorder("<")
+        digest.update(json.dumps([name, little.str, column.shape]).encode() + b"\n")
+        rows = np.atleast_1d(column)
+        step = max(1, _PIECE_BYTES // max(1, rows[:1].nbytes))
+        # A shape of many rows without bytes would take for ever.
+        for k in range(0, len(rows) if column.nbytes else 0, step):
+            digest.update(rows[k : k + step].astype(little, copy=False).tobytes())
+    return np.frombuffer(digest.digest(), np.uint8)
 
 
 def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Contents:
@@ -62,8 +88,10 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
 
     Raises
     ------
-    FormatError : a column is missing or invalid
+    FormatError : a column is missing or invalid, or the columns are not those of which the file has the checksum
     """
+    if _DIGEST in columns and not np.array_equal(columns[_DIGEST], _digest_of(columns)):
+        raise FormatError(f"{path}: damaged: what it holds is not what was written")
     values = columns.get("values")
     if values is not None and values.dtype.kind == "f" and values.flags.writeable:
         # Of the NaNs of a damaged file some may be signalling ones, of which each computation would warn.
@@ -117,7 +145,9 @@ def read_npz(path: Path, array: Array | None) -> Contents:
     FormatError : damage, or no such columns
     """
     # Other columns are not read, but the error for a missing column lists them.
-    columns = read_arrays(path, _COLUMNS, texts=TEXTS) or {name: np.empty(0) for name in stored_names(path)[:8]}
+    columns = read_arrays(path, (*_COLUMNS, _DIGEST), texts=TEXTS) or {
+        name: np.empty(0) for name in stored_names(path)[:8]
+    }
     return contents_of(path, "npz", columns, array)
 
 

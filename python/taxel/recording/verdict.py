@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Self, get_args
 
@@ -46,7 +47,7 @@ class Verdict(str):
     noted : dict of int
         What is no loss of its own: repeated datagrams, repaired values, resets of the board and others.
     doubtful_after_us : int, us, or None
-        The time after which times are doubtful.
+        The time after which times are doubtful; of several parts the earliest.
     parts : dict of Verdict
         Of several sources or merged recordings that of each, by name; else empty.
 
@@ -83,7 +84,13 @@ class Verdict(str):
     def _together(cls, parts: Iterable[tuple[str, str]]) -> Self:
         """Return the verdict on several recordings or sources, each with its name."""
         every = [(name, one if isinstance(one, Verdict) else Verdict(one)) for name, one in parts]
-        return cls._of({"together": [(name, one._held) for name, one in every]})
+        together = cls._of({"together": [(name, one._held) for name, one in every]})
+        after = min((t for _, one in every if (t := one.doubtful_after_us) is not None), default=None)
+        return cls._from({**together._held, "doubtful_after_us": after})
+
+    def _later(self, shift: int) -> Self:
+        """Return the verdict on the recording whose times are later by so many us."""
+        return self._from(_shifted(self._held, shift))
 
     @property
     def status(self) -> Status:
@@ -154,6 +161,14 @@ class Verdict(str):
         return cls._of({"together": [("", _stated(held))]})
 
 
+def _shifted(held: Mapping[str, Any], shift: int) -> dict[str, Any]:
+    """Return a verdict as the compiled part states it, with its doubtful times later by so many us."""
+    after = held["doubtful_after_us"]
+    told = re.sub(r"(?<=times after )-?\d+(?= us are doubtful)", lambda t: str(int(t[0]) + shift), held["text"])
+    parts = [(name, _shifted(part, shift)) for name, part in held["parts"]]
+    return {**held, "text": told, "doubtful_after_us": None if after is None else after + shift, "parts": parts}
+
+
 def _stated(held: Any) -> dict[str, Any]:
     """Return a verdict from `to_dict` as the compiled part states it."""
     own = held if isinstance(held, Mapping) else {}
@@ -176,10 +191,21 @@ def _stated(held: Any) -> dict[str, Any]:
         raise ProblemError(
             f"verdict: its status is {own['status']}, but its times are doubtful: must be damaged, or worse"
         )
-    for name, part in parts.items():
-        inner = _stated(part)["status"]
+    # The text on several parts begins with the name of one.
+    if STATUSES.index(own["status"]) < STATUSES.index("lost") and own["text"].startswith("LOST") and not parts:
+        raise ProblemError(f"verdict: its status is {own['status']}, but its text begins LOST: must be lost, or worse")
+    stated = {str(name): _stated(part) for name, part in parts.items()}
+    for name, part in stated.items():
+        inner = part["status"]
         if STATUSES.index(inner) > STATUSES.index(own["status"]):
             raise ProblemError(f"verdict: its status is {own['status']}, that of {name} is {inner}: must be no better")
+    for name, totals in zip(_NUMBERS, numbers, strict=True):
+        for cause in {cause for part in stated.values() for cause in part[name]}:
+            least = sum(part[name].get(cause, 0) for part in stated.values())
+            if totals.get(cause, 0) < least:
+                raise ProblemError(
+                    f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be no fewer"
+                )
     made = {"status": own["status"], "text": own["text"], doubtful: own.get(doubtful)}
     made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
-    return made | {"parts": [(str(name), _stated(part)) for name, part in parts.items()]}
+    return made | {"parts": list(stated.items())}
