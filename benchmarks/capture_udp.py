@@ -8,7 +8,7 @@ Latency: ours from the kernel's stamp to the end of decoding, a datagram each; f
 the send to the packet's delivery (it has no other stamp), which adds the sending.
 
 Peer: faery's UDP receiver. Unit: us from arrival to decoded; cores; datagrams lost. Goal: 21.3 million events/s without
-a loss in .15 core (receiving alone .05), p50 below 50 us, p99 below 1 ms.
+a loss in .15 core (receiving alone .05), up to 1e7 events/s p50 below 50 us, p99 below 1 ms.
 """
 
 from __future__ import annotations
@@ -183,8 +183,8 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
         "datagrams lost at 21.3 M events/s": worst["lost_datagrams"],
         "receiving alone, while another thread records, cores": result["worst_case_recorded"]["receive_cores"],
         "receiving and decoding, cores": worst["cores"],
-        "p50, us": max(row["taxel"]["p50"]["median"] for row in slowest),
-        "p99, us": max(row["taxel"]["p99"]["median"] for row in slowest),
+        "p50 up to 1e7 events/s, us": max(row["taxel"]["p50"]["median"] for row in slowest),
+        "p99 up to 1e7 events/s, us": max(row["taxel"]["p99"]["median"] for row in slowest),
     }
     sent = {"events sent a second": worst["sent_events_per_s"]}
     return at_least({"events sent a second": 0.98 * WORST}, sent) + at_most(

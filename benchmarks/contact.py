@@ -10,7 +10,7 @@ how many times faster than the board's clock, one thread. A foot's is with the l
 `play` does above 600 taxels.
 
 Peer: ContactMechanics. Unit: CPU seconds a frame; scenes in times the board's clock. Goal: a frame of a footprint 100
-times as fast as the peer.
+times as fast as the peer, by default and from the last frame's forces.
 """
 
 from __future__ import annotations
@@ -133,7 +133,9 @@ def scenes() -> dict[str, Scene]:
 
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
-    return at_least({"a frame of a footprint / ContactMechanics": 100.0}, result["ratios"])
+    from_nothing = "a frame of a footprint / ContactMechanics"
+    both = "frames begun from the last, both / ContactMechanics"
+    return at_least({from_nothing: 100.0, both: 100.0}, result["ratios"])
 
 
 def run(*, quick: bool) -> dict[str, Any]:

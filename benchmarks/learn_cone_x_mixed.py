@@ -104,8 +104,9 @@ def goals(result):
     times = {
         f"{size}, times ConeX": found.get("times ConeX", found.get("times ConeX, at least"))
         for size, case in result["cases"].items()
-        for peer, found in case.items()
-        if peer in PEERS
+        # With a thousand trains the peer is asked for one mix only, as it takes minutes.
+        if not size.startswith("1000/") or size.endswith(f"lambda {ASKED}")
+        for found in (case.get("CVXPY + Clarabel", {}),)
     }
     return at_least(dict.fromkeys(times, 1.0), times)
 

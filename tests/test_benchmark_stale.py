@@ -96,7 +96,11 @@ MET = {"ratios": {"a": 3.0, "b": 2.0, "c": 1.0}}
         ),
         (MET | {"machine": {"others": 0.7, "cores": 2}}, "3 of 3 goals reached; other programs used 0.7 of 2 cores\n"),
         (MET | {"machine": {"others": 0.1, "cores": 2}, "kept": {}}, "3 of 3 goals reached\n"),
-        (MET | {"machine": {"others": None, "cores": 2}}, "3 of 3 goals reached\n"),
+        (
+            MET | {"machine": {"others": None, "load": 9.7, "cores": 2}},
+            "3 of 3 goals reached; what other programs used was not measured, load 9.7\n",
+        ),
+        (MET | {"stable": False}, "3 of 3 goals reached; times vary by more than 15 %: by its own judgement\n"),
         (MET | {"kept": {"x": "2026"}}, "3 of 3 goals reached; 1 time of peers of another day\n"),
         (
             MET
@@ -111,6 +115,7 @@ def test_goals_that_are_not_reached_and_doubts_are_listed(folder: Path, capsys, 
     code, out, _ = call(capsys, "bench", "--goals", "--folder", folder)
     assert code == 0
     assert out.startswith(f"fast, commit 0123abc: {said}other: no result\n")
+    assert out.endswith("goals reached; 2 results of 2 of earlier code\n")
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("[!_]*.py")), ids=lambda path: path.stem)

@@ -133,11 +133,15 @@ def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
 def doubts_of(result: Mapping[str, Any]) -> list[str]:
     """Return what speaks against the times of a result: other programs, other days, times that vary."""
     machine, kept = result.get("machine", {}), result.get("kept", {})
-    others, cores = machine.get("others", 0.0) or 0.0, machine.get("cores", 1)
-    doubts = [f"other programs used {others:.1f} of {counted(cores, 'core')}"] * (others > _BUSY * cores)
+    others, cores = machine.get("others"), machine.get("cores", 1)
+    if others is None:
+        doubts = [f"what other programs used was not measured, load {machine['load']:.1f}"] if "load" in machine else []
+    else:
+        doubts = [f"other programs used {others:.1f} of {counted(cores, 'core')}"] * (others > _BUSY * cores)
     doubts += [f"{counted(len(kept), 'time')} of peers of another day"] * bool(kept)
     # With AVX2 alone a row has the same name.
     vary = list(dict.fromkeys(name for name, one in _measured(result) if one.get("stable") is False))
+    vary = vary or ["by its own judgement"] * (result.get("stable") is False)
     more = f" and {len(vary) - 2} more" * (len(vary) > 2)
     return doubts + [f"times vary by more than 15 %: {'; '.join(vary[:2])}{more}"] * bool(vary)
 
@@ -165,7 +169,8 @@ def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
         typer.echo(f"{name}, commit {result.get('commit', 'unknown')}: {reached}{doubts}")
         for goal in lacks:
             typer.echo(f"  not reached: {goal}")
-    typer.echo(f"{total - missed} of {counted(total, 'goal')} reached")
+    stale = counted(len(stale_results(folder, names)), "result")
+    typer.echo(f"{total - missed} of {counted(total, 'goal')} reached; {stale} of {len(names)} of earlier code")
 
 
 class _Others:
