@@ -156,7 +156,9 @@ def evt2(folder: Path, words: int) -> dict[str, Callable[[], Any]]:
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
     plain = [name for name in result["ratios"] if " / " in name and "fresh" not in name]
-    twice = {"AVX2: taxel, mix, warm / C loop, mix, warm": 2.0}
+    # Where AVX2 is the best that the machine has, it is measured once.
+    before = "AVX2: " if "avx2" in result else ""
+    twice = {f"{before}taxel, mix, warm / C loop, mix, warm": 2.0}
     return not_slower(result, *(name for name in plain if name not in twice)) + at_least(twice, result["ratios"])
 
 
