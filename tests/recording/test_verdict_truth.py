@@ -428,3 +428,31 @@ def test_what_stands_behind_the_end_of_a_file_is_told(tmp_path: Path, appended: 
     assert recording.verdict.status == "damaged"
     bytes_ = "1 byte" if len(more) == 1 else f"{len(more)} bytes"
     assert recording.verdict.startswith(f"damage in the file: {bytes_} behind its end not read; while recording: ")
+
+
+def test_what_two_generations_of_a_file_lost_adds_up(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.mcap", tmp_path / "second.mcap"
+    record(first, some_events(3000))
+    whole = len(taxel.open(first).datagrams())
+
+    def spoil(path: Path, share: float) -> dict[str, int]:
+        data = bytearray(path.read_bytes())
+        at = int(share * len(data))
+        data[at : at + 40] = bytes(40)
+        path.write_bytes(bytes(data))
+        return taxel.open(path).verdict.lost
+
+    before = spoil(first, 0.3)
+    taxel.convert(first, second)
+    assert taxel.open(second).verdict.lost == before
+    after = spoil(second, 0.6)
+    left = len(taxel.open(second).datagrams())
+    assert 0 < before["lost_in_file"] < after["lost_in_file"] == whole - left
+
+
+def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
+    counts = {"received": 5, "recorded": 5, "missing": 0, "decoder": {"resets": 2}}
+    verdict = Verdict._of({"counts": counts})
+    assert verdict == "nothing lost but for what resets hide; 2 resets of the board"
+    assert verdict.status == "complete after arrival"
+    assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"

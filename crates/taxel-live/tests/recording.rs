@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use taxel_core::detect::Detection;
-use taxel_core::wire::Registers;
+use taxel_core::wire::{self, Registers, v2};
 use taxel_core::{Array, Marker, Stop};
-use taxel_live::recording::{Compression, Counts, Ending, Header, NOTHING_LOST, Reader, Topic, Writer, WriterOptions};
+use taxel_live::recording::{
+    Compression, Counts, Ending, Header, NOTHING_LOST, Reader, Status, Topic, Writer, WriterOptions, damage,
+};
 
 /// A folder that is gone when the test ends.
 struct Folder(PathBuf);
@@ -256,6 +258,39 @@ fn wrong_files_are_refused_in_one_line() {
         let error = Reader::open(&path).unwrap_err().to_string();
         assert!(error.contains(reason) && error.contains("a.mcap") && !error.contains('\n'), "{error}");
     }
+}
+
+#[test]
+fn all_that_a_decoder_of_version_2_could_not_use_is_damage() {
+    let found = v2::Counts {
+        datagrams: 9,
+        old: 1,
+        short: 2,
+        long: 3,
+        foreign: 4,
+        checksum: 5,
+        unknown_kind: 6,
+        unknown_flags: 7,
+        malformed: 8,
+        outside: 9,
+        unknown_marker: 10,
+        unknown_value: 11,
+        ..v2::Counts::default()
+    };
+    let (decoder, missing) = damage(&wire::Counts::default(), 0, 0, &found);
+    let verdict = Counts { received: 9, recorded: 9, missing, decoder, ..Counts::default() }.verdict();
+    let expected = [
+        ("datagrams_damaged", 2 + 3 + 4 + 5),
+        ("datagrams_of_an_unknown_kind", 6),
+        ("datagrams_too_late", 1),
+        ("datagrams_with_unknown_flags", 7),
+        ("differences_from_an_unknown_value", 11),
+        ("malformed_bodies", 8),
+        ("markers_with_an_unknown_code", 10),
+        ("taxels_outside_the_array", 9),
+    ];
+    let damaged: Vec<_> = verdict.damaged.iter().map(|(cause, n)| (cause.as_str(), *n)).collect();
+    assert_eq!((damaged, verdict.status), (expected.to_vec(), Status::Damaged));
 }
 
 #[test]
