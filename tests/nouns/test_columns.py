@@ -145,7 +145,7 @@ quiet = {
 }[work]
 columns = [frames.values] if "frames" in work else [events.t, events.x, events.y, events.p]
 size = sum(column.nbytes for column in columns)
-# Pages that the system took away while nobody read them come back here, and not while it is measured.
+# Reading makes pages resident again that the system has reclaimed meanwhile, so that this does not count as a copy.
 for column in columns:
     column.max()
 with open("/proc/self/clear_refs", "w") as reset:

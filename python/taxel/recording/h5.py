@@ -27,7 +27,7 @@ __all__ = ["is_ours", "read_h5", "write_h5"]
 _MARK = "taxel"
 #: Version of the layout.
 _VERSION = 1
-#: Size of the chunks of a data set, which are compressed one by one, each with a checksum.
+#: Size of the chunks of a data set, which are compressed one by one.
 _PIECE_BYTES = 1 << 20
 
 
@@ -56,8 +56,8 @@ def write_h5(part: Path, contents: Contents) -> None:
                 continue
             row = max(1, column[:1].nbytes)
             chunks = (max(1, min(len(column), _PIECE_BYTES // row)), *column.shape[1:]) if column.size else None
-            gzip = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
-            h5.create_dataset(name, data=column, **(gzip | {"chunks": chunks} if chunks else {}))
+            packed = {"chunks": chunks, "compression": "gzip", "compression_opts": 4, "shuffle": True} if chunks else {}
+            h5.create_dataset(name, data=column, **packed)
 
 
 def read_h5(path: Path, array: Array | None) -> Contents:

@@ -83,10 +83,7 @@ class Verdict(str):
     @classmethod
     def _together(cls, parts: Iterable[tuple[str, str]]) -> Self:
         """Return the verdict on several recordings or sources, each with its name."""
-        every = [(name, one if isinstance(one, Verdict) else Verdict(one)) for name, one in parts]
-        together = cls._of({"together": [(name, one._held) for name, one in every]})
-        after = min((t for _, one in every if (t := one.doubtful_after_us) is not None), default=None)
-        return cls._from({**together._held, "doubtful_after_us": after})
+        return cls._of({"together": [(name, Verdict(one)._held) for name, one in parts]})
 
     def _later(self, shift: int) -> Self:
         """Return the verdict on the recording whose times are later by so many us."""

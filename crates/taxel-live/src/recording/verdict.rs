@@ -542,6 +542,8 @@ impl Verdict {
         let mut pieces = vec![];
         for (name, part) in parts {
             whole.status = whole.status.max(part.status);
+            // The earliest of those that there are.
+            whole.doubtful_after_us = whole.doubtful_after_us.into_iter().chain(part.doubtful_after_us).min();
             for (sums, counts) in
                 [(&mut whole.lost, &part.lost), (&mut whole.damaged, &part.damaged), (&mut whole.noted, &part.noted)]
             {
