@@ -90,7 +90,7 @@ def kept_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
 
 def _digest(script: str, packages: str) -> str:
     """Return a digest of the benchmark's own code and of the versions of a peer's packages."""
-    own = Sources({Path(script).stem: Path(script)}, {}).digest(Path(script).stem)
+    own = Sources({Path(script).stem: Path(script)}, {}, without=("goals", "_goals")).digest(Path(script).stem)
     return " ".join([own, *(version(package) for package in packages.split())])
 
 

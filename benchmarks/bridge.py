@@ -37,6 +37,8 @@ STREAMS = {
     "a foot: 5208 datagrams/s of 640 bytes": (192.0, 1, 640),
     "full frames: 10 000 datagrams/s of 1400 bytes": (1000.0, 10, 1400),
 }
+#: The sources of the other wheel.
+READS = ("crates/taxel-bridge/src/**/*.rs", "crates/taxel-bridge/Cargo.lock")
 AHEAD_S, DRIFT_PPM = 3.7, 50.0
 
 SEND = """

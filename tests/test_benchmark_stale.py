@@ -3,52 +3,77 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from shell import call
 
-from taxel.cli.bench import _load, _Others, stale_results
+from taxel.cli.bench import _load, _Others, changed_parts, made_of
+from taxel.report import installed_sources
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import _peer  # noqa: E402  what benchmarks share
 
 BENCHMARK = '''"""How fast is it?"""
+from _goals import at_least
 from _shared import often
 from taxel.metrics import distance_of
 
+READS = ("logic/*.sv",)
+
 def run(*, quick):
     return often(distance_of)
+
+def goals(result):
+    return at_least({"a": 3.0}, result)
 '''
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A benchmark with a result of the current code, and one without a result."""
-    (tmp_path / "results").mkdir()
-    (tmp_path / "fast.py").write_text(BENCHMARK.replace("distance_of", "victor_purpura"))
-    (tmp_path / "other.py").write_text(BENCHMARK.replace("distance_of", "van_rossum"))
-    (tmp_path / "_shared.py").write_text("def often(run):\n    return 3  # times\n")
-    from taxel.report import installed_sources
+    folder = tmp_path / "benchmarks"
+    (folder / "results").mkdir(parents=True)
+    (tmp_path / "logic").mkdir()
+    (tmp_path / "logic" / "top.sv").write_text("module top; endmodule\n")
+    (folder / "fast.py").write_text(BENCHMARK.replace("distance_of", "victor_purpura"))
+    (folder / "other.py").write_text(BENCHMARK.replace("distance_of", "van_rossum"))
+    (folder / "_shared.py").write_text("def often(run):\n    return 3  # times\n")
+    (folder / "_goals.py").write_text("def at_least(limits, figures):\n    return []\n")
+    parts = now(folder)
+    assert {"fast", "_shared", "taxel.metrics.victor_purpura", "logic/top.sv"} <= parts.keys()
+    (folder / "results" / "fast.json").write_text(json.dumps({"made_of": parts}))
+    return folder
 
-    parts = installed_sources(*sorted(tmp_path.glob("*.py"))).parts("fast")
-    assert {"fast", "_shared", "taxel.metrics.victor_purpura"} <= parts.keys()
-    (tmp_path / "results" / "fast.json").write_text(json.dumps({"made_of": parts}))
-    return tmp_path
+
+def now(folder: Path) -> dict[str, str]:
+    """Return what the benchmark's result would be made of, with the patterns that its code names."""
+    installed_sources.cache_clear()  # a process that measures reads each file once
+    return made_of(folder / "fast.py", SimpleNamespace(READS=("logic/*.sv",)))
 
 
-def test_a_result_of_this_code_is_not_stale_and_one_that_is_missing_is(folder: Path) -> None:
-    assert stale_results(folder, ["fast", "other"]) == {"other": ["no result"]}
+def changed(folder: Path) -> list[str]:
+    return changed_parts(json.loads((folder / "results" / "fast.json").read_text()), now(folder))
+
+
+def test_a_result_of_this_code_is_not_stale(folder: Path) -> None:
+    assert changed(folder) == []
 
 
 @pytest.mark.parametrize(
     ("file", "old", "new", "moved"),
     [
         ("fast.py", "How fast", "How slow", []),
+        ("fast.py", "3.0}", "4.0}", []),
+        ("fast.py", "import at_least", "import at_least, at_most", []),
+        ("_goals.py", "[]", "None", []),
+        ("../logic/top.sv", "top", "whole", ["logic/top.sv"]),
         ("_shared.py", "# times", "# rounds", []),
         ("_shared.py", "3", "4", ["_shared"]),
         ("fast.py", "quick", "short", ["fast"]),
@@ -61,22 +86,24 @@ def test_a_result_of_this_code_is_not_stale_and_one_that_is_missing_is(folder: P
     ],
 )
 def test_a_change_in_what_is_measured_is_named(folder: Path, file: str, old: str, new: str, moved: list[str]) -> None:
-    (folder / file).write_text((folder / file).read_text().replace(old, new))
-    assert stale_results(folder, ["fast"]).get("fast", []) == moved
+    text = (folder / file).read_text()
+    assert old in text
+    (folder / file).write_text(text.replace(old, new))
+    assert changed(folder) == moved
 
 
 def test_a_result_without_its_sources_is_stale(folder: Path) -> None:
     (folder / "results" / "fast.json").write_text("{}")
-    assert stale_results(folder, ["fast"]) == {"fast": ["its sources were not recorded"]}
+    assert changed(folder) == ["its sources were not recorded"]
 
 
 JUDGED = (
     BENCHMARK.replace("distance_of", "victor_purpura")
-    + """
-def goals(result):
-    from _goals import at_least, at_most, not_slower
-    return at_least({"a": 3.0}, result["ratios"]) + at_most({"b": 2.0}, result["ratios"]) + not_slower(result, "c")
-"""
+    .replace(
+        'at_least({"a": 3.0}, result)',
+        'at_least({"a": 3.0}, result["ratios"]) + at_most({"b": 2.0}, result["ratios"]) + not_slower(result, "c")',
+    )
+    .replace("import at_least", "import at_least, at_most, not_slower")
 )
 MET = {"ratios": {"a": 3.0, "b": 2.0, "c": 1.0}}
 
@@ -111,11 +138,12 @@ MET = {"ratios": {"a": 3.0, "b": 2.0, "c": 1.0}}
 )
 def test_goals_that_are_not_reached_and_doubts_are_listed(folder: Path, capsys, result: dict, said: str) -> None:
     (folder / "fast.py").write_text(JUDGED)
-    (folder / "results" / "fast.json").write_text(json.dumps({"commit": "0123abc", **result}))
+    shutil.copy(ROOT / "benchmarks" / "_goals.py", folder)
+    (folder / "results" / "fast.json").write_text(json.dumps({"commit": "0123abc", "made_of": now(folder), **result}))
     code, out, _ = call(capsys, "bench", "--goals", "--folder", folder)
     assert code == 0
     assert out.startswith(f"fast, commit 0123abc: {said}other: no result\n")
-    assert out.endswith("goals reached; 2 results of 2 of earlier code\n")
+    assert out.endswith("goals reached; 0 of 2 results of earlier code\n")
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("[!_]*.py")), ids=lambda path: path.stem)
@@ -128,6 +156,8 @@ def test_each_benchmark_states_goals_and_judges_its_saved_result(path: Path) -> 
 
 
 def test_a_benchmark_without_goals_is_refused(folder: Path, capsys) -> None:
+    text = (folder / "fast.py").read_text()
+    (folder / "fast.py").write_text(text.replace("def goals", "def judged"))
     code, _, err = call(capsys, "bench", "fast", "--quick", "--folder", folder)
     assert code
     assert "fast.py: defines no goals(result)" in err
@@ -145,13 +175,15 @@ def test_the_time_of_other_programs_counts() -> None:
     assert found > 0.3
 
 
-def test_modules_are_named_before_the_compiled_part_is_counted(folder: Path, capsys) -> None:
-    before = json.loads((folder / "results" / "fast.json").read_text())["made_of"]
+def test_the_list_of_goals_names_what_has_changed_modules_before_the_compiled_part(folder: Path, capsys) -> None:
+    before = now(folder)
     stale = before | {name: "other" for name in before if name.startswith("taxel._core.") or name == "_shared"}
     (folder / "results" / "fast.json").write_text(json.dumps({"made_of": stale}))
     compiled = sum(name.startswith("taxel._core.") for name in before)
     assert compiled > 1
-    assert f"fast: _shared, {compiled} compiled names\n" in call(capsys, "bench", "--stale", "--folder", folder)[1]
+    out = call(capsys, "bench", "fast", "--goals", "--folder", folder)[1]
+    assert f"  of earlier code; changed: _shared, {compiled} compiled names\n" in out
+    assert out.endswith("; 1 of 1 results of earlier code\n")
 
 
 PEER = "import json, sys\nprint(json.dumps({'cpu_s': float(sys.argv[1]), 'verdict': 'solved'}))\n"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache, cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -36,6 +36,8 @@ class Sources:
         By name, each package's folder, or the file of a single module.
     compiled : mapping of str to str
         The digest of each name of the compiled part.
+    without : names
+        Functions, and modules that are imported, that no result depends on.
 
     Examples
     --------
@@ -44,8 +46,8 @@ class Sources:
     (True, True, False)
     """
 
-    def __init__(self, roots: Mapping[str, Path], compiled: Mapping[str, str]) -> None:
-        self._roots, self._compiled = dict(roots), dict(compiled)
+    def __init__(self, roots: Mapping[str, Path], compiled: Mapping[str, str], without: Collection[str] = ()) -> None:
+        self._roots, self._compiled, self._without = dict(roots), dict(compiled), frozenset(without)
         self._modules: dict[str, _Module | None] = {}
         #: What each module uses, of those that were followed.
         self._followed: dict[str, list[str]] = {}
@@ -90,7 +92,7 @@ class Sources:
     def _module(self, name: str) -> _Module | None:
         if name not in self._modules:
             path = None if f"{name}.".startswith(f"{_BASE}.") else self._path(name)
-            self._modules[name] = None if path is None else _Module(name, path)
+            self._modules[name] = None if path is None else _Module(name, path, self._without)
         return self._modules[name]
 
     def _path(self, name: str) -> Path | None:
@@ -163,9 +165,10 @@ class Sources:
 class _Module:
     """A module's syntax tree and what it imports."""
 
-    def __init__(self, name: str, path: Path) -> None:
+    def __init__(self, name: str, path: Path, without: frozenset[str]) -> None:
         self.name, self.path = name, path
         tree = ast.parse(path.read_bytes())
+        tree.body = [node for node in tree.body if not without & {_called(node)}]
         nodes = list(ast.walk(tree))
         for node in nodes:
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and _described(
@@ -224,6 +227,11 @@ class _Module:
             for file in folder.rglob("*")
             if file.is_file() and file.suffix not in _CODE and not packages & set(file.parents)
         )
+
+
+def _called(node: ast.stmt) -> str | None:
+    """Return the name of a function, or of the module that names are imported from."""
+    return node.module if isinstance(node, ast.ImportFrom) else getattr(node, "name", None)
 
 
 def _described(node: ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
@@ -285,15 +293,17 @@ def _digest(data: bytes) -> str:
 
 
 @cache
-def installed_sources(*more: str | Path) -> Sources:
+def installed_sources(*more: str | Path, without: tuple[str, ...] = ()) -> Sources:
     """Return the sources of the installed `taxel`.
 
     Parameters
     ----------
     *more : str or Path
         Further packages whose imports are followed, by name; files of single modules.
+    without : names
+        Functions, and modules that are imported, that no result depends on.
     """
     files = {file.stem: file for file in more if isinstance(file, Path)}
     packages = {name: find_spec(name) for name in ("taxel", *(name for name in more if isinstance(name, str)))}
     folders = {name: Path(str(spec.origin)).parent for name, spec in packages.items() if spec is not None}
-    return Sources(folders | files, _core.source_digests())
+    return Sources(folders | files, _core.source_digests(), without)

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO
 
@@ -17,11 +18,11 @@ import typer
 
 from taxel._base.files import write_whole
 from taxel._base.messages import counted
-from taxel._base.provenance import Sources, installed_sources
+from taxel._base.provenance import installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
 
-__all__ = ["bench", "doubts_of", "stale_results"]
+__all__ = ["bench", "changed_parts", "doubts_of", "made_of"]
 
 #: Set by --peers: benchmarks then wait for peers that need minutes (benchmarks/_peer.py).
 _PATIENT = "TAXEL_BENCH_PEERS"
@@ -41,12 +42,12 @@ def bench(
     peers: Annotated[
         bool, typer.Option("--peers", help="Wait for peers that need minutes, and save their times for this processor.")
     ] = False,
-    stale: Annotated[
-        bool, typer.Option("--stale", help="List the results that are older than a change in what they measure.")
-    ] = False,
     goals: Annotated[
         bool,
-        typer.Option("--goals", help="List the goals of the saved results, and what speaks against their times."),
+        typer.Option(
+            "--goals",
+            help="List the goals of the saved results, what speaks against their times, and whose code has changed.",
+        ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -64,9 +65,6 @@ def bench(
     if name != "all" and name not in files:
         raise ProblemError(f"no benchmark {name!r}: there are {', '.join(files)} and all")
     names = list(files) if name == "all" else [name]
-    if stale:
-        _list_stale(folder, files, names)
-        return
     # The modules that benchmarks share lie in the same folder; their names begin with an underscore.
     sys.path.insert(0, str(folder.resolve()))
     if goals:
@@ -86,7 +84,7 @@ def bench(
         result["took_s"] = round(time.monotonic() - begun, 1)
         result["machine"]["others"] = others.cores()
         if not quick:
-            result["made_of"] = _sources(folder).parts(stem)
+            result["made_of"] = made_of(files[stem], benchmark)
             place = folder / "results" / f"{stem}.json"
             place.parent.mkdir(exist_ok=True)
             text = json.dumps(result, indent=1) + "\n"
@@ -99,35 +97,31 @@ def bench(
             typer.echo(_table(stem, result, benchmark.goals(result)))
 
 
-def _sources(folder: Path) -> Sources:
-    """Return the sources of the benchmarks and of what they measure."""
-    return installed_sources("taxel_studies", *sorted(folder.glob("*.py")))
+def made_of(file: Path, benchmark: Any) -> dict[str, str]:
+    """Return the digest of every part that a benchmark's result depends on.
+
+    These are the benchmark without its `goals`, what it imports of taxel, of the studies and of its own folder, the
+    Rust sources of the compiled names that are used, and files of the checkout that its `READS` names by patterns.
+    """
+    beside = sorted(file.parent.glob("*.py"))
+    parts = installed_sources("taxel_studies", *beside, without=("goals", "_goals")).parts(file.stem)
+    checkout = file.resolve().parents[1]
+    read = sorted(path for pattern in getattr(benchmark, "READS", ()) for path in checkout.glob(pattern))
+    digests = {str(path.relative_to(checkout)): sha256(path.read_bytes()).hexdigest()[:12] for path in read}
+    return parts | digests
 
 
-def stale_results(folder: Path, names: Sequence[str]) -> dict[str, list[str]]:
-    """Return the results that are older than a change in what they measure, with the changed parts of each."""
-    sources = _sources(folder)
-    stale = {}
-    for name in names:
-        place = folder / "results" / f"{name}.json"
-        before = json.loads(place.read_text(encoding="utf-8")).get("made_of") if place.exists() else None
-        now = sources.parts(name)
-        if before is None:
-            stale[name] = ["its sources were not recorded" if place.exists() else "no result"]
-        elif before != now:
-            stale[name] = sorted(part for part in before.keys() | now.keys() if before.get(part) != now.get(part))
-    return stale
-
-
-def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
-    stale = stale_results(folder, names)
-    for name, parts in stale.items():
-        # A change in the compiled part counts for all names whose Rust module has the changed one below it.
-        compiled = sum(part.startswith(_COMPILED) for part in parts)
-        own = [part for part in parts if not part.startswith(_COMPILED)]
-        more = [f"{len(own) - 5} more modules"] * (len(own) > 5) + [f"{compiled} compiled names"] * bool(compiled)
-        typer.echo(f"{name}: {', '.join([*own[:5], *more])}")
-    typer.echo(f"{counted(len(stale), 'stale result')} of {len(files)}" if stale else "no result is stale")
+def changed_parts(result: Mapping[str, Any], now: Mapping[str, str]) -> list[str]:
+    """Return what a result was made of that is another today; names of the compiled part are counted."""
+    before = result.get("made_of")
+    if before is None:
+        return ["its sources were not recorded"]
+    parts = sorted(part for part in before.keys() | now.keys() if before.get(part) != now.get(part))
+    # A change in the compiled part counts for all names whose Rust module has the changed one below it.
+    compiled = sum(part.startswith(_COMPILED) for part in parts)
+    own = [part for part in parts if not part.startswith(_COMPILED)]
+    more = [f"{len(own) - 5} more"] * (len(own) > 5) + [counted(compiled, "compiled name")] * bool(compiled)
+    return [*own[:5], *more]
 
 
 def doubts_of(result: Mapping[str, Any]) -> list[str]:
@@ -154,23 +148,26 @@ def _measured(part: Mapping[str, Any], name: str = "result") -> list[tuple[str, 
 
 
 def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
-    missed = total = 0
+    missed = total = stale = 0
     for name in names:
         place = folder / "results" / f"{name}.json"
         if not place.exists():
             typer.echo(f"{name}: no result")
             continue
         result = json.loads(place.read_text(encoding="utf-8"))
-        goals = _load(files[name]).goals(result)
+        benchmark = _load(files[name])
+        goals, changed = benchmark.goals(result), changed_parts(result, made_of(files[name], benchmark))
+        stale += bool(changed)
         lacks = [goal for goal in goals if not goal.reached]
         missed, total = missed + len(lacks), total + len(goals)
         doubts = "".join(f"; {doubt}" for doubt in doubts_of(result))
         reached = f"{len(goals) - len(lacks)} of {counted(len(goals), 'goal')} reached"
         typer.echo(f"{name}, commit {result.get('commit', 'unknown')}: {reached}{doubts}")
+        if changed:
+            typer.echo(f"  of earlier code; changed: {', '.join(changed)}")
         for goal in lacks:
             typer.echo(f"  not reached: {goal}")
-    stale = counted(len(stale_results(folder, names)), "result")
-    typer.echo(f"{total - missed} of {counted(total, 'goal')} reached; {stale} of {len(names)} of earlier code")
+    typer.echo(f"{total - missed} of {counted(total, 'goal')} reached; {stale} of {len(names)} results of earlier code")
 
 
 class _Others:
