@@ -1,8 +1,8 @@
 """A peer in a process of its own, stopped at a limit of CPU time; times of minutes are saved.
 
 A peer has a minute of CPU. One that needs more is stopped, unless ``taxel bench --peers`` (`PATIENT`) waits for it:
-then its time is saved in ``results/peers.json`` with the date, the processor's model, and a digest of the benchmark's
-code with the peer's version. It is valid on that model alone, until one of them changes.
+then its time is saved in ``results/peers.json`` with the date, the processor, and a digest of the benchmark's
+code with the peer's version. It is valid on that processor alone, until one of them changes.
 """
 
 from __future__ import annotations

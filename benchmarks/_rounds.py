@@ -96,9 +96,11 @@ def stamp(*packages: str) -> dict[str, Any]:
 
 
 def processor() -> str:
-    """Return the processor's model."""
-    named = (line.split(":", 1)[1].strip() for line in _read("/proc/cpuinfo") if line.startswith("model name"))
-    return next(named, platform.processor())
+    """Return the processor's model and its widest vectors, as models of one name have AVX-512 or not."""
+    about = dict(map(str.strip, line.partition(":")[::2]) for line in _read("/proc/cpuinfo"))
+    flags = about.get("flags", "").split()
+    widest = next((name for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2")) if flag in flags), None)
+    return ", ".join(filter(None, (about.get("model name", platform.processor()), widest)))
 
 
 def version(package: str) -> str:

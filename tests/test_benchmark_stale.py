@@ -13,12 +13,13 @@ from types import SimpleNamespace
 import pytest
 from shell import call
 
-from taxel.cli.bench import _load, _Others, changed_parts, made_of
+from taxel.cli.bench import _load, _Others, changed_parts, goals_of, made_of
 from taxel.report import installed_sources
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import _peer  # noqa: E402  what benchmarks share
+import _rounds  # noqa: E402
 
 BENCHMARK = '''"""How fast is it?"""
 from _goals import at_least
@@ -122,7 +123,7 @@ MET = {"ratios": {"a": 3.0, "b": 2.0, "c": 1.0}}
             "2 of 3 goals reached\n  not reached: b: not measured (goal: at most 2)\n",
         ),
         (MET | {"machine": {"others": 0.7, "cores": 2}}, "3 of 3 goals reached; other programs used 0.7 of 2 cores\n"),
-        (MET | {"machine": {"others": 0.1, "cores": 2}, "kept": {}}, "3 of 3 goals reached\n"),
+        (MET | {"machine": {"others": 0.1, "cores": 2, "cpu": "one, AVX2"}, "kept": {}}, "3 of 3 goals reached\n"),
         (
             MET | {"machine": {"others": None, "load": 9.7, "cores": 2}},
             "3 of 3 goals reached; what other programs used was not measured, load 9.7\n",
@@ -142,17 +143,41 @@ def test_goals_that_are_not_reached_and_doubts_are_listed(folder: Path, capsys, 
     (folder / "results" / "fast.json").write_text(json.dumps({"commit": "0123abc", "made_of": now(folder), **result}))
     code, out, _ = call(capsys, "bench", "--goals", "--folder", folder)
     assert code == 0
-    assert out.startswith(f"fast, commit 0123abc: {said}other: no result\n")
+    assert out.startswith(
+        f"fast, commit 0123abc, {result.get('machine', {}).get('cpu', 'unknown processor')}: {said}other: no result\n"
+    )
     assert out.endswith("goals reached; 0 of 2 results of earlier code\n")
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("[!_]*.py")), ids=lambda path: path.stem)
 def test_each_benchmark_states_goals_and_judges_its_saved_result(path: Path) -> None:
     result = json.loads((path.parent / "results" / f"{path.stem}.json").read_text())
-    goals = _load(path).goals(result)
+    goals = goals_of(_load(path), result)
     assert goals
     for goal in goals:
         assert goal.figure is not None, str(goal)
+
+
+def test_avx2_is_judged_by_the_same_goals_beside_the_best(folder: Path) -> None:
+    """A figure that is the same with both is listed once."""
+    (folder / "fast.py").write_text(JUDGED)
+    result = {"ratios": MET["ratios"] | {"AVX2: a": 2.0, "AVX2: c": 1.5}, "avx2": {}}
+    found = [(goal.what, goal.figure, goal.reached) for goal in goals_of(_load(folder / "fast.py"), result)]
+    best = [("a", 3.0, True), ("b", 2.0, True), ("c", 1.0, True)]
+    assert found == [*best, ("AVX2: a", 2.0, False), ("AVX2: c", 1.5, True)]
+    del result["avx2"]
+    assert [what for what, *_ in best] == [goal.what for goal in goals_of(_load(folder / "fast.py"), result)]
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"), [("avx2 avx512f", "EPYC, AVX-512"), ("sse avx2", "EPYC, AVX2"), ("sse", "EPYC")]
+)
+def test_a_processor_is_its_model_and_its_widest_vectors(
+    monkeypatch: pytest.MonkeyPatch, flags: str, said: str
+) -> None:
+    text = f"processor\t: 0\nmodel name\t: EPYC\nflags\t\t: fpu {flags}\n\n"
+    monkeypatch.setattr(_rounds, "_read", lambda path: (2 * text).splitlines())
+    assert _rounds.processor() == said
 
 
 def test_a_benchmark_without_goals_is_refused(folder: Path, capsys) -> None:

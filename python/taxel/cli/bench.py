@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -22,12 +23,14 @@ from taxel._base.provenance import installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
 
-__all__ = ["bench", "changed_parts", "doubts_of", "made_of"]
+__all__ = ["bench", "changed_parts", "doubts_of", "goals_of", "made_of"]
 
 #: Set by --peers: benchmarks then wait for peers that need minutes (benchmarks/_peer.py).
 _PATIENT = "TAXEL_BENCH_PEERS"
 #: How the parts of a result begin that are compiled.
 _COMPILED = "taxel._core."
+#: How the rows begin that were measured with AVX2 alone (benchmarks/_instructions.py).
+_AVX2 = "AVX2: "
 #: The share of all cores that other programs may use while times are measured.
 _BUSY = 0.1
 
@@ -94,7 +97,7 @@ def bench(
         if as_json:
             typer.echo(json.dumps(result))
         else:
-            typer.echo(_table(stem, result, benchmark.goals(result)))
+            typer.echo(_table(stem, result, goals_of(benchmark, result)))
 
 
 def made_of(file: Path, benchmark: Any) -> dict[str, str]:
@@ -122,6 +125,18 @@ def changed_parts(result: Mapping[str, Any], now: Mapping[str, str]) -> list[str
     own = [part for part in parts if not part.startswith(_COMPILED)]
     more = [f"{len(own) - 5} more"] * (len(own) > 5) + [counted(compiled, "compiled name")] * bool(compiled)
     return [*own[:5], *more]
+
+
+def goals_of(benchmark: Any, result: Mapping[str, Any]) -> list[Any]:
+    """Return the goals with what a result reached, and those of AVX2 alone where it was measured beside the best."""
+    best = list(benchmark.goals(result))
+    if "avx2" not in result:
+        return best
+    ratios = result["ratios"]
+    capped = {name.removeprefix(_AVX2): value for name, value in ratios.items() if name.startswith(_AVX2)}
+    alone = benchmark.goals({**result, "ratios": ratios | capped})
+    # A figure that does not depend on the instructions is listed once.
+    return best + [replace(goal, what=_AVX2 + goal.what) for goal in alone if goal not in best]
 
 
 def doubts_of(result: Mapping[str, Any]) -> list[str]:
@@ -156,13 +171,14 @@ def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
             continue
         result = json.loads(place.read_text(encoding="utf-8"))
         benchmark = _load(files[name])
-        goals, changed = benchmark.goals(result), changed_parts(result, made_of(files[name], benchmark))
+        goals, changed = goals_of(benchmark, result), changed_parts(result, made_of(files[name], benchmark))
         stale += bool(changed)
         lacks = [goal for goal in goals if not goal.reached]
         missed, total = missed + len(lacks), total + len(goals)
         doubts = "".join(f"; {doubt}" for doubt in doubts_of(result))
         reached = f"{len(goals) - len(lacks)} of {counted(len(goals), 'goal')} reached"
-        typer.echo(f"{name}, commit {result.get('commit', 'unknown')}: {reached}{doubts}")
+        where = result.get("machine", {}).get("cpu", "unknown processor")
+        typer.echo(f"{name}, commit {result.get('commit', 'unknown')}, {where}: {reached}{doubts}")
         if changed:
             typer.echo(f"  of earlier code; changed: {', '.join(changed)}")
         for goal in lacks:
