@@ -1,10 +1,12 @@
-"""Figures that README, roadmap and limits quote are those of the saved results, rounded."""
+"""Figures that README, roadmap, limits and the page of accuracy quote are those of the saved results, rounded."""
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -56,21 +58,130 @@ QUOTED = [
 ]
 
 
-def found(result: str, way: tuple[str, ...]) -> float:
+def both(*ways: tuple[str, ...]) -> Callable[[Any], list[float]]:
+    """Return a function to the figures of neuron and rule at the end of each way."""
+    return lambda result: [value(result, (*way, who, "wrong")) for way in ways for who in ("neuron", "rule")]
+
+
+def sums(*names: str) -> Callable[[Any], list[float]]:
+    return lambda result: [result["ratios"][name] for name in names]
+
+
+def trained(result: Any, name: str) -> list[float]:
+    """Return the median over the trainings for neuron and rule."""
+    return [float(np.median([one[who][name] for one in result["trainings"]])) for who in ("neuron", "rule")]
+
+
+def delays(result: Any, label: str) -> list[float]:
+    """Return how many times the rule's delay the neuron's is, smallest and largest."""
+    found = [1 / one for name, one in result["ratios"].items() if f"{label}: plain rule's delay" in name]
+    return [min(found), max(found)]
+
+
+def known(result: Any) -> list[float]:
+    first = result["neuron"]["classes"]["first impact"]
+    return [first[label]["known_ms"]["p50"] for label in ("contact", "lift")]
+
+
+#: In docs/accuracy.md: the words around figures, the result, and the figures in it.
+N = r"([\d.]*\d)"
+ACCURATE: list[tuple[str, str, Callable[[Any], list[float]]]] = [
+    (
+        rf"found \(no fewer\) \| {N} \| {N} \| {N}",
+        "training",
+        lambda r: [
+            sum(one["neuron"]["touches"] for one in r["trainings"]),
+            *sums("as played, found, neuron", "as played, found, rule")(r),
+        ],
+    ),
+    (
+        rf"false \(no more\) \| \| {N} \| {N}",
+        "training",
+        sums("as played, false, neuron", "as played, false, rule"),
+    ),
+    (rf"within .1 ms\) \| \| {N} ms \| {N} ms", "training", lambda r: trained(r, "known at first impacts, ms")),
+    (
+        rf"the rule's \+ 10\) \| {N} \| {N} \| {N}",
+        "training",
+        sums("worn, touches", "worn, wrong, neuron", "worn, wrong, rule"),
+    ),
+    (
+        rf"\(fewer\) \| {N} \| {N} \| {N}",
+        "training",
+        sums("an object stays, touches", "an object stays, wrong, neuron", "an object stays, wrong, rule"),
+    ),
+    (
+        rf"ten scenes take {N} s of processor time, and ten minutes .* {N} s \({N} and {N} s on the clock",
+        "training",
+        lambda r: [r["time"][of][clock] for clock in ("cpu_s", "wall_s") for of in ("ten scenes", "ten minutes")],
+    ),
+    (rf"recording \({N} of {N}\)", "training", lambda r: [r["live"]["live"], r["live"]["recording"]]),
+    (
+        rf"training finds {N} %",
+        "training",
+        lambda r: [100 * r["ratios"]["as played, worst training found, of the rule's"]],
+    ),
+    (
+        rf"\({N} wrong, the rule {N}\), then a noise of .6 ticks \({N} and {N}\)",
+        "training",
+        both(("conditions", "stale tare"), ("conditions", "noise .6")),
+    ),
+    (
+        rf"\({N} and {N}, {N} and {N}, {N} and {N}, bad taxels {N} and {N}\)",
+        "training",
+        both(*(("conditions", name) for name in ("noise .3", "noise 1.2", "noise 2.4", "bad taxels"))),
+    ),
+    (
+        rf"miss \({N} and {N} of {N}\)",
+        "training",
+        lambda r: [
+            *(r["stays"][who]["lift, missed"] for who in ("neuron", "rule")),
+            r["stays"]["neuron"]["lift, found"] + r["stays"]["neuron"]["lift, missed"],
+        ],
+    ),
+    (
+        rf"delay is {N} to {N} times the rule's at contacts and {N} to {N} times at lifts",
+        "demo",
+        lambda r: delays(r, "contact") + delays(r, "lift"),
+    ),
+    (rf"{N} ms after the contact and {N} ms after the lift, at the median", "demo", known),
+]
+
+
+def saved(result: str) -> Any:
+    return json.loads((ROOT / "benchmarks" / "results" / f"{result}.json").read_text())
+
+
+def value(result: Any, way: tuple[str, ...]) -> float:
     """Return a figure of a saved result; of growth that of a thousand trains and three hundred patterns."""
-    value: Any = json.loads((ROOT / "benchmarks" / "results" / f"{result}.json").read_text())
     if way[0] == "growth":
-        table = value["growth"]["table"]
+        table = result["growth"]["table"]
         [row] = [one for one in table if (one["time"], one["N"], one["p"]) == (way[1], 1000, 300)]
         return float(row["cpu_s"])
     for key in way:
-        value = value[key]
-    return float(value)
+        result = result[key]
+    return float(result)
+
+
+def quoted(page: str, words: str) -> list[str]:
+    """Return the figures in a page that must be there once."""
+    there = re.findall(words, " ".join((ROOT / page).read_text().split()))
+    assert len(there) == 1, f"{page}: {words} is there {len(there)} times"
+    return [there[0]] if isinstance(there[0], str) else list(there[0])
+
+
+def rounded(figure: float, text: str) -> float:
+    return round(figure, len(text.partition(".")[2]))
 
 
 @pytest.mark.parametrize(("page", "words", "result", "way", "unit"), QUOTED)
 def test_a_quoted_figure_is_that_of_the_saved_result(page, words, result, way, unit):
-    quoted = re.findall(words, " ".join((ROOT / page).read_text().split()))
-    assert len(quoted) == 1, f"{page}: {words} is there {len(quoted)} times"
-    digits = len(quoted[0].partition(".")[2])
-    assert round(found(result, way) / unit, digits) == float(quoted[0]), f"{page}: {words}"
+    [text] = quoted(page, words)
+    assert rounded(value(saved(result), way) / unit, text) == float(text), f"{page}: {words}"
+
+
+@pytest.mark.parametrize(("words", "result", "figures"), ACCURATE)
+def test_a_figure_of_accuracy_is_that_of_the_saved_result(words, result, figures):
+    texts, found = quoted("docs/accuracy.md", words), figures(saved(result))
+    assert len(found) == len(texts)
+    assert [rounded(one, text) for one, text in zip(found, texts, strict=True)] == [float(text) for text in texts]
