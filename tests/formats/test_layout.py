@@ -175,28 +175,86 @@ def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> Non
         taxel.open(tmp_path / "a.h5")
 
 
-def test_arrays_without_a_layout_name_the_layout_that_would_read_them(tmp_path: Path) -> None:
+def layout_said_of(place: Path) -> str:
+    """Return the lines of a layout that the refusal of a file prints, checking the sentence before them."""
+    with pytest.raises(FormatError) as caught:
+        taxel.open(place)
+    said, _, lines = str(caught.value).partition("\n")
+    name = f"{place.name.removesuffix('.gz').rpartition('.')[0]}.layout.toml"
+    assert f", not written by taxel; a layout file beside it, {name}, or one given by --layout, says " in said
+    assert said.endswith(" (docs/files.md):")
+    return lines
+
+
+@pytest.mark.parametrize("flat", [True, False])
+@pytest.mark.parametrize("time", [None, "time_ms", "timestamp"])
+@pytest.mark.parametrize("ending", [".npy", ".npz", ".h5"])
+def test_arrays_without_a_layout_print_the_one_that_reads_them(
+    tmp_path: Path, ending: str, time: str | None, flat: bool
+) -> None:
     import h5py
 
-    pictures, flat = VALUES.reshape(3, 2, 3), VALUES
-    np.save(tmp_path / "a.npy", flat)
-    np.savez(tmp_path / "b.npz", when=[1, 2, 3], palm=pictures)
-    with h5py.File(tmp_path / "c.h5", "w") as h5:
-        h5["run1/palm"] = pictures
-    for name, holds, keys in (
-        ("a.npy", r"an array \(3 x 6\)", "says what it is: rate_hz, rows, columns"),
-        ("b.npz", r"palm \(3 x 2 x 3\), when \(3\)", r'rate_hz, \[data\] array = "palm"'),
-        ("c.h5", r"run1/palm \(3 x 2 x 3\)", r'rate_hz, \[data\] array = "run1/palm"'),
-    ):
-        said = (
-            rf"{name}: holds {holds}, not written by taxel; a layout file beside it, {name[0]}\.layout\.toml, .*{keys}"
-        )
-        with pytest.raises(FormatError, match=rf"{said} \(docs/files\.md\)"):
-            taxel.open(tmp_path / name)
-        # The layout that the error names reads it.
-        data = "" if name == "a.npy" else f'[data]\narray = "{"run1/" * (name == "c.h5")}palm"\n'
-        (tmp_path / f"{name[0]}.layout.toml").write_text("rate_hz = 10\nrows = 2\ncolumns = 3\n" + data)
-        assert taxel.open(tmp_path / name).frames().values.shape == (3, 2, 3)
+    values, place = VALUES if flat else VALUES.reshape(3, 2, 3), tmp_path / f"a{ending}"
+    arrays = {"palm": values} | ({} if time is None or ending == ".npy" else {time: np.array([0, 250, 750])})
+    if ending == ".npy":
+        np.save(place, values)
+    elif ending == ".npz":
+        np.savez(place, **arrays)
+    else:
+        with h5py.File(place, "w") as h5:
+            h5.update({f"run1/{name}": array for name, array in arrays.items()})
+    lines = layout_said_of(place)
+    (tmp_path / "a.layout.toml").write_text(lines)
+    recording = taxel.open(place)
+    np.testing.assert_array_equal(recording.frames().values.reshape(3, 6), VALUES.astype(np.float32))
+    assert recording.array.shape == ((1, 6) if flat else (2, 3))
+    assert recording.timed == (len(arrays) > 1)
+    if recording.timed:
+        assert recording.frames().t.tolist() == [0, 250_000, 750_000] if time == "time_ms" else [0, 250e6, 750e6]
+    else:
+        (tmp_path / "a.layout.toml").write_text(lines.replace("# rate_hz = 100", "rate_hz = 10"))
+        assert taxel.open(place).frames().t.tolist() == [0, 100_000, 200_000]
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+@pytest.mark.parametrize("mark", ["6.5", "", "NaN", "NA", "nan"])
+@pytest.mark.parametrize("head", ["", "of a hand\n\n"])
+@pytest.mark.parametrize("time", ["", "time (ms)", "t_s", "first"])
+@pytest.mark.parametrize("ending", [".csv", ".txt", ".dat.gz"])
+def test_tables_without_a_layout_print_the_one_that_reads_them(
+    tmp_path: Path, separator: str, mark: str, head: str, time: str, ending: str
+) -> None:
+    if separator == " " and (not mark or " " in time):
+        pytest.skip("cells by blanks are never empty, nor have they blanks")
+    values = np.tile(VALUES, (7, 1))
+    t = np.cumsum(np.arange(len(values)))
+    cells = [[f"{cell:g}".replace("6.5", mark) for cell in row] for row in values]
+    if time:
+        cells = [[str(one), *row] for one, row in zip(t, cells, strict=True)]
+    if time not in ("", "first"):
+        cells = [[time, *"abcdef"], *cells]
+    text, place = head + "".join(separator.join(row) + "\n" for row in cells), tmp_path / f"a{ending}"
+    place.write_bytes(gzip.compress(text.encode()) if ending.endswith(".gz") else text.encode())
+    (tmp_path / "a.layout.toml").write_text(layout_said_of(place))
+    recording = taxel.open(place)
+    expected = np.where((values == 6.5) & (mark != "6.5"), np.nan, values)
+    np.testing.assert_array_equal(recording.frames().values[:, 0], expected.astype(np.float32))
+    assert recording.timed == bool(time)
+    expected_us = t * {"": 0, "time (ms)": 1e3}.get(time, 1e6) if time else np.arange(len(t))
+    assert recording.frames().t.tolist() == expected_us.tolist()
+
+
+def test_a_folder_of_tables_without_a_layout_says_the_same(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(lines(VALUES))
+    (tmp_path / "read me.txt").write_text("of a hand")
+    with pytest.raises(FormatError, match=r"a\.csv: holds a table of 6 columns, .*\nrows = 1\ncolumns = 6"):
+        taxel.open(tmp_path)
+
+
+def test_a_text_without_numbers_prints_no_layout(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("of a hand\n")
+    with pytest.raises(FormatError, match=r"no recording; there are .* \(docs/files\.md\)$"):
+        taxel.open(tmp_path / "a.txt")
 
 
 @pytest.mark.parametrize(
@@ -399,7 +457,7 @@ def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: 
     np.save(palm, VALUES)
     assert FileOptions(rate_hz=100.0, array=["2x3"]).one(palm).array.shape == (2, 3)
     refused = CliRunner().invoke(app, ["info", str(palm)])
-    assert str(refused.exception).endswith("or give --rate-hz HZ")
+    assert ", or --rate-hz HZ, says what it is" in str(refused.exception)
 
 
 @pytest.mark.parametrize(

@@ -158,6 +158,27 @@ def test_of_one_board_and_numbers_the_files_own_is_the_board(tmp_path: Path) -> 
         _ = part.sources
 
 
+def test_of_one_board_and_numbers_the_files_verdict_is_of_all(tmp_path: Path) -> None:
+    path, at = tmp_path / "one.mcap", 1_700_000_000_000_000_000
+    stream = {"name": "imu", "array": SMALL._geometry(), "stream": {"columns": ["ax"]}}
+    header = {"array": SMALL._geometry(), "sources": [stream | {"array": taxel.Array(1, 1)._geometry()}]}
+    writer = _core.RecordingWriter(path, json.dumps(header), "none", False)
+    imu = writer.track("imu")
+    for number, t in enumerate(range(0, 200_000, 20_000)):
+        writer.datagram(at + t * 1000, number, taxel.wire.encode(presses(10, 2)[number : number + 1]))
+        imu.samples(np.array([at + t * 1000]), np.array([number], np.uint64), np.array([1.0]))
+    imu.end(json.dumps({"received": 13, "dropped_by_queue": 3}))
+    writer.finish(json.dumps({"received": 10}))
+    recording = taxel.open(path)
+    for one in (recording, recording.on_clock("host"), recording.on_clock("board"), recording.between(0, 50_000)):
+        assert (one.verdict.status, one.verdict.lost) == ("lost", {"dropped_by_queue": 3})
+        assert list(one.verdict.parts) == ["board", "imu"]
+    for one in (recording, recording.on_clock("host")):
+        own = {name: source.verdict for name, source in one.sources.items()}
+        assert own == recording.verdict.parts
+        assert one.sources["board"].sources["board"].verdict.status == "complete after arrival"
+
+
 def test_the_command_line_shows_and_writes_one_source(
     several: tuple[Path, dict[str, taxel.Events]], tmp_path: Path
 ) -> None:

@@ -26,6 +26,8 @@ export function notify(text, bad = false, offer) {
   place.classList.toggle("bad", bad);
   write(part("notice-text", HTMLElement), text);
   clearTimeout(timer);
+  // Lines to be copied stay until they are closed.
+  if (text.includes("\n")) return;
   timer = setTimeout(() => {
     place.hidden = true;
     write(part("notice-text", HTMLElement), "");

@@ -74,8 +74,8 @@ class _Command(TyperCommand):
             text = options[first[1]] + text[first.end() :]
         if "tare" in options:
             text = re.sub(r"without a tare: .*", "without the taxels' rest: give --tare SECONDS or --tare FILE", text)
-        if "rate_hz" in options and ", says what it is: rate_hz" in text:
-            text += f"; or give {options['rate_hz']} HZ"
+        if "rate_hz" in options:
+            text = text.replace(", says what it is", f", or {options['rate_hz']} HZ, says what it is")
         if "--set" in options.values():
             text = re.sub(r"^(encoder \w+: (\w+) is missing)$", r"\1; give --set \2=...", text)
             text = re.sub(r"( ([\d.]+) ms after the last: .* period_ms, .*)$", r"\1; give --set period_ms=\2", text)

@@ -17,10 +17,12 @@ from taxel._base.header_table import HeaderTable
 from taxel._base.limits import TEXT, VALUE
 from taxel._core import FormatError
 
-__all__ = ["head", "lines", "number", "numbers", "table"]
+__all__ = ["beginning", "head", "lines", "number", "numbers", "table"]
 
 #: Number of rows of a table that are in memory as cells of text at once.
 _AT_ONCE = 4096
+#: Bytes of the beginning of a text.
+_BEGINNING = 1 << 16
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
 
@@ -46,7 +48,18 @@ def head(path: Path) -> str:
     ------
     FormatError : not a text, or a damaged gzip file
     """
-    return (_lines(path, _bytes(path, 1 << 16).partition(b"\n")[0]) or [""])[0]
+    return (_lines(path, _bytes(path, _BEGINNING).partition(b"\n")[0]) or [""])[0]
+
+
+def beginning(path: Path) -> list[str]:
+    """Read the whole lines in the first 64 KiB of a text file, as `lines` does.
+
+    Raises
+    ------
+    FormatError : not a text, or a damaged gzip file
+    """
+    data = _bytes(path, _BEGINNING)
+    return _lines(path, data if len(data) < _BEGINNING else data[: data.rfind(b"\n") + 1])
 
 
 def _bytes(path: Path, most: int) -> bytes:

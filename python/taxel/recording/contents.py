@@ -290,8 +290,11 @@ def together(sources: Mapping[str, Contents]) -> bool:
 
 
 def alone(sources: Mapping[str, Contents]) -> Contents:
-    """Return the contents of a file: those of its only source or its only sensor; else those of `several`."""
+    """Return the contents of a file: those of its only source or its only sensor; else those of `several`.
+
+    The verdict is that of all sources.
+    """
     boards = [one for one in sources.values() if vars(one)["columns"] is None]
     if len(sources) == 1:
         return next(iter(sources.values()))
-    return boards[0] if len(boards) == 1 else several(sources)
+    return boards[0].but(verdict=once(lambda: _verdict(sources))) if len(boards) == 1 else several(sources)

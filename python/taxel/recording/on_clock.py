@@ -46,7 +46,8 @@ def on_clock(of: Contents, name: str) -> Contents:
     for label, one in sources.items():
         times = None if label == name else _times(_clock(one), to)
         moved[label] = _moved(one, name, times).but(sources=moved)
-    return alone(moved) if of.is_several else moved[of.label]
+    # The verdict may be that of all sources.
+    return alone(moved) if of.is_several else moved[of.label].but(verdict=vars(of)["verdict"])
 
 
 def _clock(of: Contents) -> Clock:

@@ -25,12 +25,13 @@ from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, is_label_table, is_own_table, kind_of
 from taxel.recording.layout import laid_out, on_array
 from taxel.recording.npz import read_npz
-from taxel.recording.read_foreign import is_foreign, read_foreign, refuse_without_layout
+from taxel.recording.read_foreign import is_foreign, read_foreign
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.read_ros import Topics, read_ros
 from taxel.recording.recording import Recording, with_notes
 from taxel.recording.sidecars import with_sidecars
+from taxel.recording.without_layout import refuse_without_layout
 
 __all__ = [
     "check_recording",
@@ -238,6 +239,8 @@ def _folder(folder: Path, how: How) -> list[Recording]:
         pairs = [(file.relative_to(folder), _open_one(file, how)) for file in foreign]
     else:
         if len(names) != 1:
+            for file in files if not names else ():
+                refuse_without_layout(file)
             problem = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
             deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
             hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""

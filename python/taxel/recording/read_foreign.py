@@ -24,28 +24,40 @@ from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.checks import ascending_us
 from taxel.formats.checks import table as limited
-from taxel.formats.layout import UNITS_US, Data, Layout, Table, advice, as_size
+from taxel.formats.layout import UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Contents
 from taxel.recording.h5 import is_ours
-from taxel.recording.kinds import is_label_table, is_own_table, kind_of
+from taxel.recording.kinds import is_label_table, is_own_table
 
-__all__ = ["is_foreign", "is_lone_array", "read_foreign", "refuse_without_layout"]
+__all__ = [
+    "ARRAYS",
+    "arrays_of",
+    "is_foreign",
+    "is_lone_array",
+    "listed",
+    "read_foreign",
+    "shapes_of",
+    "time_of",
+    "unit_of",
+]
 
 #: The endings of tables of text, also compressed by gzip, and of files of arrays.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
-_DATA = (".npy", ".npz", ".h5", ".hdf5")
+ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
 
-_UNIT = r"(s|secs?|seconds?|ms|us|µs|ns)"
+_UNIT = "s|secs?|seconds?|ms|us|µs|ns"
 
 #: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
-_TIMES = re.compile(rf"(t|time|timestamps?)([ _.]*[\[(/] *{_UNIT} *[\])]?|[ _.]+{_UNIT})?", re.IGNORECASE)
+_TIMES = re.compile(
+    rf"(t|time|timestamps?)([ _.]*[\[(/] *(?P<within>{_UNIT}) *[\])]?|[ _.]+(?P<after>{_UNIT}))?", re.IGNORECASE
+)
 
 
 def is_foreign(path: Path) -> bool:
     """Return whether a file is a table or holds arrays that taxel did not write; false for a file that is not there."""
     ending = Path(path.name.removesuffix(".gz")).suffix.lower()
-    if not path.is_file() or ending not in (*_TABLES, *_DATA):
+    if not path.is_file() or ending not in (*_TABLES, *ARRAYS):
         return False
     if ending == ".npz":
         return not {"t", "about"} & set(stored_names(path))
@@ -58,9 +70,9 @@ def is_foreign(path: Path) -> bool:
 
 def is_lone_array(path: Path) -> bool:
     """Return whether a file that taxel did not write holds one array only, of the shape of pictures."""
-    if path.suffix.lower() not in _DATA or not is_foreign(path):
+    if path.suffix.lower() not in ARRAYS or not is_foreign(path):
         return False
-    there = _shapes(path)
+    there = shapes_of(path)
     return len(there) == 1 and all(len(shape) in (2, 3) for shape in there.values())
 
 
@@ -84,7 +96,7 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
     FormatError : another number of columns than the layout's taxels, a cell that is not a number (names line and
         column), an array that is not there
     """
-    is_table = path.suffix.lower() not in _DATA
+    is_table = path.suffix.lower() not in ARRAYS
     first, unread = 0, ""
     if is_table:
         values, seconds, first = _table(path, layout.table or Table())
@@ -108,34 +120,25 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
     return Contents(path, path.name, kind, array, frames=frames, untimed=seconds is None, lost=lost)
 
 
-def refuse_without_layout(path: Path) -> None:
-    """Refuse a file of arrays that taxel did not write and no layout describes, and say what the layout would say.
+def time_of(names: Sequence[str]) -> int | None:
+    """Return which column holds times by its name; None of none."""
+    # A letter may be the name of a taxel too: t is the time only where it comes first.
+    return next((k for k, name in enumerate(names) if unit_of(name) is not None and (k == 0 or len(name) > 1)), None)
 
-    Raises
-    ------
-    FormatError : it is such a file, or a damaged one
+
+def unit_of(name: str) -> str | None:
+    """Return the unit that the name of a column or an array of times states, "" if none; None of another name.
+
+    Examples
+    --------
+    >>> unit_of("Time (ms)"), unit_of("run1/time"), unit_of("palm")
+    ('ms', '', None)
     """
-    if path.suffix.lower() not in _DATA or not is_foreign(path):
-        return
-    if path.suffix.lower() == ".npz" and not stored_names(path):
-        return
-    if path.suffix.lower() not in (".npy", ".npz"):
-        kind_of(path)  # refuses what is not of the kind that its name says
-    there = _shapes(path)
-    fit = [name for name, shape in there.items() if len(shape) in (2, 3)]
-    if not fit:
-        raise FormatError(
-            f"{path}: holds {_listed(there)}; must be t, x, y, p (events), values, t (pictures), or, with a layout "
-            "file, an array of pictures x rows x columns or pictures x taxels (docs/files.md)"
-        )
-    which = f'[data] array = "{fit[0]}"' if fit[0] else ""
-    flat = "rows, columns" if len(there[fit[0]]) == 2 else ""
-    keys = ", ".join(key for key in ("rate_hz", flat, which) if key)
-    says = f"says which are the pictures: {keys}" if which else f"says what it is: {keys}"
-    raise FormatError(f"{path}: holds {_listed(there)}, not written by taxel; {advice(path, says)}")
+    found = _TIMES.fullmatch(name.strip("\"'").rpartition("/")[2])
+    return None if found is None else (found["within"] or found["after"] or "").lower()
 
 
-def _listed(there: Mapping[str, tuple[int, ...]]) -> str:
+def listed(there: Mapping[str, tuple[int, ...]]) -> str:
     """Return the names and shapes of the first arrays, those that could hold pictures before the others."""
     first = sorted(there.items(), key=lambda one: len(one[1]) not in (2, 3))[:8]
     shown = [f"{name or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
@@ -161,9 +164,8 @@ def _table(path: Path, how: Table) -> tuple[NDArray[np.float64], NDArray[np.floa
     names = names if named else [f"column {k}" for k in range(1, len(names) + 1)]
     first += named
     column = _time_column(path, how, names, named)
-    # A letter may be the name of a taxel too: t is the time only where it comes first.
-    times = (name for k, name in enumerate(names) if _TIMES.fullmatch(name.strip("\"'")) and (k == 0 or len(name) > 1))
-    if column is None and (time := next(times, None)) is not None:
+    if column is None and (place := time_of(names)) is not None:
+        time = names[place]
         raise FormatError(
             f"{path.name}, line {first - 1}: column {shown(time)} holds times by its name; say in the layout: [table] "
             f"time_column = {json.dumps(time, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, skip "
@@ -223,10 +225,10 @@ def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | No
         there: list[str] = [""]
         wanted = there
     else:
-        every = _shapes(path)
+        every = shapes_of(path)
         there = list(every)
         if how.array is None and len(there) != 1:
-            raise FormatError(f"{path}: holds {_listed(every)}; say which in the layout: [data] array")
+            raise FormatError(f"{path}: holds {listed(every)}; say which in the layout: [data] array")
         # A path within a .h5 may begin at its root.
         named = [name if name in every else name.strip("/") for name in (how.array, how.time) if name is not None]
         wanted = [there[0], *named] if how.array is None else named
@@ -234,8 +236,8 @@ def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | No
         if missing is not None:
             size = as_size(missing)
             hint = f"; a size is said by {size}" if size else ""
-            raise FormatError(f"{path}: holds no array {missing}; there are {_listed(every)}{hint}")
-        arrays = _arrays(path, wanted)
+            raise FormatError(f"{path}: holds no array {missing}; there are {listed(every)}{hint}")
+        arrays = arrays_of(path, wanted)
     values, unread = arrays[wanted[0]], ", ".join(name for name in there if name not in wanted)
     if values.dtype.kind not in "uif" or values.ndim not in (2, 3) or 0 in values.shape:
         shape = " x ".join(map(str, values.shape))
@@ -253,7 +255,7 @@ def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | No
     return values, times * UNITS_US[how.time_unit] / 1e6, unread
 
 
-def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
+def shapes_of(path: Path) -> dict[str, tuple[int, ...]]:
     """Return the shapes of the arrays of numbers by name; the one of a .npy has the name ""."""
     if path.suffix.lower() in (".npy", ".npz"):
         return shapes(path)
@@ -261,7 +263,8 @@ def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
         return {name: entry.shape for name, entry in h5.entries.items() if entry.is_numbers}
 
 
-def _arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+def arrays_of(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Read the arrays of these names of a .npz or .h5."""
     if path.suffix.lower() == ".npz":
         return read_arrays(path, names)
     with H5File(path) as h5:

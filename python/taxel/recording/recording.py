@@ -135,8 +135,8 @@ class Recording:
         """The sources of the file by name, in their order in the file, each with its own clock.
 
         Each is a recording that every function accepts. A file of one board has one source. In a file of one board and
-        streams of numbers (an IMU) the events, frames and other attributes are those of the board; in a file of several
-        boards they raise an error that names the sources.
+        streams of numbers (an IMU) the events, frames and other attributes are those of the board, but for the verdict,
+        which is of all; in a file of several boards they raise an error that names the sources.
 
         Raises
         ------
@@ -144,7 +144,7 @@ class Recording:
         """
         own = self._contents
         every = own.sources or {own.label: own}
-        return {name: self if name == own.label else Recording(one_source(own, name)) for name in every}
+        return {name: self if len(every) == 1 else Recording(one_source(own, name)) for name in every}
 
     def on_clock(self, name: str) -> Recording:
         """Return the same recording with the times of all sources by the clock of one of them, or of the host.
