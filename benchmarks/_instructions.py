@@ -43,9 +43,10 @@ def beside_avx2(run: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, A
         )
         capped = json.loads(done.stdout.splitlines()[-1])
         result["avx2"] = {part: capped[part] for part in ("results", "stable") if part in capped}
-        best = result["ratios"]
         # Results that do not depend on the instructions (bytes an event) are equal in both, and are listed once.
-        result["ratios"] = best | {f"AVX2: {key}": v for key, v in capped["ratios"].items() if v != best.get(key)}
+        for of in ("ratios", "spread"):
+            best = result[of]
+            result[of] = best | {f"AVX2: {name}": one for name, one in capped[of].items() if one != best.get(name)}
         return result
 
     return both

@@ -14,11 +14,12 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from _rounds import processor, version
+import numpy as np
+from _rounds import measure, processor, summary, version
 
 from taxel.report import Sources, write_whole
 
@@ -26,6 +27,8 @@ from taxel.report import Sources, write_whole
 PATIENT = "TAXEL_BENCH_PEERS"
 #: Limits of a peer's CPU time without waiting, and in a quick run, s; longer times than the first are saved.
 LONG_S, QUICK_S = 60, 3
+#: CPU time up to which a peer runs in each round, s.
+OFTEN_S = 3
 KEPT = Path(__file__).parent / "results" / "peers.json"
 
 
@@ -76,6 +79,31 @@ def ask(script: str, *arguments: object, packages: str, limit: int, quick: bool)
         text = json.dumps(kept, indent=1, sort_keys=True) + "\n"
         write_whole(KEPT, lambda file: file.write(text.encode()), overwrite=True)
     return found
+
+
+def in_turn(
+    ours: Callable[[], Any], peers: Mapping[str, Callable[[], dict[str, Any]]], rounds: int
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Measure ours and each peer in turn; return ours, and what each peer found with `times`: its time over ours.
+
+    A peer that takes above `OFTEN_S`, is stopped or has a saved time runs once, and its time is over our median; of the
+    others `times` is the median over the rounds, `quartiles` theirs.
+    """
+    mine: list[dict[str, Any]] = []
+    found: dict[str, dict[str, Any]] = {}
+    seconds: dict[str, list[float]] = {name: [] for name in peers}
+    for turn in range(rounds):
+        mine.append(measure({"ours": ours}, rounds=1, warm_up=not turn)["ours"])
+        for name, run in peers.items():
+            if not turn or ("kept" not in found[name] and found[name].get("cpu_s", LONG_S) <= OFTEN_S):
+                found[name] = run()
+                seconds[name].append(found[name].get("cpu_s", found[name].get("limit_s", LONG_S)))
+    cpu = [one["cpu_s"]["median"] for one in mine]
+    for name, one in found.items():
+        over = cpu if len(seconds[name]) == rounds else [float(np.median(cpu))]
+        low, one["times"], high = np.percentile(np.array(seconds[name][: len(over)]) / over, [25, 50, 75]).tolist()
+        one |= {"rounds": len(over), "quartiles": [low, high]}
+    return summary(cpu, [one["wall_s"]["median"] for one in mine]), found
 
 
 def kept_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:

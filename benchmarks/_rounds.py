@@ -1,4 +1,4 @@
-"""Measuring: peers in one run, rounds interleaved, CPU time of the working thread."""
+"""Measuring: ours and peers in one run, in turn, by the CPU time of the process; BLAS in one thread."""
 
 from __future__ import annotations
 
@@ -6,25 +6,26 @@ import os
 import platform
 import subprocess
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.linalg  # noqa: F401  its pool of threads can be limited once it is loaded
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 #: A ratio is not stable if the interquartile range of the rounds is larger than this share of the median.
 WIDEST = 0.15
 
 
 def measure(
-    runs: Mapping[str, Callable[[], Any]],
-    *,
-    rounds: int,
-    work: float = 1.0,
-    clock: int = time.CLOCK_THREAD_CPUTIME_ID,
+    runs: Mapping[str, Callable[[], Any]], *, rounds: int, work: float = 1.0, warm_up: bool = True
 ) -> dict[str, dict[str, Any]]:
-    """Run each once to warm up, then all of them `rounds` times in turn; return seconds and `work` per second.
+    """Run all of them `rounds` times in turn, BLAS in one thread; return seconds and `work` per second.
+
+    The CPU time is that of the process, of ours and of peers: threads that either starts count.
 
     Parameters
     ----------
@@ -32,35 +33,60 @@ def measure(
     rounds : int
     work : float
         Amount of work of one call, in the unit of the rate: events, spikes ...
-    clock : int
-        CPU time of this thread; of the process (``CLOCK_PROCESS_CPUTIME_ID``) if peers have threads of their own.
+    warm_up : bool
+        Whether each runs once before; calls of minutes need none.
     """
     seconds: dict[str, list[float]] = {name: [] for name in runs}
     walls: dict[str, list[float]] = {name: [] for name in runs}
-    for done in range(rounds + 1):
-        for name, run in runs.items():
-            wall, cpu = time.perf_counter(), time.clock_gettime(clock)
-            run()
-            cpu, wall = time.clock_gettime(clock) - cpu, time.perf_counter() - wall
-            if done:
-                seconds[name].append(cpu)
-                walls[name].append(wall)
-    return {name: _summary(seconds[name], walls[name], work) for name in runs}
+    for done in range(0 if warm_up else 1, rounds + 1):
+        with threadpool_limits(1):  # each time, as a first call may load libraries
+            for name, run in runs.items():
+                wall, cpu = time.perf_counter(), time.process_time()
+                run()
+                cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+                if done:
+                    seconds[name].append(cpu)
+                    walls[name].append(wall)
+    return {name: summary(seconds[name], walls[name], work) for name in runs}
 
 
-def _summary(seconds: list[float], walls: list[float], work: float) -> dict[str, Any]:
-    low, middle, high = np.percentile(seconds, [25, 50, 75])
+def summary(seconds: Sequence[float], walls: Sequence[float], work: float = 1.0) -> dict[str, Any]:
+    """Return median, quartiles and every round of CPU seconds, the median of wall seconds, and the rate."""
+    low, middle, high = np.percentile(seconds, [25, 50, 75]).tolist()
     return {
-        "cpu_s": {"median": middle, "quartiles": [low, high], "rounds": len(seconds)},
+        "cpu_s": {"median": middle, "quartiles": [low, high], "rounds": list(seconds)},
         "wall_s": {"median": float(np.median(walls))},
         "rate": work / middle,
-        "stable": bool(high - low <= WIDEST * middle),
+        "stable": high - low <= WIDEST * middle,
     }
 
 
+def compared(
+    results: Mapping[str, Mapping[str, Any]], pairs: Mapping[str, tuple[str, str]]
+) -> tuple[dict[str, float], dict[str, list[float]]]:
+    """Return how many times less CPU time ours took than the peer: medians over the rounds, and quartiles.
+
+    Parameters
+    ----------
+    results : what `measure` returned
+    pairs : by the ratio's name, the names of ours and of the peer
+    """
+
+    def rates(name: str) -> NDArray[np.float64]:
+        of = results[name]
+        return of["rate"] * of["cpu_s"]["median"] / np.array(of["cpu_s"]["rounds"])
+
+    ratios, spread = {}, {}
+    for name, (ours, peer) in pairs.items():
+        # Both of a round ran one after the other, so that what slows the machine for a while slows both.
+        low, ratios[name], high = np.percentile(rates(ours) / rates(peer), [25, 50, 75]).tolist()
+        spread[name] = [low, high]
+    return ratios, spread
+
+
 def ratio(results: Mapping[str, Mapping[str, Any]], ours: str, peer: str) -> float:
-    """Return how many times faster ours is than the peer, by medians."""
-    return float(results[ours]["rate"] / results[peer]["rate"])
+    """Return how many times less CPU time ours took than the peer: the median over the rounds."""
+    return compared(results, {"": (ours, peer)})[0][""]
 
 
 def thread_seconds() -> dict[str, float]:

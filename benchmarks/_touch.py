@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from _rounds import measure, ratio, stamp
+from _rounds import compared, measure, stamp
 
 import taxel
 from taxel import Array, Events, Frames, SpikeTrains, Tare
@@ -86,7 +86,8 @@ def compare(
             raise taxel.Error(f"{name}: {mine} spikes, the NumPy version has {theirs}")
     runs = {f"taxel, {name}": call for name, call in ours.items()} | {f"numpy, {name}": c for name, c in numpy.items()}
     results = measure(runs, rounds=2 if quick else 7, work=seconds)
-    ratios = {f"taxel / numpy, {name}": ratio(results, f"taxel, {name}", f"numpy, {name}") for name in numpy}
+    pairs = {f"taxel / numpy, {name}": (f"taxel, {name}", f"numpy, {name}") for name in numpy}
+    ratios, spread = compared(results, pairs)
     ratios |= {f"{name}, times real time": result["rate"] for name, result in results.items()}
     return {
         "question": (about or "").splitlines()[0],
@@ -95,5 +96,6 @@ def compare(
         **facts,
         "results": results,
         "ratios": ratios,
+        "spread": spread,
         "stable": all(result["stable"] for result in results.values()),
     }

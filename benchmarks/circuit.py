@@ -9,10 +9,9 @@ Peer: `numpy.linalg.solve`, and SciPy's `splu`. Unit: CPU seconds a frame. Goal:
 
 import numpy as np
 from _goals import not_slower
-from _rounds import measure, ratio, stamp
+from _rounds import compared, measure, stamp
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
-from threadpoolctl import threadpool_limits
 
 from taxel.simulate.circuit import Fabric, VirtualGround
 
@@ -80,26 +79,29 @@ def run(*, quick):
         "without wires": float(np.abs(plain.volts(g) - dense(plain, g)).max()),
         "with wires": float(np.abs(wired.volts(g) - sparse(wired, g)).max()),
     }
-    # One thread for all: at this size BLAS' own threads wait for each other longer than they compute.
-    with threadpool_limits(1):
-        results = measure(
-            {
-                "taxel": lambda: plain.volts(g),
-                "numpy.linalg.solve": lambda: dense(plain, g),
-                "taxel, with wires": lambda: wired.volts(g),
-                "scipy splu, with wires": lambda: sparse(wired, g),
-            },
-            rounds=rounds,
-        )
+    results = measure(
+        {
+            "taxel": lambda: plain.volts(g),
+            "numpy.linalg.solve": lambda: dense(plain, g),
+            "taxel, with wires": lambda: wired.volts(g),
+            "scipy splu, with wires": lambda: sparse(wired, g),
+        },
+        rounds=rounds,
+    )
+    ratios, spread = compared(
+        results,
+        {
+            "numpy.linalg.solve": ("taxel", "numpy.linalg.solve"),
+            "scipy splu, with wires": ("taxel, with wires", "scipy splu, with wires"),
+        },
+    )
     return {
         "question": __doc__.splitlines()[0],
         **stamp("scipy"),
         "size": [size, size],
         "largest difference, V": apart,
         "results": results,
-        "ratios": {
-            "numpy.linalg.solve": ratio(results, "taxel", "numpy.linalg.solve"),
-            "scipy splu, with wires": ratio(results, "taxel, with wires", "scipy splu, with wires"),
-        },
+        "ratios": ratios,
+        "spread": spread,
         "stable": all(result["stable"] for result in results.values()),
     }

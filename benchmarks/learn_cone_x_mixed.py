@@ -1,8 +1,8 @@
 """ConeX with l1, norm and B in the objective against CVXPY + Clarabel with every row (6.4.4, C = 3, on the grid).
 
-Three sizes, four mixes of terms, one thread. The peer runs in a process of its own and is stopped after a minute of
-CPU (15 with ``taxel bench --peers``, which saves a time above one); its time is that of `solve`, without
-stating the rows; ours is the whole `fit`.
+Three sizes, four mixes of terms, one thread. The peer runs in a process of its own, in turn with ConeX if it needs 3 s
+at most, and is stopped after a minute of CPU (15 with ``taxel bench --peers``, which saves a time above one); its time
+is that of `solve`, without stating the rows; ours is the whole `fit`.
 
 Peer: CVXPY with Clarabel. Unit: CPU seconds a fit. Goal: not slower than the peer.
 """
@@ -12,11 +12,12 @@ import json
 import sys
 import time
 import warnings
+from functools import partial
 
 import numpy as np
 from _goals import at_least
-from _peer import ask, kept_of, missing
-from _rounds import WIDEST, measure, stamp
+from _peer import ask, in_turn, kept_of, missing
+from _rounds import WIDEST, stamp
 
 from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX
@@ -71,11 +72,13 @@ def peer(trains, patterns, lambdas):
 
 
 def case(trains, patterns, lambdas, rounds, *, asked, quick):
-    """Measure one size and mix: ConeX, then the peer once, if it is `asked`."""
+    """Measure one size and mix: ConeX, and in turn the peer, if it is `asked`."""
     spikes, targets = draw(trains, patterns)
     examples = [SpikeTrains.from_lists([[s] for s in one], stop=END) for one in spikes], [[t] for t in targets]
     cone = ConeX(neuron=Neuron(time="grid"), horizon=END, lambdas=lambdas, kappa=KAPPA)
-    ours = measure({"ConeX": lambda: cone.fit(*examples)}, rounds=rounds)["ConeX"]
+    (packages,) = PEERS.values()
+    run = partial(ask, __file__, trains, patterns, *lambdas, packages=packages, limit=LIMIT_S, quick=quick)
+    ours, theirs = in_turn(lambda: cone.fit(*examples), dict.fromkeys(PEERS, run) if asked else {}, rounds)
     said = {
         "status": cone.status_,
         "engine": cone.engine_,
@@ -86,14 +89,11 @@ def case(trains, patterns, lambdas, rounds, *, asked, quick):
         "weights of 0": int(np.sum(cone.weights_ == 0)),
     }
     out = {"ConeX": ours | said}
-    if asked:
-        (packages,) = PEERS.values()
-        found = ask(__file__, trains, patterns, *lambdas, packages=packages, limit=LIMIT_S, quick=quick)
-        ratio = round(found.get("cpu_s", found.get("limit_s", LIMIT_S)) / ours["cpu_s"]["median"], 1)
-        found["times ConeX, at least" if "stopped" in found else "times ConeX"] = ratio
+    for name, found in theirs.items():
+        found["times ConeX, at least" if "stopped" in found else "times ConeX"] = found.pop("times")
         if found.get("verdict") == "optimal":
             found["objective, relative difference"] = found["objective"] / cone.objective_ - 1
-        out["CVXPY + Clarabel"] = found
+        out[name] = found
     print(f"{trains}/{patterns} {lambdas}: {out}", file=sys.stderr)
     return out
 

@@ -4,7 +4,7 @@ Trains of 1 s, Victor-Purpura at 50/s, van Rossum at 20 ms. Elephant and PySpike
 (``victor_purpura_distance``, ``van_rossum_distance``, ``isi_distance_matrix``, ``spike_distance_matrix``), as are we
 (``taxel.metrics.pairwise``); elephant's calls on two trains take 2 to 20 times as long a pair as its matrices. Then
 patterns of 256 taxels with about 100 spikes each, as in a matrix of 1800 by 1800: 240 or fewer against each other,
-scaled to all 1 619 100 pairs. One thread; CPU time of it.
+scaled to all 1 619 100 pairs. One thread.
 
 Peer: elephant, and PySpike. Unit: CPU seconds a pair; of the large matrix, minutes. Goal: not slower than either, and
 the same distances.
@@ -16,7 +16,7 @@ import warnings
 import numpy as np
 from _goals import at_most, not_slower
 from _peer import missing
-from _rounds import measure, ratio, stamp
+from _rounds import compared, measure, stamp
 
 from taxel import Array, SpikeTrains, _core
 from taxel.metrics import pairwise
@@ -91,30 +91,29 @@ def against_peers(spikes, absent, *, quick):
     }
     peers = {name: run for peer in PEERS if peer not in absent for name, run in CALLS[peer](lists).items()}
     mine = {name: (lambda run=run: [run() for _ in range(often)]) for name, run in repeated.items()}
-    results = measure({**mine, **peers}, rounds=1 if quick else 3, work=pairs)
+    results = measure({**mine, **peers}, rounds=1 if quick else 5, work=pairs)
     for name in mine:
         for clock in ("cpu_s", "wall_s"):
-            results[name][clock] = {
-                key: np.divide(value, often).tolist() if key != "rounds" else value
-                for key, value in results[name][clock].items()
-            }
+            results[name][clock] = {key: (np.array(one) / often).tolist() for key, one in results[name][clock].items()}
         results[name]["rate"] *= often
     for result in results.values():
         result["us_a_pair"] = 1e6 / result["rate"]
     couples = {name: (f"taxel {name.split()[1]}", name) for name in peers}
+    ratios, spread = compared(results, {f"{name}, {spikes} spikes": couple for name, couple in couples.items()})
     return {
         "trains": count,
         "results": results,
-        "ratios": {f"{name}, {spikes} spikes": ratio(results, *couple) for name, couple in couples.items()},
+        "ratios": ratios,
+        "spread": spread,
         "largest difference": {name: off(repeated[couple[0]](), peers[name]()) for name, couple in couples.items()},
     }
 
 
 def minutes(metric, patterns, vectors=None, **parameters):
     """Return the CPU minutes of a matrix of all of these patterns, on one thread."""
-    begun = time.thread_time()
+    begun = time.process_time()
     _core.pairwise(stated(metric, parameters), listed(metric, "a", patterns), None, 1, vectors, None)
-    return (time.thread_time() - begun) / 60
+    return (time.process_time() - begun) / 60
 
 
 def large(*, quick):
@@ -178,6 +177,6 @@ def run(*, quick):
         "left out": absent,
         "against peers": small,
         "large matrices": large(quick=quick),
-        "ratios": {name: value for part in small.values() for name, value in part["ratios"].items()},
+        **{of: {name: one for part in small.values() for name, one in part[of].items()} for of in ("ratios", "spread")},
         "stable": all(r["stable"] for part in small.values() for r in part["results"].values()),
     }

@@ -88,6 +88,7 @@ def compared(parameters, footfalls, steps):
         "online_s": {"median": float(np.median(mine)), "largest": float(mine.max())},
         "from nothing_s": {"median": float(np.median(whole)), "solving alone": float(np.median(solve))},
         "ratio, median": float(np.median(mine / whole)),
+        "ratio, quartiles": np.percentile(mine / whole, [25, 75]).tolist(),
         "ratio to solving alone, median": float(np.median(mine / solve)),
         "objectives differ by at most": float(off.max()),
         "engine": online.engine_,

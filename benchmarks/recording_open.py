@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from _goals import Goal, at_most
-from _rounds import stamp
+from _rounds import compared, stamp, summary
 from recording_write import BYTES, HEADER, datagrams
 
 from taxel import _core
@@ -78,23 +78,22 @@ def run(*, quick: bool) -> dict[str, Any]:
     none = statistics.median(one[2] for one in found["imported"])
     results = {
         name: {
-            "cpu_s": {"median": statistics.median(one[0] for one in all_of_them), "rounds": rounds},
-            "wall_s": {"median": statistics.median(one[1] for one in all_of_them)},
-            "peak_mb": statistics.median(one[2] for one in all_of_them) - none,
+            **summary([one[0] for one in rows], [one[1] for one in rows]),
+            "peak_mb": statistics.median(one[2] for one in rows) - none,
         }
-        for name, all_of_them in found.items()
+        for name, rows in found.items()
     }
-    decoded = results["decoded"]
-    ratios = {}
-    for name in ("opened", "listed", "cut", "read", "sliced", "cut, its events", "copied"):
-        ratios[f"{name} / decoded, time"] = results[name]["cpu_s"]["median"] / decoded["cpu_s"]["median"]
-        ratios[f"{name} / decoded, memory"] = results[name]["peak_mb"] / max(1.0, decoded["peak_mb"])
+    steps = ("opened", "listed", "cut", "read", "sliced", "cut, its events", "copied")
+    ratios, spread = compared(results, {f"{name} / decoded, time": ("decoded", name) for name in steps})
+    peak = max(1.0, results["decoded"]["peak_mb"])
+    ratios |= {f"{name} / decoded, memory": results[name]["peak_mb"] / peak for name in steps}
     return {
         "question": __doc__.splitlines()[0],
         **stamp(),
         "bytes": raw.size,
         "results": results,
         "ratios": ratios,
+        "spread": spread,
     }
 
 

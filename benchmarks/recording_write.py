@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from _goals import Goal, not_slower
 from _peer import missing
-from _rounds import measure, ratio, stamp
+from _rounds import compared, measure, stamp
 
 from taxel import _core
 
@@ -70,17 +70,16 @@ def run(*, quick: bool) -> dict[str, Any]:
             runs[f"taxel, {compression}"] = lambda c=compression: ours(c)
             if not absent:
                 runs[f"mcap (Python), {compression}"] = official(path, messages, compression)
-        results = measure(runs, rounds=rounds, work=raw.size, clock=time.CLOCK_PROCESS_CPUTIME_ID)
+        results = measure(runs, rounds=rounds, work=raw.size)
         sizes = {}
         for compression in ("none", "lz4", "zstd"):
             ours(compression)
             sizes[compression] = path.stat().st_size / raw.size
         cores = {c: paced(path, c, seconds, (arrived, number, offsets, raw)) for c in ("none", "lz4", "zstd")}
-    ratios = {
-        f"taxel, {c} / mcap (Python), {c}": ratio(results, f"taxel, {c}", f"mcap (Python), {c}")
-        for c in sizes
-        if f"mcap (Python), {c}" in results
-    }
+    pairs = (
+        {} if absent else {f"taxel, {c} / mcap (Python), {c}": (f"taxel, {c}", f"mcap (Python), {c}") for c in sizes}
+    )
+    ratios, spread = compared(results, pairs)
     ratios |= {f"taxel, {c}, MB per CPU second": results[f"taxel, {c}"]["rate"] / 1e6 for c in sizes}
     ratios |= {f"taxel, {c}, at 107 MB/s, cores": cores[c] for c in cores}
     return {
@@ -91,6 +90,7 @@ def run(*, quick: bool) -> dict[str, Any]:
         "size": sizes,
         "results": results,
         "ratios": ratios,
+        "spread": spread,
         "stable": all(result["stable"] for result in results.values()),
     }
 

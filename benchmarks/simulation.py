@@ -16,12 +16,11 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from _goals import Goal, not_slower
-from _rounds import measure, ratio, stamp
+from _rounds import compared, measure, stamp
 from numpy.typing import NDArray
 
 import taxel
@@ -175,18 +174,17 @@ def run(*, quick: bool) -> dict[str, Any]:
             except ImportError as error:
                 absent[f"snntorch, {name}"] = str(error)
         spikes = {name: call() for name, call in runs.items()}
-        results = measure(
-            runs, rounds=rounds, work=float(neurons) * len(trains.times), clock=time.CLOCK_PROCESS_CPUTIME_ID
-        )
+        results = measure(runs, rounds=rounds, work=float(neurons) * len(trains.times))
     apart = abs(spikes["taxel, grid"] / spikes["numpy, 1 ms"] - 1)
     if apart > 1e-3:
         raise taxel.Error(f"spikes on the grid: taxel {spikes['taxel, grid']}, NumPy {spikes['numpy, 1 ms']}")
-    ratios = {}
-    for ours in ("taxel, grid", "taxel, continuous"):
-        for peer in runs:
-            if not peer.startswith("taxel"):
-                with suppress(KeyError):
-                    ratios[f"{ours} / {peer}"] = ratio(results, ours, peer)
+    pairs = {
+        f"{ours} / {peer}": (ours, peer)
+        for ours in ("taxel, grid", "taxel, continuous")
+        for peer in runs
+        if not peer.startswith("taxel")
+    }
+    ratios, spread = compared(results, pairs)
     return {
         "question": (__doc__ or "").splitlines()[0],
         **stamp("brian2", "snntorch", "torch"),
@@ -198,5 +196,6 @@ def run(*, quick: bool) -> dict[str, Any]:
         "left out": absent,
         "results": results,
         "ratios": ratios,
+        "spread": spread,
         "stable": all(result["stable"] for result in results.values()),
     }

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from _goals import Goal, at_least, at_most
 from _instructions import beside_avx2
-from _rounds import measure, ratio, stamp
+from _rounds import compared, measure, stamp
 from numpy.typing import NDArray
 
 from taxel import wire
@@ -186,16 +186,15 @@ def run(*, quick: bool) -> dict[str, Any]:
     for name, found in bytes_an_event.items():
         for how in ("at once", "hold 1 ms"):
             ratios[f"bytes an event, {name}, {how} / version 1"] = found[how]["events against version 1"]
+    pairs: dict[str, tuple[str, str]] = {}
     for name in scenes:
-        ours = f"version 2, {name}"
-        whole = f"decoded, {name}, version 2 / version 1 as one stream"
-        ratios[whole] = ratio(results, ours, f"version 1, {name}")
-        each = f"decoded, {name}, version 2 / version 1 by datagrams"
-        ratios[each] = ratio(results, ours, f"version 1 by datagrams, {name}")
         for peer, how in (("version 1", "version 1 as one stream"), ("version 1 by datagrams",) * 2):
-            new = ratio(results, f"{ours}, new memory", f"{peer}, {name}, new memory")
-            ratios[f"decoded into new memory, {name}, version 2 / {how}"] = new
-        ratios[f"version 2, {name}, million events/s"] = results[ours]["rate"] / 1e6
+            for memory, into in (("", "decoded"), (", new memory", "decoded into new memory")):
+                pair = f"version 2, {name}{memory}", f"{peer}, {name}{memory}"
+                pairs[f"{into}, {name}, version 2 / {how}"] = pair
+        ratios[f"version 2, {name}, million events/s"] = results[f"version 2, {name}"]["rate"] / 1e6
+    found, spread = compared(results, pairs)
+    ratios |= found
     ratios["version 2, a heartbeat, ns"] = 1e9 / results["heartbeats of the drop"]["rate"]
     return {
         "question": __doc__.splitlines()[0],
@@ -204,4 +203,5 @@ def run(*, quick: bool) -> dict[str, Any]:
         "bytes_an_event": bytes_an_event,
         "results": results,
         "ratios": ratios,
+        "spread": spread,
     }

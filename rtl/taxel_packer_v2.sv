@@ -3,7 +3,7 @@
 // A body is written as units of 16 bits. What a datagram holds, and when it ends, is as of the emulated board's packer: an
 // event that does not fit ends it, so does the end of a frame, unless events are held for later ones.
 //
-// Throughput: an event every 2 clocks and one more for each of its units, 1 to 6.
+// Throughput: an event of one unit or two every 3 clocks, and one more clock for each further unit, up to 6.
 // Latency: a datagram is sent when it is known that it is over.
 // Loses nothing: while both banks wait for the link, so does the queue. What the queue lost is flagged.
 module taxel_packer_v2 #(
@@ -97,7 +97,8 @@ module taxel_packer_v2 #(
   assign position = 16'(now.x) << STRIDE | 16'(now.y);
   assign entry_position = 16'(entry.x) << STRIDE | 16'(entry.y);
   assign ahead = entry_position - reached - 16'sd1;
-  assign taken = state == IDLE && valid;
+  // The next entry is taken while the last unit of the one before is written.
+  assign taken = valid && (state == IDLE || (state == WRITE && left == 3'd1 && after == IDLE));
   assign idle  = state == IDLE && !gathered && !valid && !send && !sending;
   assign row_repeated = row[6:0];
 
@@ -201,18 +202,7 @@ module taxel_packer_v2 #(
     };
     case (state)
       IDLE: begin
-        if (valid) begin
-          now        <= entry;
-          moved      <= entry.at != at;
-          behind     <= entry_position <= reached;
-          gap_ahead  <= 15'(ahead);
-          far_ahead  <= 15'(ahead) >= 15'(NEAR);
-          lost       <= lost || entry.lost;
-          states     <= entry.states;
-          totals_due <= entry.totals;
-          state      <= entry.kind == ENTRY_EVENT ? WEIGH : OVER;
-          if (!gathered) format <= entry.format;
-        end else if (leaving && gathered) begin
+        if (leaving && gathered && !valid) begin
           now.kind           <= ENTRY_FLUSH;
           now.at             <= at;
           {states, totals_due} <= '0;
@@ -387,6 +377,18 @@ module taxel_packer_v2 #(
         end
       end
     endcase
+    if (taken) begin
+      now        <= entry;
+      moved      <= entry.at != at;
+      behind     <= entry_position <= reached;
+      gap_ahead  <= 15'(ahead);
+      far_ahead  <= 15'(ahead) >= 15'(NEAR);
+      lost       <= lost || entry.lost;
+      states     <= entry.states;
+      totals_due <= entry.totals;
+      state      <= entry.kind == ENTRY_EVENT ? WEIGH : OVER;
+      if (!gathered) format <= entry.format;
+    end
     if (reset) begin
       {gathered, lost, any, bank, write, send, states_sent, totals_sent} <= '0;
       sequence_number <= '0;

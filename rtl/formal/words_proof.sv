@@ -44,9 +44,10 @@ module words_proof
   assign state = state_t'(4'(packer.state));
   assign after = state_t'(4'(packer.after));
 
-  // What was taken and has not been read yet: an event, or a marker.
-  event_t expected;
-  logic event_waits, marker_waits;
+  // What was taken and has not been read yet: an event, or a marker. It is taken a clock before the last unit of the one
+  // before is written, and so is expected a clock later.
+  event_t coming, expected;
+  logic comes, event_waits, marker_waits;
 
   // A body is of events, of a marker, or of what is repeated. Of events it is read from its first unit on with the
   // kind, the base and the line of its first event, and the header must then say the same.
@@ -139,17 +140,21 @@ module words_proof
       if (datagram.kind < 4'd3 && datagram.base + micros_t'(datagram.span) > promised)
         promised <= datagram.base + micros_t'(datagram.span);
     end
+    comes <= taken;
     if (taken) begin
-      expected     <= entry;
-      event_waits  <= entry.kind == ENTRY_EVENT;
-      marker_waits <= entry.kind == ENTRY_MARKER;
-      newest       <= entry.at;
+      coming <= entry;
+      newest <= entry.at;
+    end
+    if (comes) begin
+      expected     <= coming;
+      event_waits  <= coming.kind == ENTRY_EVENT;
+      marker_waits <= coming.kind == ENTRY_MARKER;
     end
     any_again <= any_again || (write && begins.offset && whole && begins.body == EVENTS);
     any_jump  <= any_jump || (write && begins.body == EVENTS && whole && ones && !up && !begins.offset);
     if (!begun) begin
       held.body <= EMPTY;
-      {event_waits, marker_waits, any_again, any_jump} <= '0;
+      {comes, event_waits, marker_waits, any_again, any_jump} <= '0;
       {promised, newest} <= '0;
     end
   end
@@ -159,8 +164,8 @@ module words_proof
       if (valid) assume (32'(entry.y) < ROWS && entry.at >= newest && !entry.at[47]);
       // A fault shows early, too.
       if (!LEMMAS) assume (!valid || entry.at < 48'd200_000);
-      // Nothing is taken before what was taken last can be read.
-      if (taken) assert ((!event_waits || finds) && (!marker_waits || sends_marker));
+      // Nothing comes before what was taken last can be read.
+      if (comes) assert ((!event_waits || finds) && !marker_waits);
       if (finds) begin
         assert (event_waits);
         assert (position >> STRIDE == 32'(expected.x) && position[STRIDE-1:0] == expected.y);
@@ -192,11 +197,14 @@ module words_proof
   always_comb begin
     if (LEMMAS && begun) begin
       assert (state != WRITE || (packer.left != 0 && packer.left <= 3'd6));
-      assert (promised <= newest && 4'(state) <= 4'(AGE) && (!event_waits || expected.at == newest));
+      assert (promised <= newest && 4'(state) <= 4'(AGE));
+      if (comes) assert (coming.at == newest && packer.now == coming && (state == WEIGH || state == OVER));
+      else assert (!event_waits || expected.at == newest);
       assert (!send || !packer.gathered || state == WEIGH);
       case (state)
         IDLE: assert ((!event_waits || finds) && (!marker_waits || sends_marker));
-        WEIGH, PLACE: assert (event_waits && packer.now == expected && !write && !marker_waits);
+        WEIGH: assert (!marker_waits && (comes || (event_waits && packer.now == expected && !write)));
+        PLACE: assert (event_waits && packer.now == expected && !write && !marker_waits);
         WRITE: assert (after == IDLE ? packer.gathered && !marker_waits : !packer.gathered && !event_waits
                        && (after == BEYOND ? marker_waits && expected.at == packer.now.at
                            : after == REPEAT && !marker_waits));
@@ -204,7 +212,8 @@ module words_proof
         SEND: assert (!packer.gathered && packer.base + packer.span == packer.now.at
                       && packer.span <= 48'd65_535 && !write);
         AGE, BEAT: assert (after == NEXT && !event_waits);
-        OVER: assert (!event_waits || finds);
+        OVER: assert ((!event_waits || finds) && !marker_waits
+                      && (comes ? packer.now.kind != ENTRY_EVENT : packer.now.kind == ENTRY_FLUSH));
         BEYOND: assert (!packer.gathered && !event_waits && marker_waits && read.body == MARKER && read.words == 3'd4
                         && expected.at == packer.now.at);
         // Where events are held nothing else of a frame's end follows.
@@ -217,7 +226,7 @@ module words_proof
         assert (after == WEIGH || after == NEXT);
         assert (after == WEIGH ? event_waits && packer.now == expected && !marker_waits : !event_waits);
       end
-      if (state == OVER || state == AGE || state == BEAT || ((state == CLOSE || state == SEND) && after == NEXT)
+      if (state == AGE || state == BEAT || ((state == CLOSE || state == SEND) && after == NEXT)
           || state == NEXT)
         assert (marker_waits == (packer.now.kind == ENTRY_MARKER) && (!marker_waits || packer.now == expected));
       assert (state != REPEAT || packer.row <= 8'(ROWS));

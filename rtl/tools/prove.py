@@ -141,6 +141,8 @@ PROOFS = (
             (PACKER_V2, "line     <= now.x;", ""),
             (PACKER_V2, "at      <= now.at;", "at      <= base;"),
             (PACKER_V2, "if (left == 3'd1) state <= after;", "if (left <= 3'd2) state <= after;"),
+            (PACKER_V2, "left == 3'd1 && after == IDLE", "after == IDLE"),
+            (PACKER_V2, "left == 3'd1 && after == IDLE", "left == 3'd1"),
             (PACKER_V2, "now.more ? 16'd1 : 16'd2", "now.more ? 16'd2 : 16'd1"),
             (PACKER_V2, "base: now.at,", "base: base,"),
             (PACKER_V2, "since_16   <= at_most(since);", "since_16   <= at_most(since) + 16'd1;"),

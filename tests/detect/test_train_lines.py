@@ -248,7 +248,8 @@ def made() -> tuple[Trained, Example]:
         ((94, 6, 0), (96, 4, 0), 2.0, "--search"),
         ((100, 0, 6), (100, 0, 6), 2.0, "--search"),
         ((94, 6, 0), (94, 6, 0), None, "more labels"),
-        ((0, 1, 0), (0, 1, 0), 2.0, "--search"),
+        ((0, 4, 0), (0, 4, 0), 2.0, "--search"),
+        ((0, 3, 0), (0, 3, 0), 2.0, "more labels"),
     ],
 )
 def test_what_may_help_is_named_where_many_are_missed_or_false(made, held, own, search_s, helps) -> None:
@@ -266,9 +267,25 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     assert loaded_at_rest([example, stale], ContactArea()) == 64
     assert loaded_at_rest([example, stale._replace(tare=None)], ContactArea()) == 0
     assert loaded_at_rest([stale], LevelCrossing([10.0])) == 0
+    few = advised(readout, [stale], scored(0, 1, 0), scored(0, 1, 0), 2.0)["contact"]
+    assert (few.helps, few.because) == (
+        "more labels",
+        "there is 1; 4 are the least to score it held out, 10 for five folds",
+    )
     advice = advised(readout, [stale], scored(9, 1, 0), scored(9, 1, 0), 2.0)
     assert advice["contact"].helps == "another tare"
     assert advice["contact"].because == "64 taxels read above theirs while nothing touches them"
+
+
+def test_another_recipe_may_help_where_it_is_made_for_the_labels(made) -> None:
+    readout, example = made
+    frames = taxel.Frames(np.zeros((2, 8, 8)), [0, 1000], unit="N", array=ARRAY)
+    tared = example._replace(source=frames, tare=taxel.Tare.take(frames), labels={})
+    assert advised(readout, [tared], scored(9, 1, 0), scored(9, 1, 0), None)["contact"].helps == "more labels"
+    by_gait = readout._replace(recipe=taxel.detect.Recipe.load("gait_insole", None, ["contact", "lift"]))
+    advice = advised(by_gait, [tared], scored(9, 1, 0), scored(9, 1, 0), None)["contact"]
+    why = "it is made for contact and lift on a grid of 8 x 8 taxels; this training took gait_insole"
+    assert (advice.helps, advice.because) == ("--recipe touch", why)
 
 
 def test_a_tare_that_drifts_away_is_noticed_at_the_end() -> None:

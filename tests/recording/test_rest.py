@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -111,3 +112,57 @@ def test_what_is_never_quiet_has_no_rest_and_the_page_says_so(tmp_path: Path) ->
     assert refused.returncode == 2
     assert "the rest of its taxels is not known" in refused.stderr
     assert "--tare" in refused.stderr
+
+
+def lain(*, until_s: float = 0.8, events: bool = False) -> tuple[taxel.Events | taxel.Frames, dict[str, list[int]]]:
+    """A hand that lies on rows 2 to 4, columns 5 to 7 from the beginning, then presses of 0.3 s elsewhere, labelled."""
+    rng, hz = np.random.default_rng(3), 200
+    values = 50 + rng.integers(-1, 2, (8 * hz, 8, 10)).astype(np.float32)
+    values[: round(until_s * hz), 2:5, 5:8] += 40
+    contacts = [2 * hz + k * hz * 3 // 2 for k in range(4)]
+    for k in contacts:
+        values[k : k + hz * 3 // 10, 5:8, 1:4] += 60
+    t = np.arange(len(values)) * (1_000_000 // hz)
+    truth = {"contact": [int(t[k]) for k in contacts], "lift": [int(t[k + hz * 3 // 10]) for k in contacts]}
+    frames = taxel.Frames(values, t, unit="ticks", array=taxel.Array(8, 10, 2.0))
+    if not events:
+        return frames, truth
+    rows, last = [], np.full(values.shape[1:], np.nan)
+    for at, picture in zip(t, values, strict=True):
+        for y, x in np.argwhere(~(np.abs(picture - last) <= 3)):
+            rows.append((at, x, y, not picture[y, x] < last[y, x], picture[y, x]))
+            last[y, x] = picture[y, x]
+    t, x, y, p, ticks = map(np.array, zip(*rows, strict=True))
+    return taxel.Events(t, x, y, p, array=frames.array, intensity=ticks.astype(int)), truth
+
+
+@pytest.mark.parametrize("events", [False, True])
+def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_training(
+    tmp_path: Path, events: bool
+) -> None:
+    source, truth = lain(events=events)
+    path, where = tmp_path / "a.npz", "something lay on rows 2 to 4, columns 5 to 7 (up to 4"
+    taxel.convert(source, path)
+    rows = sorted((t, label) for label, times in truth.items() for t in times)
+    (tmp_path / "a.notes.csv").write_text("label,t_us\n" + "".join(f"{label},{t}\n" for t, label in rows))
+    assert where in run("info", path).stdout
+    trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
+    assert where in trained.stderr
+    assert "so the tare is of a time without it" in trained.stderr
+    assert "tare: what the recording holds from 800 to 19" in trained.stdout.replace("from 810", "from 800")
+    # Until the first label: then the tare is of a later quiet stretch.
+    source, _ = lain(until_s=2, events=events)
+    taxel.convert(source, path, overwrite=True)
+    trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
+    assert "so the tare is of a time without it" in trained.stderr
+    begin, end = map(float, re.findall(r"holds from ([\d.]+) to ([\d.]+) ms", trained.stdout)[0])
+    assert 2000 < begin < end
+
+
+@pytest.mark.parametrize("drift", [0.0, 30.0])
+def test_where_nothing_lay_or_the_whole_array_drifts_nothing_is_said(tmp_path: Path, drift: float) -> None:
+    frames, _ = lain(until_s=0)
+    assert isinstance(frames, taxel.Frames)
+    falling = np.linspace(drift, 0, len(frames))[:, None, None].astype(np.float32)
+    taxel.convert(taxel.Frames(frames.values + falling, frames.t, unit="ticks", array=frames.array), tmp_path / "a.npz")
+    assert "something lay" not in run("info", tmp_path / "a.npz").stdout

@@ -184,6 +184,21 @@ def test_loss_in_a_board_s_own_last_second_is_seen_in_a_file_without_its_end(tmp
     assert (verdict.status, verdict.lost) == ("lost", {"lost_on_the_way": 1})
 
 
+@pytest.mark.parametrize("lost", [0, 2])
+def test_what_was_overtaken_when_the_last_counts_were_saved_is_not_lost(lost: int, tmp_path: Path) -> None:
+    sent, path = sent_by_a_board(), tmp_path / "a.mcap"
+    came = [*sent[:20], *sent[21:40], sent[20], *sent[40 + lost : 60]]
+    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
+    for number, one in enumerate(came):
+        writer.datagram(START_NS + number, number, one)
+        if number == 30:
+            writer.counts(START_NS + number, json.dumps({"received": 31, "recorded": 31, "missing": 1}))
+    del writer
+    verdict = taxel.open(path).verdict
+    assert verdict.lost == ({"lost_on_the_way": lost} if lost else {})
+    assert verdict.status == ("lost" if lost else "unfinished")
+
+
 def test_datagrams_of_version_1_that_come_again_are_noted(tmp_path: Path) -> None:
     events = some_events(400, intensity=False)
     events.markers = ()

@@ -241,12 +241,14 @@ def _load(path: Path) -> Any:
 
 def _table(stem: str, result: dict[str, Any], goals: Sequence[Any]) -> str:
     ratios = result.get("ratios", {})
+    spread = {name: f" ({low:.3g} to {high:.3g})" for name, (low, high) in result.get("spread", {}).items()}
     rows = [
-        f"  {key}: {value:.3g}" if isinstance(value, float) else f"  {key}: {value}" for key, value in ratios.items()
+        f"  {name}: {f'{one:.3g}' if isinstance(one, float) else one}{spread.get(name, '')}"
+        for name, one in ratios.items()
     ]
     left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
     saved = [f"  saved, not measured in this run: {peer}: of {when}" for peer, when in result.get("kept", {}).items()]
-    head = f"{stem}: ratios (ours over the peer's, above 1 is faster); {result['took_s']:g} s"
+    head = f"{stem}: ratios (ours over the peer's, above 1 is faster) with quartiles of rounds; {result['took_s']:g} s"
     lacks = [f"  not reached: {goal}" for goal in goals if not goal.reached]
     doubts = [f"  {doubt}" for doubt in doubts_of(result)]
     return "\n".join([head, *rows, *left_out, *saved, *lacks, *doubts])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import comb
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,8 @@ _MANY = 0.05
 _BEFORE_US = 20_000
 #: How many labels at either end of a recording are looked at.
 _LABELS = 4
+#: Of fewer labels than the first no two folds can be made, and of the second five.
+_TWO_FOLDS, _FIVE_FOLDS = 4, 10
 #: Into so many parts a recording is divided to see a drift, at so many pictures of each.
 _PARTS, _LOOKS = 8, 40
 #: A touched taxel reads so many times its drift.
@@ -44,10 +46,7 @@ _CHANCE = 0.05
 class Advice(NamedTuple):
     """What may help a label, and how that is known."""
 
-    helps: Literal[
-        "other times of the labels", "another tare", "the plain rule", "--recipe touch", "other kinds", "--array",
-        "--search", "more labels",
-    ]  # fmt: skip
+    helps: str
     because: str
 
 
@@ -61,14 +60,15 @@ def advised(
 ) -> dict[str, Advice]:
     """Return what may help each label of which more than 5 % are missed or false.
 
-    Other times of the labels where most of them lie at one distance of more than 50 ms from what the sensor felt.
-    Another tare where it holds a touch, where taxels read above their rest before touches begin, or where nothing was
-    felt of most labels that are missed. Else the plain rule, where it makes at most half the mistakes on the same
-    labels; or the recipe that learns from the same quantities, if this one does not. For contact and lift of channels,
-    and kinds of touch that they do not tell, their distance. Other kinds of touch where neither neuron nor rule tells
-    more of them than chance would. Else more labels, where on
-    its own training data the readout makes at most half the mistakes, as it learnt by heart what these data have. Else
-    a search of other parameters, if the recipe lists any.
+    Other times of the labels where most of them lie at one distance of more than 50 ms from what the sensor felt. More
+    labels where there are fewer than four. The recipe that fits recording and labels, if a named one was taken that
+    does not. Another tare where it holds a touch, where taxels read above their rest before touches begin, or where
+    nothing was felt of most labels that are missed. Else the plain rule, where it makes at most half the mistakes on
+    the same labels; or the recipe that learns from the same quantities, if this one does not. For contact and lift of
+    channels, and kinds of touch that they do not tell, their distance. Other kinds of touch where neither neuron nor
+    rule tells more of them than chance would. Else more labels, where on its own training data the readout makes at
+    most half the mistakes, as it learnt by heart what these data have. Else a search of other parameters, if the recipe
+    lists any.
 
     Parameters
     ----------
@@ -96,9 +96,10 @@ def advised(
     better = (
         {} if plain is None or plain.together is None else {one: plain.together[one] for one in plain.better(scored)}
     )
-    channels = lacks_neighbours(examples)
+    channels, recipe = lacks_neighbours(examples), _other_recipe(made, examples)
     return {
-        label: _of_times(made, label, scored[label], times)
+        label: _of_labels(label, scored[label], times, recipe)
+        or _of_tare(made, label, scored[label], times)
         or _advice(
             made,
             label,
@@ -121,12 +122,32 @@ class _OfTimes(NamedTuple):
     loaded: int
 
 
-def _of_times(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advice | None:
-    """Return what is wrong with the times of labels, or with a tare, if anything is."""
-    alignment = made.alignments.get(label)
+def _of_labels(label: str, scored: Score, times: _OfTimes, recipe: Advice | None) -> Advice | None:
+    """Return what is wrong with labels, if anything is: their times, their number, or the recipe that they have."""
     if label in times.off:
         because = f"{times.off[label]}, and are aligned within {WINDOW_MS:.0f} ms only"
         return Advice("other times of the labels", because)
+    if scored.events < _TWO_FOLDS:
+        there = f"there {'is' if scored.events == 1 else 'are'} {scored.events}"
+        return Advice(
+            "more labels", f"{there}; {_TWO_FOLDS} are the least to score it held out, {_FIVE_FOLDS} for five folds"
+        )
+    return recipe
+
+
+def _other_recipe(made: Trained, examples: Sequence[Example]) -> Advice | None:
+    """Return the recipe that fits recording and labels, if another named one was trained by."""
+    used = next((name for name in recipes.names() if recipes.read(name)["about"] == made.recipe.about), None)
+    source = recorded(examples[0].source)
+    if used is None or isinstance(source, SpikeTrains):
+        return None
+    fits, why = recipes.chosen(source, made.readout.labels)
+    return None if fits == used else Advice(f"--recipe {fits}", f"it is made for {why}; this training took {used}")
+
+
+def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advice | None:
+    """Return what is wrong with a tare, if anything is."""
+    alignment = made.alignments.get(label)
     if times.held >= TOUCH:
         late_ms = 0.0 if alignment is None or alignment.train is None else -alignment.median_ms
         why = f", as labels lie {late_ms:.0f} ms after what was felt (median)" * (late_ms > to_ms(_BEFORE_US))

@@ -237,6 +237,8 @@ class _Drawn:
     #: The place of each taxel in the rectangle around them, and that one's shape.
     places: NDArray[np.int64]
     box: tuple[int, int]
+    #: Row and column of the rectangle's first taxel.
+    corner: tuple[int, int]
     #: Place, time (us) and rest of the taxels that were zeroed.
     zeroed: tuple[tuple[int, int, float], ...]
 
@@ -255,7 +257,7 @@ class _Drawn:
             since[known] = np.iinfo(np.int64).min
         values = _core.HeldValues(events._parts(), taxels.astype(np.uint32), begins)
         y, x = np.divmod(taxels, events.array.columns)
-        rows, columns = int(np.ptp(y)) + 1, int(np.ptp(x)) + 1
+        rows, columns, corner = int(np.ptp(y)) + 1, int(np.ptp(x)) + 1, (int(y.min()), int(x.min()))
         if rows * columns > _MOST_PLACES:
             places, rows, columns = np.arange(len(taxels)), 1, len(taxels)
         else:
@@ -263,7 +265,7 @@ class _Drawn:
         of = {int(taxel): k for k, taxel in enumerate(taxels)}
         zeroings = [(of.get(z.y * events.array.columns + z.x), z.t, z.rest) for z in recording.zeroings]
         zeroed = tuple((k, t, rest) for k, t, rest in zeroings if k is not None)
-        return cls(_times(recording), taxels, since, values, places, (rows, columns), zeroed)
+        return cls(_times(recording), taxels, since, values, places, (rows, columns), corner, zeroed)
 
     def areas(self, array: Array) -> NDArray[np.float64]:
         """Return the area of each of the taxels, mm2; 1 each where it is not known."""
@@ -289,9 +291,11 @@ class _Drawn:
 
     def found(self) -> Rest:
         """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""
-        rest = found(lambda: (picture for _, picture in self.blocks()), self.box[0] * self.box[1], self.box[1])
+        size, pictures = self.box[0] * self.box[1], lambda: (picture for _, picture in self.blocks())
+        rest = found(pictures, size, self.box[1], corner=self.corner)
+        lay = None if rest.lay is None else rest.lay[self.places]
         # A board's comparators are turned by its register, not by a layout file.
-        return replace(rest, values=rest.values[self.places], falls=False)
+        return replace(rest, values=rest.values[self.places], lay=lay, falls=False)
 
     def above(self, rest: Rest) -> Iterator[tuple[int, NDArray[np.float32]]]:
         """Yield the number of the first picture of each block, and the values of the taxels above rest."""
@@ -421,9 +425,13 @@ def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float]
     if events.present is None or not events.present.any():
         return None
     drawn = _Drawn.of(recording)
-    rest, values = _rest_of(recording, drawn, tare), np.full(events.array.shape, np.nan)
+    rest, values, lay = _rest_of(recording, drawn, tare), np.full(events.array.shape, np.nan), None
     values.reshape(-1)[drawn.taxels] = rest.values
-    return recording.frames(_rate_hz(recording)), replace(rest, values=values.reshape(-1)), ContactArea().above
+    if rest.lay is not None:
+        lay = np.zeros(values.size)
+        lay[drawn.taxels] = rest.lay
+    raw = recording.frames(_rate_hz(recording))
+    return raw, replace(rest, values=values.reshape(-1), lay=lay), ContactArea().above
 
 
 def _rest_of(recording: Recording, drawn: _Drawn, tare: Tare | None) -> Rest:

@@ -72,6 +72,11 @@ class Rest:
     falls : bool
         Whether values of pictures go further below the rest of a quiet stretch than above it, and come back: less may
         mean more pressure.
+    lay : float64, one a taxel, in the sensor's unit, optional
+        Of a grid: how much more than at rest a taxel read in the quiet stretch, where something lay on it then and was
+        taken away; 0 elsewhere.
+    on : str
+        Where that was, for people; empty where nothing lay there.
     """
 
     source: str
@@ -80,6 +85,8 @@ class Rest:
     begin_us: int = 0
     zeroed: int = 0
     falls: bool = False
+    lay: NDArray[np.float64] | None = None
+    on: str = ""
 
     def __str__(self) -> str:
         """Return the line of ``taxel info``."""
@@ -97,6 +104,7 @@ class Rest:
         if self.quiet_us is not None:
             first, end = ((us - self.begin_us) / 1e6 for us in self.quiet_us)
             text = f"a quiet stretch, {first:.3f} to {end:.3f} s, tracked from there"
+            text += f"; something lay on {self.on} in it" * bool(self.on)
         if self.falls:
             text += "; values fall from it: if less means more pressure, say falls = true in a layout file"
             text += "" if path is None else f" {or_given(path)}"
@@ -166,7 +174,13 @@ def _extremes(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray
 
 
 def found(
-    pictures: Callable[[], Iterable[Picture]], taxels: int, columns: int, scale: float = 1.0, *, falls: bool = False
+    pictures: Callable[[], Iterable[Picture]],
+    taxels: int,
+    columns: int,
+    scale: float = 1.0,
+    *,
+    falls: bool = False,
+    corner: tuple[int, int] = (0, 0),
 ) -> Rest:
     """Return the rest that a quiet stretch of pictures shows (`_core.TrackedRest`), or none.
 
@@ -179,6 +193,8 @@ def found(
         Ticks by the sensor's unit.
     falls : bool
         Whether values fall from the rest with pressure.
+    corner : (int, int)
+        Row and column of the first taxel, for text.
     """
     rest = _core.TrackedRest(columns, NOISE_FLOOR, np.full(taxels, np.nan), falls)
     begin_us = None
@@ -188,15 +204,46 @@ def found(
     unknown = np.full(taxels, np.nan)
     if rest.quiet is None:
         return Rest("none", unknown)
-    begins, released, known = rest.begins / scale, np.zeros(taxels, np.int64), np.zeros(taxels, np.int64)
-    for _, values in pictures():
+    begins, known = rest.begins / scale, np.zeros(taxels, np.int64)
+    released, less, quiet, in_quiet = known.copy(), np.zeros(taxels), np.zeros(taxels), known.copy()
+    for t, values in pictures():
         load = begins - values if falls else values - begins
-        released += np.count_nonzero(load < -LOADED_TICKS / scale, axis=0)
-        known += np.count_nonzero(~np.isnan(values), axis=0)
-    begins[released > LOADED_SHARE * known] = np.nan
+        far = load < -LOADED_TICKS / scale
+        released += np.count_nonzero(far, axis=0)
+        less -= np.where(far, load, 0.0).sum(axis=0)
+        there = ~np.isnan(load)
+        known += np.count_nonzero(there, axis=0)
+        within = slice(*np.searchsorted(t, rest.quiet))
+        quiet += np.where(there, load, 0.0)[within].sum(axis=0)
+        in_quiet += np.count_nonzero(there[within], axis=0)
+    loaded = released > LOADED_SHARE * known
+    begins[loaded] = np.nan
     if np.isnan(begins).all():
         return Rest("none", unknown)
-    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls)
+    lay = quiet / np.maximum(in_quiet, 1) + np.where(loaded, less / np.maximum(released, 1), 0.0)
+    lay = _together(np.where(lay > LOADED_TICKS / scale, lay, 0.0), columns, int(np.count_nonzero(known)))
+    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, lay=lay, on=_where(lay, columns, corner))
+
+
+def _together(lay: NDArray[np.float64], columns: int, known: int) -> NDArray[np.float64]:
+    """Return a load without the taxels that are alone; 0 of channels, and where so many are loaded that it is drift."""
+    on = lay.reshape(-1, columns) > 0
+    if min(on.shape) < _THIRD:
+        return np.zeros_like(lay)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(on, 1), (3, 3)).sum(axis=(2, 3))
+    lay = np.where((on & (around >= _THIRD)).reshape(-1), lay, 0.0)
+    return lay if np.count_nonzero(lay) <= known / 2 else np.zeros_like(lay)
+
+
+def _where(lay: NDArray[np.float64], columns: int, corner: tuple[int, int]) -> str:
+    """Return the rows and columns of a load, and how large it is at most; "" of none."""
+    if not lay.any():
+        return ""
+    sides = []
+    for name, places, first in zip(("row", "column"), np.divmod(np.flatnonzero(lay), columns), corner, strict=True):
+        least, most = int(places.min()) + first, int(places.max()) + first
+        sides.append(f"{name} {least}" if least == most else f"{name}s {least} to {most}")
+    return f"{', '.join(sides)} (up to {lay.max():.3g} above rest)"
 
 
 def of_pictures(frames: Frames) -> Rest:

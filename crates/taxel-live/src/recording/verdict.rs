@@ -601,9 +601,10 @@ fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64) -> Counts
         let known = counts.decoder.entry(cause).or_default();
         *known = n.max(*known);
     }
-    // What was dropped after its arrival is missing among the board's numbers too.
+    // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
+    // among the board's numbers too.
     let missing = found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue);
-    counts.missing = counts.missing.max(missing.filter(|n| counts.missing.is_some() || *n > 0));
+    counts.missing = missing.filter(|n| counts.missing.is_some() || *n > 0).or(counts.missing);
     counts
 }
 
