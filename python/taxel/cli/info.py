@@ -123,16 +123,16 @@ def _spikes(file: Path, as_json: bool, *, drawn: bool) -> str:
         raise ProblemError(f"{file}: spike trains; a picture or a table is of a recording")
     trains = SpikeTrains.load(file)
     silent, seconds = int(np.count_nonzero(trains.counts == 0)), (trains.stop - trains.start) / to_ms(1_000_000)
-    facts = {"file": str(file), "trains": len(trains), "silent_trains": silent, "trains_kind": trains.kind}
-    facts |= {"spikes": int(trains.counts.sum()), "start_ms": trains.start, "stop_ms": trains.stop}
+    spikes = int(trains.counts.sum())
     if as_json:
-        return json.dumps(facts)
-    rate = f", {facts['spikes'] / seconds:.4g} a second of all trains" if seconds else ""
+        facts = {"file": str(file), "trains": len(trains), "silent_trains": silent, "trains_kind": trains.kind}
+        return json.dumps(facts | {"spikes": spikes, "start_ms": trains.start, "stop_ms": trains.stop})
+    rate = f", {spikes / seconds:.4g} a second of all trains" if seconds else ""
     rows = [
         ("trains", f"{len(trains)}, {silent} silent; the file does not say of which encoder"),
         ("kind", trains.kind),
         ("time", f"{trains.start:g} to {trains.stop:g} ms ({seconds:.3f} s)"),
-        ("spikes", f"{facts['spikes']}{rate}"),
+        ("spikes", f"{spikes}{rate}"),
     ]
     return "\n".join([f"{file}: spike trains", *(f"  {name:<20}{value}" for name, value in rows)])
 
