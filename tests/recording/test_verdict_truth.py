@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -307,6 +308,50 @@ def test_conversions_keep_a_verdict_with_its_numbers(kind: str, tmp_path: Path) 
         assert second.to_dict() == first.to_dict()
     taxel.convert(tmp_path / f"b.{kind}", tmp_path / "c.mcap")
     assert taxel.open(tmp_path / "c.mcap").verdict.to_dict() == second.to_dict()
+
+
+@pytest.mark.parametrize("converted", [False, True])
+def test_damage_of_a_file_of_two_boards_counts_once(converted: bool, tmp_path: Path) -> None:
+    path, sent = tmp_path / "two.mcap", sent_by_a_board()
+    writer = _core.RecordingWriter(path, json.dumps(HEADER | {"sources": [HEADER | {"name": "b"}]}), "none", False)
+    b = writer.track("b")
+    for number, one in enumerate(sent):
+        writer.datagram(START_NS + number * 1_000_000, number, one)
+        b.datagram(START_NS + number * 1_000_000, number, one)
+    b.end(json.dumps({"received": len(sent), "missing": 0}))
+    writer.finish(json.dumps({"received": len(sent), "missing": 0}))
+    data = bytearray(path.read_bytes())
+    data[data.index(sent[len(sent) // 2]) + 5] ^= 1
+    path.write_bytes(bytes(data) + b"more")
+    whole = taxel.open(path)
+    if converted:
+        whole = whole.on_clock("b")
+    parts = whole.verdict.parts
+    assert [one.damaged for one in parts.values()] == 2 * [{"bad_chunks": 1, "bytes_after_end": 4}]
+    assert whole.verdict.damaged == {"bad_chunks": 1, "bytes_after_end": 4}
+    gone = [len(sent) - len(one.datagrams()) for one in taxel.open(path).sources.values()]
+    assert [one.lost for one in parts.values()] == [{"lost_in_file": n} for n in gone]
+    assert whole.verdict.lost == {"lost_in_file": sum(gone)}
+    assert Verdict.from_dict(whole.verdict.to_dict()).to_dict() == whole.verdict.to_dict()
+
+
+def test_times_that_are_doubtful_move_with_the_recording() -> None:
+    """Wherever a time stands in the text, it is the field, of the verdict or of one of its parts."""
+    found = {"doubtful_after_us": 700, "damage": {"jumps_of_time": 1}}
+    one = Verdict._of({"file": {"ending": {"finished": {"counts": {"received": 1, "recorded": 1}}}, "decoded": found}})
+    fine = Verdict("nothing lost")
+    both = Verdict._together([("a", one), ("b", one._later(-900)), ("a", fine)])
+    assert both == f"a: {one}; b: {one._later(-900)}; a (2): nothing lost"
+    cut = Verdict._of({"file": {"converted": both._held}})
+    mixed = Verdict._of({"file": {"converted": both._held, "decoded": found | {"doubtful_after_us": -500}}})
+    for verdict, times in ((one, [700]), (both, [700, -200]), (cut, [700, -200]), (mixed, [700, -200, -500])):
+        for shift in (0, 5, -1000, 2**40):
+            moved = verdict._later(shift)
+            told = [int(t) for t in re.findall(r"times after (-?\d+) us are doubtful", moved)]
+            assert told == [t + shift for t in times]
+            assert moved.doubtful_after_us == min(told)
+            assert moved._later(-shift).to_dict() == verdict.to_dict()
+            assert moved.lost == verdict.lost
 
 
 def test_a_merged_verdict_is_the_worst_and_keeps_those_of_its_parts(tmp_path: Path) -> None:

@@ -171,6 +171,10 @@ pub enum Basis {
     Silent(String),
     /// Several recordings or sources.
     Together(Vec<(String, Verdict)>),
+    /// The sources of one file.
+    Sources(Vec<(String, Verdict)>),
+    /// The recording with this verdict, of which all times are later by so many us.
+    Later(i64, Verdict),
     /// The line that an earlier version wrote.
     Line(String),
 }
@@ -292,6 +296,8 @@ impl Verdict {
                 Self { status: Status::Unknown, text, ..Self::default() }
             }
             Basis::Together(parts) => Self::together(parts),
+            Basis::Sources(parts) => Self::of_sources(parts),
+            Basis::Later(us, verdict) => verdict.later(us),
             Basis::Line(line) => Self::of_line(&line),
         }
     }
@@ -503,15 +509,14 @@ impl Verdict {
         } else {
             pieces.push(format!("{before}{}", verdict.text));
         }
+        verdict.text = pieces.join("; ");
         if let Some(after) = decoded.doubtful_after_us {
             verdict.status = verdict.status.max(Status::Damaged);
-            verdict.doubtful_after_us = Some(after);
             // A recorder of an earlier version did not count jumps.
             let jumps = decoded.damage.get(JUMPS).copied().unwrap_or(1);
             verdict.damaged.entry(JUMPS.to_owned()).or_insert(jumps);
-            pieces.push(format!("times after {after} us are doubtful"));
+            verdict.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain([after]).min());
         }
-        verdict.text = pieces.join("; ");
         verdict
     }
 
@@ -532,6 +537,15 @@ impl Verdict {
     ///
     /// Equal verdicts without numbers are one.
     pub(crate) fn together(parts: Vec<(String, Self)>) -> Self {
+        Self::joined(parts, |_, sum, n| sum + n)
+    }
+
+    /// As [`Self::together`], of the sources of one file, whose damage each of them has: it counts once.
+    fn of_sources(parts: Vec<(String, Self)>) -> Self {
+        Self::joined(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
+    }
+
+    fn joined(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
         let numbers = |one: &Self| !(one.lost.is_empty() && one.damaged.is_empty() && one.noted.is_empty());
         if let [(_, first), others @ ..] = &parts[..]
             && (others.is_empty() || (others.iter().all(|(_, one)| one == first) && !numbers(first)))
@@ -539,24 +553,55 @@ impl Verdict {
             return first.clone();
         }
         let mut whole = Self { status: Status::Complete, ..Self::default() };
-        let mut pieces = vec![];
+        let mut named: Vec<(String, Self)> = vec![];
         for (name, part) in parts {
             whole.status = whole.status.max(part.status);
-            // The earliest of those that there are.
-            whole.doubtful_after_us = whole.doubtful_after_us.into_iter().chain(part.doubtful_after_us).min();
             for (sums, counts) in
                 [(&mut whole.lost, &part.lost), (&mut whole.damaged, &part.damaged), (&mut whole.noted, &part.noted)]
             {
-                counts.iter().for_each(|(cause, n)| *sums.entry(cause.clone()).or_default() += n);
+                for (cause, n) in counts {
+                    let sum = sums.entry(cause.clone()).or_default();
+                    *sum = add(cause, *sum, *n);
+                }
             }
-            pieces.push(format!("{name}: {}", part.text));
-            let taken = |name: &str| whole.parts.iter().any(|(known, _)| known == name);
+            let taken = |name: &str| named.iter().any(|(known, _)| known == name);
             let unique = (2..).map(|k| format!("{name} ({k})")).find(|other| !taken(other));
             let name = if taken(&name) { unique.unwrap_or_default() } else { name };
-            whole.parts.push((name, part));
+            named.push((name, part));
         }
-        whole.text = pieces.join("; ");
+        whole.change(|own| {
+            // The earliest of those that there are.
+            own.doubtful_after_us = named.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
+            own.parts = named;
+        });
         whole
+    }
+
+    /// The verdict on the recording whose times are later by so many us.
+    fn later(mut self, us: i64) -> Self {
+        if us != 0 && self.doubtful_after_us.is_some() {
+            self.change(|own| {
+                own.parts.iter_mut().for_each(|(_, part)| *part = std::mem::take(part).later(us));
+                own.doubtful_after_us = own.doubtful_after_us.map(|after| after.saturating_add(us));
+            });
+        }
+        self
+    }
+
+    /// Changes the parts and the time after which times are doubtful, and what the text says of them.
+    fn change(&mut self, change: impl FnOnce(&mut Self)) {
+        let own = self.text.strip_suffix(&self.end()).unwrap_or(&self.text).trim_end_matches("; ").to_owned();
+        change(self);
+        let between = if own.is_empty() || own.ends_with(": ") { "" } else { "; " };
+        self.text = format!("{own}{between}{}", self.end());
+    }
+
+    /// What the text ends with: the texts of all parts, and the time after which times are doubtful unless a part says it.
+    fn end(&self) -> String {
+        let said = self.parts.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
+        let own = self.doubtful_after_us.filter(|_| self.doubtful_after_us != said);
+        let parts = self.parts.iter().map(|(name, part)| format!("{name}: {}", part.text));
+        parts.chain(own.map(|after| format!("times after {after} us are doubtful"))).collect::<Vec<_>>().join("; ")
     }
 
     /// The verdict whose line is all that an earlier version wrote: its status, without numbers.
@@ -635,3 +680,6 @@ pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
+/// Damage that is of a file as a whole, and that each of its sources has.
+const OF_THE_FILE: [&str; 7] =
+    ["bad_chunks", "large_chunks", "skipped_bytes", "torn_bytes", "bytes_after_end", "no_summary", "no_final_counts"];
