@@ -14,6 +14,7 @@ import pytest
 import taxel
 from taxel import Verdict, _core
 from taxel.live.summary import summary_of
+from taxel.recording.contents import Contents, several
 from taxel.recording.verdict import STATUSES
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
@@ -308,6 +309,43 @@ def test_conversions_keep_a_verdict_with_its_numbers(kind: str, tmp_path: Path) 
         assert second.to_dict() == first.to_dict()
     taxel.convert(tmp_path / f"b.{kind}", tmp_path / "c.mcap")
     assert taxel.open(tmp_path / "c.mcap").verdict.to_dict() == second.to_dict()
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.5, 0.8, 0.99])
+@pytest.mark.parametrize("of", ["events", "lines", "pictures", "two"])
+def test_a_converted_file_that_is_cut_says_what_its_source_lost(of: str, share: float, tmp_path: Path) -> None:
+    source = tmp_path / "a.mcap"
+    if of in ("events", "lines"):
+        stream = {"stream": {"columns": ["ax"]}, "array": taxel.Array(1, 1)._geometry()}
+        writer = _core.RecordingWriter(source, json.dumps(HEADER | (stream if of == "lines" else {})), "none", False)
+        at = START_NS + np.arange(3000) * 1_000_000
+        if of == "lines":
+            writer.samples(at, np.arange(3000, dtype=np.uint64), np.arange(3000.0))
+        else:
+            write_all(writer, sent_by_a_board())
+        writer.finish(json.dumps({"received": 3, "dropped_by_kernel": 7}))
+        first: taxel.Recording = taxel.open(source)
+    else:
+        frames = taxel.Frames(np.random.default_rng(2).normal(size=(300, 16, 16)).astype(np.float32), np.arange(300))
+        verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 7}})
+        one = Contents(tmp_path, "a.bag", "ros", frames.array, label="a", frames=frames, verdict=verdict)
+        first = taxel.Recording(one if of == "pictures" else several({"a": one, "b": one.but(label="b")}))
+    lost = first.verdict.lost
+    assert lost == {"dropped_by_kernel": 14 if of == "two" else 7}
+    taxel.convert(first, tmp_path / "b.mcap")
+    assert taxel.open(tmp_path / "b.mcap").verdict.to_dict() == first.verdict.to_dict()
+    data = (tmp_path / "b.mcap").read_bytes()
+    # From behind the header on.
+    (tmp_path / "b.mcap").write_bytes(data[: 2600 + int((len(data) - 2600) * share)])
+    verdict = taxel.open(tmp_path / "b.mcap").verdict
+    assert verdict.lost == lost
+    assert verdict.status == "lost"
+    assert "not finished: " in verdict or share > 0.9, "there the summary is cut"
+
+
+def write_all(writer: _core.RecordingWriter, sent: list[bytes]) -> None:
+    for number, one in enumerate(sent):
+        writer.datagram(START_NS + number * 1_000_000, number, one)
 
 
 @pytest.mark.parametrize("converted", [False, True])

@@ -117,7 +117,7 @@ pub struct Counts {
     /// For version 2: datagrams that the board sent and that never arrived intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
-    /// The verdict of the recording that this one was converted from.
+    /// The verdict of the recording that this one was converted from; earlier versions wrote it here, and none into the header.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converted: Option<Verdict>,
 }
@@ -201,6 +201,8 @@ pub struct Condition {
     pub skipped_numbers: u64,
     /// The last counts before the end.
     pub so_far: Option<Counts>,
+    /// The verdict of the recording that this one was converted from, as the header states it.
+    pub converted: Option<Verdict>,
     /// What decoding found, if the file was decoded.
     pub decoded: Option<Found>,
     /// Whether the source is a stream of numbers.
@@ -403,20 +405,26 @@ impl Verdict {
     /// The verdict on a source of a file.
     fn of_file(condition: Condition) -> Self {
         let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { repeated, so_far, decoded, lines, .. } = condition;
+        let Condition { repeated, so_far, converted, decoded, lines, .. } = condition;
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
         let decoded = decoded.unwrap_or_default();
         let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
         let mut no_counts = false;
         let (mut verdict, why) = match ending {
-            Some(Ending::Finished { counts }) => (Self::of_counts(&counts, nothing_lost), None),
+            Some(Ending::Finished { counts }) => {
+                let converted = converted.or(counts.converted);
+                (Self::of_counts(&Counts { converted, ..counts }, nothing_lost), None)
+            }
             ending => {
                 let why = match ending {
                     Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
                     _ if rebuilt.no_end => NO_END.to_owned(),
                     _ => "not finished: what came last is missing".to_owned(),
                 };
-                let counts = so_far.filter(|counts| counts.received > 0);
+                let counts = match converted {
+                    Some(_) => Some(Counts { converted, ..so_far.unwrap_or_default() }),
+                    None => so_far.filter(|counts| counts.received > 0),
+                };
                 no_counts = counts.is_none();
                 // The file may hold more than its counts, which are saved now and then; where parts were skipped,
                 // decoding finds faults that never came.
@@ -428,10 +436,10 @@ impl Verdict {
         };
         let came_short = !verdict.lost.is_empty();
         if unknown && why.is_some() {
-            // Numbers that the file skips, and that were not dropped before.
-            let dropped = verdict.lost.get("dropped_by_queue").copied().unwrap_or(0);
+            // Numbers that the file skips, and that were not dropped before, or lost in the file that it was converted from.
+            let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
             let datagrams = lost.entry(Topic::Datagrams).or_default();
-            *datagrams = skipped_numbers.saturating_sub(dropped).max(*datagrams);
+            *datagrams = skipped_numbers.saturating_sub(before).max(*datagrams);
         }
         let mut bad = vec![];
         for (n, cause, text) in [
