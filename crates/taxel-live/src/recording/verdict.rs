@@ -109,6 +109,9 @@ pub struct Counts {
     pub dropped_by_kernel: u64,
     /// Datagrams that taxel dropped because its own queue was full.
     pub dropped_by_queue: u64,
+    /// Whether datagrams came several a message (`UDP_GRO`), so that the kernel may have dropped several at once.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub several_a_message: bool,
     /// What the decoder could not use of the bytes received, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
     /// What was lost between the computer that received the datagrams and this one, if they are different.
@@ -335,9 +338,17 @@ impl Verdict {
         ];
         // The board's numbers also skip what was dropped after it was sent, which is counted above.
         let behind: u64 = dropped.iter().filter(|(_, cause, _)| *cause != "not_recorded").map(|(n, ..)| n).sum();
-        let on_the_way = counts.missing.unwrap_or(0).saturating_sub(behind);
+        let missing = counts.missing.unwrap_or(0);
+        // Which of them were dropped is not known where more was dropped than is missing (datagrams that came again), or
+        // more datagrams than messages.
+        let several = counts.several_a_message && counts.dropped_by_kernel > 0 && missing > behind;
+        let unclear = missing.min(behind) > 0 && (several || of_board(REPEATED) > 0);
         let board = (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events");
-        let way = (on_the_way, "lost_on_the_way", "datagrams lost or damaged on the way");
+        let way = if unclear {
+            (missing, "lost_on_the_way_or_dropped", "datagrams lost or damaged on the way or among those dropped")
+        } else {
+            (missing.saturating_sub(behind), "lost_on_the_way", "datagrams lost or damaged on the way")
+        };
         let mut verdict = Self::default();
         let mut words = vec![];
         for (n, cause, what) in std::iter::once(board).chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
