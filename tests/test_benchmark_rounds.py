@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
+from taxel import wire
+
 sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks"))
 import _peer
 import _rounds
+import wire_decode
 
 
 class Clock:
@@ -102,3 +105,24 @@ def test_peers_run_in_turn_with_ours_and_long_ones_once(clock: Clock) -> None:
     times = {name: (one["times"], one["rounds"]) for name, one in found.items()}
     assert times == {"fast": (2.0, 3), "slow": (50.0, 1), "stopped": (60.0, 1), "saved": (300.0, 1)}
     assert found["fast"]["quartiles"] == [1.5, 2.5]
+
+
+def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:
+    ends = {(ours.rpartition(", ")[2], peer.rpartition(", ")[2]) for ours, peer in wire_decode.pairs().values()}
+    assert ends == {("warm", "warm"), ("fresh", "fresh"), ("file", "EVT2")}
+    for ours, peer in wire_decode.pairs().values():
+        assert ours.split(", ")[1] in ("clean", peer.split(", ")[1])
+
+
+@pytest.mark.parametrize("into", ["given", "new"])
+def test_the_c_loop_decodes_what_ours_does(tmp_path: Path, into: str) -> None:
+    loop = wire_decode.compiled(tmp_path)
+    if loop is None:
+        pytest.skip("no C compiler")
+    for name, stream in wire_decode.streams(1000).items():
+        ours = wire.decode(stream)
+        columns = wire.Columns(1002) if into == "given" else None
+        assert wire_decode.by_loop(loop, stream, columns, values=name == "pairs") == len(ours)
+        if columns is not None:
+            assert np.array_equal(columns.t[: len(ours)], ours.t)
+            assert name != "pairs" or np.array_equal(columns.intensity[: len(ours)], ours.intensity)
