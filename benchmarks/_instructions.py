@@ -13,13 +13,6 @@ from typing import Any
 
 from taxel import _core
 
-#: Program that runs a benchmark by its name and prints the result as JSON.
-_ALONE = """
-import importlib, json, sys
-sys.path.insert(0, sys.argv[1])
-print(json.dumps(importlib.import_module(sys.argv[2]).run(quick=sys.argv[3] == "quick")))
-"""
-
 
 def beside_avx2(run: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
     """Add to a benchmark's result the measurements of a process whose dispatch is capped at AVX2.
@@ -35,7 +28,7 @@ def beside_avx2(run: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, A
             return result
         path = Path(run.__code__.co_filename)
         done = subprocess.run(
-            [sys.executable, "-c", _ALONE, path.parent, path.stem, "quick" if quick else "whole"],
+            [sys.executable, path.with_name("_alone.py"), path.stem, "quick" if quick else "whole"],
             env=os.environ | {"TAXEL_INSTRUCTIONS": "avx2"},
             stdout=subprocess.PIPE,
             text=True,

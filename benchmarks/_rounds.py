@@ -84,11 +84,6 @@ def compared(
     return ratios, spread
 
 
-def ratio(results: Mapping[str, Mapping[str, Any]], ours: str, peer: str) -> float:
-    """Return how many times less CPU time ours took than the peer: the median over the rounds."""
-    return compared(results, {"": (ours, peer)})[0][""]
-
-
 def thread_seconds() -> dict[str, float]:
     """Return the CPU time of each named thread of this process so far, s."""
     seconds: dict[str, float] = {}

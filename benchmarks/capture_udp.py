@@ -1,14 +1,13 @@
-"""CPU time and losses of receiving, and latency from arrival to decoded, beside faery's UDP receiver.
+"""CPU time and losses of receiving, and latency from sending to decoded, beside faery's UDP receiver.
 
-Sender and receiver share this machine, over loopback, the sender a process of its own. Ours sends as the board does:
-each 192 us the events of a frame, in datagrams of at most 280 words, which the kernel cuts out of one train
-(UDP_SEGMENT). faery's receiver gets its own format ("t64_x16_y16_on8", 111 events a datagram), paced alike.
+Sender and receiver share this machine, over loopback, the sender a process of its own. *The worst case*: the sender
+sends as the board does, each 192 us the events of a frame, in datagrams of at most 280 words, which the kernel cuts out
+of one train (UDP_SEGMENT). *Beside faery*: both receive from the same sender, paced alike, one send call a datagram of
+111 events, ours in words of 5 bytes, faery's in its own format of 13 ("t64_x16_y16_on8"); in turn. `DOES` says what
+each latency is; the cores are the CPU time of the receiving process.
 
-Latency: ours from the kernel's stamp to the end of decoding, a datagram each; faery's from its sender's clock before
-the send to the packet's delivery (it has no other stamp), which adds the sending.
-
-Peer: faery's UDP receiver. Unit: us from arrival to decoded; cores; datagrams lost. Goal: 21.3 million events/s without
-a loss in .15 core (receiving alone .05), up to 1e7 events/s p50 below 50 us, p99 below 1 ms.
+Peer: faery's UDP receiver. Unit: us from sending to decoded; cores; datagrams lost. Goal: 21.3 million events/s without
+a loss in .15 core (receiving alone .05); beside faery up to 1e7 events/s p50 below 50 us, p99 below 1 ms.
 """
 
 from __future__ import annotations
@@ -37,6 +36,12 @@ from taxel.wire import encode
 WORST = 21.3e6
 FRAME_US, DATAGRAM_WORDS = 192.0, 280
 RATES = (1e4, 1e6, 1e7)
+#: Events a datagram beside faery.
+ALIKE = 111
+DOES = {
+    "taxel": "from the kernel's stamp to the end of decoding in the pipeline's thread, and the time of the send call",
+    "faery": "from the clock just before the send call to the packet of events in Python",
+}
 
 SEND = """
 import json, pickle, sys
@@ -45,28 +50,34 @@ port, path, each, seconds, segment = int(sys.argv[1]), sys.argv[2], int(sys.argv
 print(json.dumps(send(pickle.load(open(path, "rb")), port=port, each=each, seconds=seconds, segment=segment == "1")))
 """
 
-FAERY_SEND = """
-import json, socket, sys, time
+#: Sends datagrams of 111 events: words of a file to ours, or faery's format with the time of each send.
+SEND_ALIKE = """
+import json, pickle, socket, sys, time
 import numpy as np
-port, rate, seconds = int(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3])
+port, rate, seconds, path = int(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3]), sys.argv[4]
+words = pickle.load(open(path, "rb")) if path else None
 events = np.zeros(111, np.dtype([("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("on", "?")]))
 events["x"], events["y"] = np.arange(111) % 64, np.arange(111) // 64
 link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-begun, sent = time.perf_counter(), 0
+begun, calls = time.perf_counter(), []
 while (passed := time.perf_counter() - begun) < seconds:
     due = int(passed * rate / 111)
-    if sent >= due:
+    if len(calls) >= due:
         time.sleep(min(111 / rate, 192e-6))
-    while sent < due:
+    while len(calls) < due:
         events["t"] = time.time_ns() // 1000
+        data = words or events.tobytes()
+        before = time.perf_counter_ns()
+        link.sendto(data, ("127.0.0.1", port))
+        calls.append(time.perf_counter_ns() - before)
+if not words:
+    time.sleep(0.5)
+    events["on"] = True
+    for _ in range(20):
         link.sendto(events.tobytes(), ("127.0.0.1", port))
-        sent += 1
-time.sleep(0.5)
-events["t"], events["on"] = time.time_ns() // 1000, True
-for _ in range(20):
-    link.sendto(events.tobytes(), ("127.0.0.1", port))
-    time.sleep(0.02)
-print(json.dumps({"events": sent * 111}))
+        time.sleep(0.02)
+p50, p99, most = np.percentile(calls, [50, 99, 100]) / 1e3
+print(json.dumps({"datagrams": len(calls), "call_us": {"p50": p50, "p99": p99, "max": most}}))
 """
 
 FAERY_RECEIVE = """
@@ -148,29 +159,52 @@ def ours(rate: float, seconds: float, scratch: Path, *, segment: bool = True, re
     }
 
 
+def send_alike(port: int, rate: float, seconds: float, path: Path | str = "") -> dict[str, Any]:
+    """Send datagrams of 111 events from a process of its own, of words if their file is given."""
+    arguments = [str(port), str(rate), str(seconds), str(path)]
+    done = subprocess.run([sys.executable, "-c", SEND_ALIKE, *arguments], capture_output=True, text=True, check=True)
+    sent: dict[str, Any] = json.loads(done.stdout)
+    return sent
+
+
+def beside_faery(rate: float, seconds: float, scratch: Path) -> dict[str, Any]:
+    """Receive and decode what is sent to faery too, in words."""
+    taxel = np.arange(ALIKE)
+    events = Events(0 * taxel, taxel % 64, taxel // 64, np.ones(ALIKE, bool), array=Array(64, 64))
+    words = scratch / "alike.pickle"
+    words.write_bytes(pickle.dumps(encode(events)))
+    with Live(0, host="127.0.0.1") as live:
+        before = time.process_time()
+        sent = send_alike(live.address[1], rate, seconds, words)
+        time.sleep(0.2)
+        used = time.process_time() - before
+        counters = live.stop().counters
+    delay, call = counters["decode_latency"], sent["call_us"]
+    return {
+        "sent_events_per_s": ALIKE * sent["datagrams"] / seconds,
+        "arrived": counters["decoded"] / sent["datagrams"],
+        "cores": used / seconds,
+        "latency": {name: delay[f"{name}_us"] + call[name] for name in ("p50", "p99", "max")},
+    }
+
+
 def faery(rate: float, seconds: float, port: int) -> dict[str, Any]:
     """Receive with faery the datagrams of a sender of `rate` events a second, in faery's format."""
     receiver = subprocess.Popen([sys.executable, "-c", FAERY_RECEIVE, str(port)], stdout=subprocess.PIPE, text=True)
     assert receiver.stdout is not None
     receiver.stdout.readline()
     time.sleep(0.3)
-    sender = subprocess.run(
-        [sys.executable, "-c", FAERY_SEND, str(port), str(rate), str(seconds)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    sent = send_alike(port, rate, seconds)
     try:
         printed, _ = receiver.communicate(timeout=10 + seconds)
     except subprocess.TimeoutExpired:
         receiver.kill()
         receiver.communicate()
-        return {"asked_events_per_s": rate, "failed": "its receiver never got the end mark"}
-    sent, received = json.loads(sender.stdout)["events"], json.loads(printed.splitlines()[-1])
+        return {"failed": "its receiver never got the end mark"}
+    received = json.loads(printed.splitlines()[-1])
     return {
-        "asked_events_per_s": rate,
-        "sent_events_per_s": sent / seconds,
-        "arrived": received["events"] / max(sent, 1),
+        "sent_events_per_s": ALIKE * sent["datagrams"] / seconds,
+        "arrived": received["events"] / (ALIKE * sent["datagrams"]),
         "cores": received["cpu_s"] / seconds,
         "latency": {"p50": received["p50_us"], "p99": received["p99_us"], "max": received["max_us"]},
     }
@@ -205,11 +239,21 @@ def run(*, quick: bool) -> dict[str, Any]:
         }
         for turn in range(rounds):
             for k, rate in enumerate(RATES):
-                rows[rate]["taxel"].append(ours(rate, seconds, scratch))
+                rows[rate]["taxel"].append(beside_faery(rate, seconds, scratch))
                 if not absent:
                     rows[rate]["faery"].append(faery(rate, seconds, 42_000 + 10 * turn + k))
     latency = {
         f"{rate:.0e} events/s": {name: _spread(row) for name, row in peers.items()} for rate, peers in rows.items()
+    }
+    turns = {
+        f"faery's {what} over ours at {rate:.0e} events/s": of
+        for rate, both in rows.items()
+        for what, find in (("p50", lambda row: row["latency"]["p50"]), ("cores", lambda row: row["cores"]))
+        if (
+            of := [
+                find(b) / find(a) for a, b in zip(both["taxel"], both.get("faery", ()), strict=False) if "latency" in b
+            ]
+        )
     }
     p50s = [row["latency"]["p50"] for peers in rows.values() for row in peers["taxel"]]
     return {
@@ -221,12 +265,10 @@ def run(*, quick: bool) -> dict[str, Any]:
         "worst_case": worst,
         "worst_case_without_segments": apart,
         "worst_case_recorded": recorded,
+        "does": DOES,
         "latency_us": latency,
-        "ratios": {
-            f"faery's p50 over ours at {name}": row["faery"]["p50"]["median"] / row["taxel"]["p50"]["median"]
-            for name, row in latency.items()
-            if "p50" in row.get("faery", {})
-        },
+        "ratios": {name: float(np.median(of)) for name, of in turns.items()},
+        "spread": {name: np.percentile(of, [25, 75]).tolist() for name, of in turns.items()},
         "stable": bool(load < os.cpu_count() and max(p50s) < 3 * min(p50s)),
     }
 
@@ -242,11 +284,4 @@ def _spread(rows: list[dict[str, Any]]) -> dict[str, Any]:
         return {"median": float(middle), "quartiles": [float(low), float(high)]}
 
     spread: dict[str, Any] = {name: over([row["latency"][name] for row in rows]) for name in ("p50", "p99", "max")}
-    spread["sent_events_per_s"] = over([row["sent_events_per_s"] for row in rows])
-    if "arrived" in rows[0]:
-        spread["arrived"] = over([row["arrived"] for row in rows])
-        spread["cores"] = over([row["cores"] for row in rows])
-    else:
-        spread["lost_datagrams"] = over([float(row["lost_datagrams"]) for row in rows])
-        spread["cores"] = over([row["cores"] for row in rows])
-    return spread
+    return spread | {name: over([row[name] for row in rows]) for name in ("sent_events_per_s", "arrived", "cores")}

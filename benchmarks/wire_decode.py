@@ -1,8 +1,9 @@
 """Decoding of bytes to events, beside a plain C loop, blocked NumPy, expelliarmus and faery (both EVT2).
 
-One core, 20 million words in the page cache. "Warm" columns have been written before, "fresh" ones come from NumPy in
-the call. Ours are the nouns' own columns (t int64, x and y uint16, p bool: 13 bytes an event, and 3 more for pairs); so
-are the C loop's; NumPy writes 11 bytes (x and y uint8), which is its best.
+One thread, 20 million words. Like is compared with like, `warm`, `fresh` or `file` (`DOES`): from the same place, into
+the same memory. Ours are the nouns' own columns (t int64, x and y uint16, p bool: 13 bytes an event, and 3 more for
+values); so are the C loop's, which is told beforehand whether there are values; NumPy writes 11 bytes (x and y uint8),
+which is its best. The peers on EVT2 read a file of as many events of their own format, and ours one of our words.
 
 Peer: a plain C loop, blocked NumPy, expelliarmus and faery. Unit: million words/s. Goal: not slower than any; a mixed
 stream twice as fast as the C loop; with AVX2 alone the same.
@@ -15,6 +16,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +24,23 @@ import numpy as np
 from _goals import Goal, at_least, not_slower
 from _instructions import beside_avx2
 from _peer import missing
-from _rounds import measure, ratio, stamp
+from _rounds import compared, measure, stamp
 from numpy.typing import NDArray
 
 import taxel
 from taxel import wire
 
 WORDS, BLOCK = 20_000_000, 65_536
+
+#: Clean changes; changes that alternate with their values; a random mix of both.
+STREAMS = ("clean", "pairs", "mix")
+#: What each row does, by the end of its name.
+DOES = {
+    "warm": "words in memory, into columns that were written before",
+    "fresh": "words in memory, into columns that are allocated in the call",
+    "file": f"a file in the page cache, read and decoded in chunks of {BLOCK} words, each into new columns",
+    "EVT2": f"a file in the page cache, read and decoded in chunks ({BLOCK} events by expelliarmus), into new columns",
+}
 
 C_LOOP = r"""
 #include <stdint.h>
@@ -47,10 +59,10 @@ size_t decode(const uint8_t *b, size_t n, int64_t *t, uint16_t *x, uint16_t *y, 
       int64_t now = latest < 0 ? value : ahead >= 64536 ? latest + ahead - 65536 : latest + ahead;
       if (now > latest) latest = now;
       t[rows] = now * 100; x[rows] = cx; y[rows] = cy; p[rows] = b[i] >> 6 & 1;
-      ticks[rows] = 0; present[rows] = 0;
+      if (ticks) { ticks[rows] = 0; present[rows] = 0; }
       rows++; open = 1;
     } else {
-      if ((b[i] & 0x28) == 0x20 && open && x[rows - 1] == cx && y[rows - 1] == cy) {
+      if (ticks && (b[i] & 0x28) == 0x20 && open && x[rows - 1] == cx && y[rows - 1] == cy) {
         ticks[rows - 1] = value; present[rows - 1] = 1;
       }
       open = 0;
@@ -153,12 +165,18 @@ def evt2(folder: Path, words: int) -> dict[str, Callable[[], Any]]:
     return runs | {"expelliarmus, EVT2": by_expelliarmus}
 
 
+def pairs() -> dict[str, tuple[str, str]]:
+    """Return ours and the peer of each ratio, by its name."""
+    both = [(f"taxel, {of}, {to}", f"C loop, {of}, {to}") for of in STREAMS for to in ("warm", "fresh")]
+    both += [(f"taxel, clean, {to}", f"numpy, clean, {to}") for to in ("warm", "fresh")]
+    both += [("taxel, clean, file", peer) for peer in EVT2]
+    return {f"{ours} / {peer}": (ours, peer) for ours, peer in both}
+
+
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
-    every = [name for name in result["ratios"] if " / " in name and "fresh" not in name]
-    plain = [name for name in every if not name.startswith("AVX2")]
     twice = {"taxel, mix, warm / C loop, mix, warm": 2.0}
-    return not_slower(result, *(name for name in plain if name not in twice)) + at_least(twice, result["ratios"])
+    return not_slower(result, *(name for name in pairs() if name not in twice)) + at_least(twice, result["ratios"])
 
 
 @beside_avx2
@@ -166,49 +184,39 @@ def run(*, quick: bool) -> dict[str, Any]:
     words, rounds = (WORDS // 20, 3) if quick else (WORDS, 11)
     data = streams(words)
     columns = wire.Columns(words + 2)
-    blocked = (np.ones(words, np.int64), *(np.ones(words, np.uint8) for _ in range(3)))
 
-    def warm(name: str) -> Callable[[], Any]:
-        return lambda: wire.Decoder().push_into(columns, data[name])
+    def blocked() -> tuple[NDArray[Any], ...]:
+        return np.empty(words, np.int64), *(np.empty(words, np.uint8) for _ in range(3))
 
-    def fresh(name: str) -> Callable[[], Any]:
-        return lambda: wire.Decoder().push(data[name])
-
-    def in_chunks() -> None:
-        decoder, view = wire.Decoder(), memoryview(data["clean"])
-        for at in range(0, len(view), 5 * BLOCK):
-            decoder.push_into(columns, view[at : at + 5 * BLOCK])
-
+    written = blocked()
+    for column in written:
+        column.fill(1)
     runs: dict[str, Callable[[], Any]] = {
-        "taxel, clean, warm": warm("clean"),
-        "numpy, clean, warm": lambda: numpy_blocked(data["clean"], blocked),
-        "taxel, clean, fresh": fresh("clean"),
-        "taxel, clean, chunks of 65536 in turn": in_chunks,
-        "taxel, pairs, warm": warm("pairs"),
-        "taxel, pairs, fresh": fresh("pairs"),
-        "taxel, mix, warm": warm("mix"),
+        "numpy, clean, warm": lambda: numpy_blocked(data["clean"], written),
+        "numpy, clean, fresh": lambda: numpy_blocked(data["clean"], blocked()),
     }
+    for name, stream in data.items():
+        runs[f"taxel, {name}, warm"] = lambda stream=stream: wire.Decoder().push_into(columns, stream)
+        runs[f"taxel, {name}, fresh"] = lambda stream=stream: wire.Decoder().push(stream)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
+        (folder / "words").write_bytes(data["clean"])
         loop = compiled(folder)
         if loop is not None:
-            places = [ctypes.c_void_p(c.ctypes.data) for c in _c_order(columns)]
-            for name in data:
-                runs[f"C loop, {name}, warm"] = lambda name=name: loop(data[name], ctypes.c_size_t(5 * words), *places)
+            for name, stream in data.items():
+                runs[f"C loop, {name}, warm"] = partial(by_loop, loop, stream, columns, values=name == "pairs")
+                runs[f"C loop, {name}, fresh"] = partial(by_loop, loop, stream, None, values=name == "pairs")
+        runs["taxel, clean, file"] = partial(from_file, folder / "words")
         runs |= evt2(folder, words)
-        _agree(data, columns, blocked, loop)
-        results = measure(runs, rounds=rounds, work=words)
-    ours = "taxel, clean, warm"
-    ratios = {f"{ours} / {peer}": ratio(results, ours, peer) for peer in results if not peer.startswith("taxel")}
-    ratios = {key: value for key, value in ratios.items() if "pairs" not in key and "mix" not in key}
-    ratios["taxel, clean, fresh / numpy, clean, warm"] = ratio(results, "taxel, clean, fresh", "numpy, clean, warm")
-    for name in ("pairs", "mix"):
-        if loop is not None:
-            ratios[f"taxel, {name}, warm / C loop, {name}, warm"] = ratio(
-                results, f"taxel, {name}, warm", f"C loop, {name}, warm"
-            )
+        _agree(data, columns, written, loop)
+        # Each peer directly behind ours.
+        order = sorted(runs, key=lambda name: (name.partition(", ")[2], not name.startswith("taxel")))
+        results = measure({name: runs[name] for name in order}, rounds=rounds, work=words)
+    for name, row in results.items():
+        row["does"] = DOES[name.rpartition(", ")[2]]
+    ratios, spread = compared(results, {name: pair for name, pair in pairs().items() if pair[1] in results})
+    for name in data:
         ratios[f"taxel, {name}, warm, million words/s"] = results[f"taxel, {name}, warm"]["rate"] / 1e6
-    ratios["taxel, clean, warm, million events/s"] = results[ours]["rate"] / 1e6
     return {
         "question": __doc__.splitlines()[0],
         **stamp("expelliarmus", "faery"),
@@ -216,8 +224,26 @@ def run(*, quick: bool) -> dict[str, Any]:
         "left out": missing(EVT2) | ({} if loop is not None else {"C loop": "no cc"}),
         "results": results,
         "ratios": ratios,
+        "spread": spread,
         "stable": all(result["stable"] for result in results.values()),
     }
+
+
+def by_loop(loop: Callable[..., int], stream: bytes, columns: wire.Columns | None, *, values: bool) -> int:
+    """Decode with the C loop, into new columns unless some are given; return the number of events."""
+    room = len(stream) // 5
+    sizes = (np.int64, np.uint16, np.uint16, np.uint8, np.uint16, np.uint8)[: 6 if values else 4]
+    into = [np.empty(room, size) for size in sizes] if columns is None else _c_order(columns)[: len(sizes)]
+    places = [ctypes.c_void_p(column.ctypes.data) for column in into] + [None] * (6 - len(sizes))
+    return loop(stream, ctypes.c_size_t(len(stream)), *places)
+
+
+def from_file(path: Path) -> None:
+    """Read words and decode them, a block at a time, each into new columns."""
+    decoder = wire.Decoder()
+    with path.open("rb") as file:
+        while chunk := file.read(5 * BLOCK):
+            len(decoder.push(chunk))
 
 
 def _c_order(columns: wire.Columns) -> tuple[NDArray[Any], ...]:
@@ -234,8 +260,7 @@ def _agree(
         if not np.array_equal(ours, theirs):
             raise taxel.Error("the NumPy decoder disagrees with ours")
     for stream in data.values() if loop is not None else ():
-        places = [ctypes.c_void_p(c.ctypes.data) for c in _c_order(columns)]
-        rows = loop(stream, ctypes.c_size_t(len(stream)), *places)  # type: ignore[misc]
+        rows = by_loop(loop, stream, columns, values=True)  # type: ignore[arg-type]
         ours = wire.decode(stream)
         pairs = () if ours.intensity is None else (ours.intensity, ours.present)
         for mine, theirs in zip((ours.t, ours.x, ours.y, ours.p, *pairs), _c_order(columns), strict=False):

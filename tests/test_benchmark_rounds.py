@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from taxel import wire
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks"))
 import _peer
 import _rounds
+import wire_decode
 
 
 class Clock:
@@ -77,14 +80,18 @@ def test_a_ratio_is_the_median_of_those_of_the_rounds(clock: Clock) -> None:
     assert _rounds.compared(found, {"much": ("ours", "peer")})[0] == {"much": 20.0}
 
 
-def test_blas_has_one_thread_also_where_a_call_loads_it() -> None:
+def test_blas_has_one_thread() -> None:
     counts: list[int] = []
 
     def call() -> None:
         np.ones((8, 8)) @ np.ones((8, 8))
         counts.extend(one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas")
 
-    _rounds.measure({"one": call}, rounds=2)
+    with threadpool_limits(2):
+        call()
+        assert 2 in counts
+        counts.clear()
+        _rounds.measure({"one": call}, rounds=2)
     assert counts
     assert set(counts) == {1}
 
@@ -102,3 +109,24 @@ def test_peers_run_in_turn_with_ours_and_long_ones_once(clock: Clock) -> None:
     times = {name: (one["times"], one["rounds"]) for name, one in found.items()}
     assert times == {"fast": (2.0, 3), "slow": (50.0, 1), "stopped": (60.0, 1), "saved": (300.0, 1)}
     assert found["fast"]["quartiles"] == [1.5, 2.5]
+
+
+def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:
+    ends = {(ours.rpartition(", ")[2], peer.rpartition(", ")[2]) for ours, peer in wire_decode.pairs().values()}
+    assert ends == {("warm", "warm"), ("fresh", "fresh"), ("file", "EVT2")}
+    for ours, peer in wire_decode.pairs().values():
+        assert ours.split(", ")[1] in ("clean", peer.split(", ")[1])
+
+
+@pytest.mark.parametrize("into", ["given", "new"])
+def test_the_c_loop_decodes_what_ours_does(tmp_path: Path, into: str) -> None:
+    loop = wire_decode.compiled(tmp_path)
+    if loop is None:
+        pytest.skip("no C compiler")
+    for name, stream in wire_decode.streams(1000).items():
+        ours = wire.decode(stream)
+        columns = wire.Columns(1002) if into == "given" else None
+        assert wire_decode.by_loop(loop, stream, columns, values=name == "pairs") == len(ours)
+        if columns is not None:
+            assert np.array_equal(columns.t[: len(ours)], ours.t)
+            assert name != "pairs" or np.array_equal(columns.intensity[: len(ours)], ours.intensity)

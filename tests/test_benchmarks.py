@@ -1,9 +1,11 @@
 """Benchmarks load where no peer is installed, and leave it out."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
+import tempfile
 import tomllib
 from pathlib import Path
 
@@ -30,10 +32,18 @@ PathFinder.find_spec = lambda name, *rest: None if name.split(".")[0] in {peers(
 
 def without_peers(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the command line where no peer can be imported."""
-    script = f"{WITHOUT}\nimport sys; from taxel.cli import main; main(sys.argv[1:])"
-    return subprocess.run(
-        [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=False, cwd=ROOT
-    )
+    with tempfile.TemporaryDirectory() as folder:
+        # A benchmark runs in a process of its own, which imports this too.
+        (Path(folder) / "sitecustomize.py").write_text(WITHOUT)
+        paths = [folder, *filter(None, [os.environ.get("PYTHONPATH")])]
+        return subprocess.run(
+            [sys.executable, "-m", "taxel", *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=ROOT,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
+        )
 
 
 @pytest.mark.parametrize("path", BENCHMARKS, ids=lambda path: path.stem)

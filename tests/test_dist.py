@@ -98,7 +98,7 @@ def test_the_wheel_runs_the_demo_in_a_bare_environment(tmp_path: Path) -> None:
     assert hooks.stdout == "True False\n", "what only tests call does not ship"
     without = bare.run("taxel", "study", "fig6.1", "--size", "toy")
     assert without.returncode == 2
-    assert without.stderr == 'taxel: taxel study is not installed: pip install "taxel[studies]"\n'
+    assert without.stderr == "taxel: taxel study is not installed: pip install 'taxel[studies]'\n"
 
 
 def test_the_studies_install_beside_the_wheel(tmp_path: Path) -> None:

@@ -241,7 +241,7 @@ class Detections(Columns):
 
         Raises
         ------
-        ImportError : pandas is not installed (``pip install taxel[pandas]``)
+        ImportError : pandas is not installed (``pip install 'taxel[pandas]'``)
         """
         import pandas  # noqa: PLC0415  heavy, and an extra
 
@@ -362,7 +362,7 @@ class Detections(Columns):
 
         Raises
         ------
-        ImportError : neo is not installed (``pip install taxel[neo]``)
+        ImportError : neo is not installed (``pip install 'taxel[neo]'``)
         """
         from neo import Event  # noqa: PLC0415  heavy, and an extra
 

@@ -266,7 +266,7 @@ class Events(Columns):
 
         Raises
         ------
-        ImportError : pandas is not installed (``pip install taxel[pandas]``)
+        ImportError : pandas is not installed (``pip install 'taxel[pandas]'``)
         """
         import pandas  # noqa: PLC0415  heavy, and an extra
 

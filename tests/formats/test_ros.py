@@ -357,10 +357,10 @@ def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:
 def test_without_rosbags_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     bag = bags.write(tmp_path / "grasp.bag", palms())
     monkeypatch.setitem(sys.modules, "rosbags", None)
-    with pytest.raises(ImportError, match=r"a ROS bag, and rosbags is not installed: pip install taxel\[ros\]"):
+    with pytest.raises(ImportError, match=r"a ROS bag, and rosbags is not installed: pip install 'taxel\[ros\]'"):
         taxel.open(bag, topic="/palm")
     code, _, said = call(capsys, "info", bag)
-    assert (code, "pip install taxel[ros]" in said) == (2, True)
+    assert (code, "pip install 'taxel[ros]'" in said) == (2, True)
 
 
 @pytest.mark.parametrize("name", KINDS[:3])

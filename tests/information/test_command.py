@@ -44,6 +44,7 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     said = done.stdout
     assert "60 trials, 2 labels x" in said
     assert "full: 1 ms, 2 taxels, to 60 ms 1.00 of 1.00 bits" in said
+    assert said.splitlines()[4].startswith("in brackets: where the bits lie when these trials")
     assert "<- cheapest" in said
     assert "10 ms " in said
     assert "wire version" in said

@@ -441,4 +441,4 @@ def test_an_extra_that_is_not_installed_is_named(
     with pytest.raises(SystemExit) as ended:
         main(["live", "--host", LOOPBACK, "--port", "0", "--to", what])
     assert ended.value.code == 2
-    assert capsys.readouterr().err.splitlines()[-1] == f"taxel: {what} is not installed: pip install taxel[{what}]"
+    assert capsys.readouterr().err.splitlines()[-1] == f"taxel: {what} is not installed: pip install 'taxel[{what}]'"

@@ -69,6 +69,9 @@ pub struct Header {
     /// What else there is to know of the recording, one line each: by whose times it is, what it was converted from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
+    /// The verdict of the recording that this one was converted from: here, so that a file that was cut still states it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub converted: Option<Verdict>,
     /// The numbers of events that a state gave, in a file made of events whose datagrams do not state it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<u64>,
@@ -202,6 +205,7 @@ impl Header {
             driven: None,
             lost: vec![],
             remarks: vec![],
+            converted: None,
             repaired: vec![],
             difference: false,
             origin_us: 0,

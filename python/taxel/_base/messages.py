@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["counted", "first_line", "plain"]
+__all__ = ["counted", "first_line", "installing", "plain"]
 
 
 def counted(count: int, noun: str, plural: str | None = None) -> str:
@@ -14,6 +14,17 @@ def first_line(error: BaseException) -> str:
     """Return the first line of another library's error, at most 200 characters; its class if it has no text."""
     line = str(error).split("\n", maxsplit=1)[0] or type(error).__name__
     return line if len(line) <= 200 else f"{line[:197]}..."
+
+
+def installing(extra: str) -> str:
+    """Return the command that installs an extra, quoted, as shells read brackets as a pattern.
+
+    Examples
+    --------
+    >>> installing("ros")
+    "pip install 'taxel[ros]'"
+    """
+    return f"pip install 'taxel[{extra}]'"
 
 
 def plain(value: float) -> str:

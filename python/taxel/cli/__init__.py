@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     except OSError as error:
         _end(_system_error(error), OUTSIDE)
     except ImportError as error:
-        if "pip install taxel[" not in str(error):
+        if "pip install 'taxel[" not in str(error):
             raise
         _end(str(error), WRONG_INPUT)
     except MemoryError as error:

@@ -12,6 +12,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from taxel._base.messages import installing
 from taxel._core import ProblemError
 
 __all__ = ["WithAdded"]
@@ -39,7 +40,7 @@ OWN = {
     "bench": "Compare the speed of taxel with other libraries.",
 }
 #: Each command of another distribution, what it does, and how it is installed.
-ADDED = {"study": ("Run a study: a protocol, its parameters, a report.", 'pip install "taxel[studies]"')}
+ADDED = {"study": ("Run a study: a protocol, its parameters, a report.", installing("studies"))}
 
 
 class WithAdded(TyperGroup):

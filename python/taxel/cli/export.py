@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from taxel._base.messages import installing
 from taxel.cli._app import App, app, with_out
 
 __all__ = ["nir"]
@@ -46,7 +47,7 @@ def nir(
     try:
         lost = Readout.load(readout).to_nir(out, spike_ms=spike_ms, overwrite=overwrite)
     except ModuleNotFoundError as error:
-        raise Error(f"{error}: pip install taxel[nir]") from None
+        raise Error(f"{error}: {installing('nir')}") from None
     if as_json:
         typer.echo(json.dumps({"readout": str(readout), "written": str(out), "lost": lost}))
         return

@@ -57,6 +57,8 @@ def info(
 ) -> None:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
+    Of spike trains that taxel encode wrote: how many, their kind, duration and spikes.
+
     Of a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
@@ -66,6 +68,7 @@ def info(
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
     from taxel.recording.pressure import above_rest, series  # noqa: PLC0415
     from taxel.recording.summary import summary  # noqa: PLC0415
+    from taxel.recording.without_layout import are_spike_trains  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
@@ -74,6 +77,9 @@ def info(
     for place in (picture, table):
         if place is not None:
             try_whole(place, overwrite=overwrite)
+    if are_spike_trains(file):
+        typer.echo(_spikes(file, as_json, drawn=picture is not None or table is not None))
+        return
     with bar(as_json) as show:
         show(f"reading {file}", 0, 0)
         if file.exists() and is_bag(file) and not files.names_topic(file):
@@ -107,6 +113,28 @@ def info(
         _draw(picture, recording, above_rest(recording, rest), overwrite)
         facts["picture"] = str(picture)
     typer.echo(json.dumps(facts) if as_json else _page(facts))
+
+
+def _spikes(file: Path, as_json: bool, *, drawn: bool) -> str:
+    """Return what a file of spike trains holds, as JSON or as lines for people."""
+    from taxel.spikes import SpikeTrains  # noqa: PLC0415  the command line starts quickly
+
+    if drawn:
+        raise ProblemError(f"{file}: spike trains; a picture or a table is of a recording")
+    trains = SpikeTrains.load(file)
+    silent, seconds = int(np.count_nonzero(trains.counts == 0)), (trains.stop - trains.start) / to_ms(1_000_000)
+    spikes = int(trains.counts.sum())
+    if as_json:
+        facts = {"file": str(file), "trains": len(trains), "silent_trains": silent, "trains_kind": trains.kind}
+        return json.dumps(facts | {"spikes": spikes, "start_ms": trains.start, "stop_ms": trains.stop})
+    rate = f", {spikes / seconds:.4g} a second of all trains" if seconds else ""
+    rows = [
+        ("trains", f"{len(trains)}, {silent} silent; the file does not say of which encoder"),
+        ("kind", trains.kind),
+        ("time", f"{trains.start:g} to {trains.stop:g} ms ({seconds:.3f} s)"),
+        ("spikes", f"{spikes}{rate}"),
+    ]
+    return "\n".join([f"{file}: spike trains", *(f"  {name:<20}{value}" for name, value in rows)])
 
 
 def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest] | None, overwrite: bool) -> None:

@@ -259,7 +259,7 @@ class Readout(_Detector):
         ------
         FileExistsError : the file is there already and `overwrite` is false
         ProblemError : exponential kernels together with others
-        ImportError : nir is not installed (``pip install taxel[nir]``)
+        ImportError : nir is not installed (``pip install 'taxel[nir]'``)
 
         Notes
         -----
@@ -320,7 +320,7 @@ class Readout(_Detector):
         FormatError : no NIR file, or a graph that no readout can stand for (names file and node)
         FileNotFoundError : no such file
         ProblemError : no encoder is known
-        ImportError : nir is not installed (``pip install taxel[nir]``)
+        ImportError : nir is not installed (``pip install 'taxel[nir]'``)
         """
 
         def build(parts: Parts) -> Readout:

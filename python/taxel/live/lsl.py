@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from taxel._base.arguments import text
+from taxel._base.messages import installing
 from taxel._core import Error, ProblemError
 
 __all__ = ["LslInlet", "LslOutlet"]
@@ -25,7 +26,7 @@ def _pylsl() -> Any:
     try:
         import pylsl  # noqa: PLC0415  an extra
     except ImportError:
-        raise ImportError("pylsl is not installed: pip install taxel[lsl]") from None
+        raise ImportError(f"pylsl is not installed: {installing('lsl')}") from None
     warnings.warn(
         "the lab streaming layer listens on all addresses of this machine, TCP and UDP from port 16572 on", stacklevel=3
     )
@@ -48,7 +49,7 @@ class LslInlet:
     Raises
     ------
     ProblemError : no stream of that name within 3 s, or one of texts
-    ImportError : pylsl is not installed (``pip install taxel[lsl]``)
+    ImportError : pylsl is not installed (``pip install 'taxel[lsl]'``)
     """
 
     def __init__(self, name: str) -> None:
@@ -107,7 +108,7 @@ class LslOutlet:
 
     Raises
     ------
-    ImportError : pylsl is not installed (``pip install taxel[lsl]``)
+    ImportError : pylsl is not installed (``pip install 'taxel[lsl]'``)
     """
 
     def __init__(self, name: str) -> None:

@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any
 
 from taxel._base.arguments import instance, number, shown, text
+from taxel._base.messages import installing
 from taxel._core import ProblemError
 from taxel.encode import Encoder
 from taxel.live._external_viewer import KINDS
@@ -85,7 +86,7 @@ class Viewer:
 
     Raises
     ------
-    ImportError : the viewer's library is not installed (``pip install taxel[rerun]`` or ``taxel[foxglove]``)
+    ImportError : the viewer's library is not installed (``pip install 'taxel[rerun]'`` or ``'taxel[foxglove]'``)
     OSError : Foxglove's port is taken, the recording is not there
     ProblemError : arguments that are invalid
 
@@ -244,4 +245,4 @@ def _check_installed(what: str) -> None:
     """Refuse a kind of viewer whose extra is not installed."""
     missing = [module for module in KINDS[what].needs if importlib.util.find_spec(module) is None]
     if missing:
-        raise ImportError(f"{missing[0]} is not installed: pip install taxel[{what}]")
+        raise ImportError(f"{missing[0]} is not installed: {installing(what)}")

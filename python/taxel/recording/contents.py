@@ -274,7 +274,7 @@ def several(sources: Mapping[str, Contents]) -> Contents:
 def _verdict(sources: Mapping[str, Contents]) -> Verdict | None:
     """Return what several sources lost, as far as they say it."""
     said = [(name, one.verdict) for name, one in sources.items() if one.verdict is not None]
-    return Verdict._together(said) if said else None
+    return Verdict._of_sources(said) if said else None
 
 
 def named(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:

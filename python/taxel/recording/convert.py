@@ -20,7 +20,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Contents
 from taxel.recording.csv import write_csv
 from taxel.recording.h5 import write_h5
-from taxel.recording.kinds import ENDINGS, verdict_of
+from taxel.recording.kinds import ENDINGS
 from taxel.recording.npz import write_npz
 from taxel.recording.opening import open_recording
 from taxel.recording.pictures import period_us, pictures
@@ -130,25 +130,17 @@ def _contents(source: object) -> Contents:
 def _counts(of: Contents, written: Contents) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
     if of.samples is not None:
-        return {"received": len(of.samples), "converted": _stated(written)}
-    if not written.has_events:
-        pictures = len(written.table)
-        if of.kind == "events":
-            return {"received": pictures, "missing": 0}
-        return {"received": pictures, "converted": _stated(written)}
+        return {"received": len(of.samples)}
     if of.kind == "events":
-        # The datagrams are made of the events, so none is missing.
-        return {"received": len(written.datagrams or ()), "missing": 0}
+        # Nothing is missing of what was made here.
+        return {"received": len((written.datagrams or ()) if written.has_events else written.table), "missing": 0}
+    if not written.has_events:
+        return {"received": len(written.table)}
     counts = of.counts
     known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
     decoder = counts.get("decoder")
     damage = json.loads(_core.recording_damage(json.dumps(decoder))) if decoder else {}
-    return {**known, "decoder": damage, "converted": _stated(written)}
-
-
-def _stated(written: Contents) -> Any:
-    """Return the verdict as the live format stores it."""
-    return verdict_of(written)._held
+    return {**known, "decoder": damage}
 
 
 def _read_otherwise(part: Path, of: Contents) -> list[str]:

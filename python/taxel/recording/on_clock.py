@@ -17,6 +17,7 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording.contents import Contents, alone, once
 from taxel.recording.fates import after
+from taxel.recording.kinds import verdict_of
 from taxel.recording.read_mcap import ascending
 
 __all__ = ["HOST", "on_clock"]
@@ -46,8 +47,12 @@ def on_clock(of: Contents, name: str) -> Contents:
     for label, one in sources.items():
         times = None if label == name else _times(_clock(one), to)
         moved[label] = _moved(one, name, times).but(sources=moved)
+    if of.is_several:
+        return alone(moved)
     # The verdict may be that of all sources.
-    return alone(moved) if of.is_several else moved[of.label].but(verdict=vars(of)["verdict"])
+    return moved[of.label].but(
+        verdict=once(lambda: (moved[of.label] if of.verdict == sources[of.label].verdict else alone(moved)).verdict)
+    )
 
 
 def _clock(of: Contents) -> Clock:
@@ -70,8 +75,7 @@ def _times(own: Clock, to: Clock | None) -> Times:
 def _moved(of: Contents, name: str, times: Times | None) -> Contents:
     """Return a source with its times converted to another clock; None leaves them unchanged."""
     if times is None:
-        same = ("events", "frames", "board_changes", "notes", "detections", "zeroings", "clock", "samples", "sources")
-        return after("on_clock", of, clock_of=name, **{field: vars(of)[field] for field in same})
+        return of.but(clock_of=name)
 
     def one(t: int) -> int:
         return int(times(np.array([t]))[0])
@@ -96,6 +100,10 @@ def _moved(of: Contents, name: str, times: Times | None) -> Contents:
     def notes() -> tuple[Note, ...]:
         return tuple(replace(note, t=None if note.t is None else one(note.t)) for note in of.notes)
 
+    def verdict() -> str | None:
+        doubtful = verdict_of(of).doubtful_after_us
+        return of.verdict if doubtful is None else verdict_of(of)._later(one(doubtful) - doubtful)
+
     return after(
         "on_clock",
         of,
@@ -111,6 +119,7 @@ def _moved(of: Contents, name: str, times: Times | None) -> Contents:
         zeroings=once(lambda: tuple(replace(z, t=one(z.t)) for z in of.zeroings)),
         clock=once(lambda: None if of.clock is None else Clock(times(of.clock.board_us), of.clock.arrived_ns)),
         clock_of=name,
+        verdict=once(verdict),
         # The times in the datagrams are by the source's own clock.
         samples=None,
         sources={},

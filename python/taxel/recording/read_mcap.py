@@ -228,7 +228,8 @@ class _Source:
         if "finished" not in self.ending:
             return True
         counts = self.ending["finished"]["counts"]
-        return "converted" not in counts and counts["decoder"].get("jumps_of_time", 0) > 0
+        converted = self.header.get("converted") or counts.get("converted")
+        return not converted and counts["decoder"].get("jumps_of_time", 0) > 0
 
 
 def _clock(decoded: tuple[Any, ...]) -> Clock:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Self, get_args
 
@@ -43,7 +42,8 @@ class Verdict(str):
     lost : dict of int
         What was lost, by cause; of several parts the sum.
     damaged : dict of int
-        What could not be used, of the bytes that came and of the file, by cause.
+        What could not be used, of the bytes that came and of the file, by cause; damage of a file of several sources
+        counts once.
     noted : dict of int
         What is no loss of its own: repeated datagrams, repaired values, resets of the board and others.
     doubtful_after_us : int, us, or None
@@ -85,9 +85,14 @@ class Verdict(str):
         """Return the verdict on several recordings or sources, each with its name."""
         return cls._of({"together": [(name, Verdict(one)._held) for name, one in parts]})
 
+    @classmethod
+    def _of_sources(cls, parts: Iterable[tuple[str, str]]) -> Self:
+        """Return the verdict on the sources of one file, each with its name; damage of the file counts once."""
+        return cls._of({"sources": [(name, Verdict(one)._held) for name, one in parts]})
+
     def _later(self, shift: int) -> Self:
         """Return the verdict on the recording whose times are later by so many us."""
-        return self._from(_shifted(self._held, shift))
+        return self._of({"later": [shift, self._held]})
 
     @property
     def status(self) -> Status:
@@ -158,14 +163,6 @@ class Verdict(str):
         return cls._of({"together": [("", _stated(held))]})
 
 
-def _shifted(held: Mapping[str, Any], shift: int) -> dict[str, Any]:
-    """Return a verdict as the compiled part states it, with its doubtful times later by so many us."""
-    after = held["doubtful_after_us"]
-    told = re.sub(r"(?<=times after )-?\d+(?= us are doubtful)", lambda t: str(int(t[0]) + shift), held["text"])
-    parts = [(name, _shifted(part, shift)) for name, part in held["parts"]]
-    return {**held, "text": told, "doubtful_after_us": None if after is None else after + shift, "parts": parts}
-
-
 def _stated(held: Any) -> dict[str, Any]:
     """Return a verdict from `to_dict` as the compiled part states it."""
     own = held if isinstance(held, Mapping) else {}
@@ -198,7 +195,8 @@ def _stated(held: Any) -> dict[str, Any]:
             raise ProblemError(f"verdict: its status is {own['status']}, that of {name} is {inner}: must be no better")
     for name, totals in zip(_NUMBERS, numbers, strict=True):
         for cause in {cause for part in stated.values() for cause in part[name]}:
-            least = sum(part[name].get(cause, 0) for part in stated.values())
+            # Not their sum: damage of a file is that of each of its sources.
+            least = max(part[name].get(cause, 0) for part in stated.values())
             if totals.get(cause, 0) < least:
                 raise ProblemError(
                     f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be no fewer"

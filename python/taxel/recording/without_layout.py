@@ -18,7 +18,7 @@ from taxel.formats.layout import UNITS_US, advice
 from taxel.recording.kinds import kind_of
 from taxel.recording.read_foreign import ARRAYS, arrays_of, is_foreign, listed, shapes_of, time_of, unit_of
 
-__all__ = ["refuse_without_layout"]
+__all__ = ["are_spike_trains", "refuse_without_layout"]
 
 #: Cells that tables hold where a value is missing.
 _MISSING = ("", "nan", "NaN", "NA", "-", "null")
@@ -36,6 +36,11 @@ def refuse_without_layout(path: Path) -> None:
     ------
     FormatError : it is such a file, or a damaged one
     """
+    if are_spike_trains(path):
+        raise FormatError(
+            f"{path}: spike trains, as taxel encode writes them, no recording; taxel info describes them, and "
+            "taxel.SpikeTrains.load reads them"
+        )
     if not is_foreign(path) or (path.suffix.lower() == ".npz" and not stored_names(path)):
         return
     if path.suffix.lower() not in ARRAYS:
@@ -58,6 +63,12 @@ def refuse_without_layout(path: Path) -> None:
         says = "says which are the pictures" if len(there) > 1 else "says what it is"
     written = "\n".join(lines)
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:\n{written}")
+
+
+def are_spike_trains(path: Path) -> bool:
+    """Return whether a file holds the arrays that `SpikeTrains.save` writes."""
+    is_npz = path.suffix.lower() == ".npz" and path.is_file()
+    return is_npz and {"times", "offsets", "start", "stop"} <= set(stored_names(path))
 
 
 def _of_arrays(path: Path, name: str, there: Mapping[str, tuple[int, ...]]) -> list[str]:

@@ -15,6 +15,7 @@ from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import Contents, once
+from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import Datagrams
 from taxel.recording.pressure import above_rest
 from taxel.recording.recording import Recording
@@ -51,7 +52,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
         return
     samples = contents.samples
     if samples is not None:
-        header = {**samples.about, "sources": [], "lost": contents.lost, "remarks": contents.remarks}
+        header = {**samples.about, "sources": [], **_told(contents)}
         writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
         writer.finish(json.dumps(counts[contents.label]))
@@ -92,12 +93,18 @@ def _header(contents: Contents) -> dict[str, Any]:
         "array": contents.array._geometry(),
         "registers": None if registers is None else json.loads(registers._json()),
         **({} if driven == contents.array else {"driven": driven._geometry()}),
-        "lost": contents.lost,
-        "remarks": contents.remarks,
+        **_told(contents),
         "source": contents.source,
         "side": contents.side,
         "heel": contents.heel,
     }
+
+
+def _told(contents: Contents) -> dict[str, Any]:
+    """Return what a header states of the recording that a file was made of."""
+    # The verdict stands here and not with the final counts, so that a file that was cut still states it.
+    converted = None if contents.verdict is None else verdict_of(contents)._held
+    return {"lost": contents.lost, "remarks": contents.remarks, "converted": converted}
 
 
 def _write_pictures(

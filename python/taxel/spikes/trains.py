@@ -382,7 +382,7 @@ class SpikeTrains(Columns):
 
         Raises
         ------
-        ImportError : neo is not installed (``pip install taxel[neo]``)
+        ImportError : neo is not installed (``pip install 'taxel[neo]'``)
         """
         from neo import SpikeTrain  # noqa: PLC0415  heavy, and an extra
 
@@ -435,7 +435,7 @@ class SpikeTrains(Columns):
 
         Raises
         ------
-        ImportError : pandas is not installed (``pip install taxel[pandas]``)
+        ImportError : pandas is not installed (``pip install 'taxel[pandas]'``)
         """
         import pandas  # noqa: PLC0415  heavy, and an extra
 
@@ -468,7 +468,7 @@ class SpikeTrains(Columns):
         Raises
         ------
         FileExistsError : the file is there already and `overwrite` is false
-        ImportError : pynwb is not installed (``pip install taxel[nwb]``)
+        ImportError : pynwb is not installed (``pip install 'taxel[nwb]'``)
         """
         return write_nwb(
             path,
@@ -498,7 +498,7 @@ class SpikeTrains(Columns):
         ------
         FormatError : no NWB file, one without units, or units without spike times (names the file)
         FileNotFoundError : no such file
-        ImportError : pynwb is not installed (``pip install taxel[nwb]``)
+        ImportError : pynwb is not installed (``pip install 'taxel[nwb]'``)
         """
         times, first, last, values, kind = read_nwb(path, start, stop)
         try:

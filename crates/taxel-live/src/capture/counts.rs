@@ -17,6 +17,9 @@ pub struct Counts {
     pub dropped_by_queue: u64,
     /// Number of payload bytes in those datagrams.
     pub bytes_dropped_by_queue: u64,
+    /// Number of times that the sender was again the one before the last, as two senders at one port are in turn; looked at
+    /// in the first message of each batch.
+    pub changes_between_senders: u64,
     /// Datagrams that wait to be read.
     pub waiting: u64,
     /// Size of the kernel's own queue, bytes, as the kernel counts them (including its overhead).
@@ -25,15 +28,22 @@ pub struct Counts {
     pub gro: bool,
 }
 
+/// What a socket counts.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Totals {
+    pub(super) dropped_by_kernel: u64,
+    pub(super) changes_between_senders: u64,
+}
+
 impl Counts {
-    /// Adds the results of receive calls, and the kernel's total of dropped messages; returns the first datagram's
-    /// number.
-    pub(super) fn add(&mut self, datagrams: usize, bytes: usize, messages: u64, dropped_by_kernel: u64) -> u64 {
+    /// Adds the results of receive calls, and the socket's totals; returns the first datagram's number.
+    pub(super) fn add(&mut self, datagrams: usize, bytes: usize, messages: u64, totals: Totals) -> u64 {
         let first = self.datagrams;
         self.messages += messages;
         self.datagrams += datagrams as u64;
         self.bytes += bytes as u64;
-        self.dropped_by_kernel = dropped_by_kernel;
+        self.dropped_by_kernel = totals.dropped_by_kernel;
+        self.changes_between_senders = totals.changes_between_senders;
         first
     }
 }

@@ -5,6 +5,7 @@ use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use super::counts::Totals;
 use super::parcel::Parcel;
 use super::queue::{Batch, Queue};
 use crate::bridged::Bridged;
@@ -89,7 +90,7 @@ impl Feed {
             batch.push_arrived(offset.here_ns(arrived_ns), bytes);
         }
         // The promise must be set after the datagrams are in the queue: callers that find it empty rely on it.
-        self.queue.put(batch, u64::from(parcel.count > 0), 0);
+        self.queue.put(batch, u64::from(parcel.count > 0), Totals::default());
         self.queue.promise(offset.here_ns(parcel.until_ns()));
         true
     }

@@ -4,7 +4,7 @@ use std::io;
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use super::counts::Counts;
+use super::counts::{Counts, Totals};
 use crate::locked::lock;
 use crate::recording::now_ns;
 
@@ -133,10 +133,10 @@ impl Queue {
     }
 
     /// Moves received datagrams into the waiting batch; those that do not fit are dropped and counted.
-    pub(super) fn put(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
+    pub(super) fn put(&self, received: &mut Batch, messages: u64, totals: Totals) {
         let mut state = self.state();
         let Received { waiting, counts, .. } = &mut *state;
-        let first = counts.add(received.datagrams.len(), received.bytes.len(), messages, dropped_by_kernel);
+        let first = counts.add(received.datagrams.len(), received.bytes.len(), messages, totals);
         if waiting.is_empty() && received.bytes.len() <= self.limit {
             received.number_from(first);
             std::mem::swap(waiting, received);
@@ -159,9 +159,9 @@ impl Queue {
     }
 
     /// Counts and numbers datagrams that the caller received directly.
-    pub(super) fn count(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
+    pub(super) fn count(&self, received: &mut Batch, messages: u64, totals: Totals) {
         let (datagrams, bytes) = (received.datagrams.len(), received.bytes.len());
-        let first = self.state().counts.add(datagrams, bytes, messages, dropped_by_kernel);
+        let first = self.state().counts.add(datagrams, bytes, messages, totals);
         received.number_from(first);
     }
 

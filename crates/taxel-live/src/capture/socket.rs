@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use libc::{c_int, c_void};
 
+use super::counts::Totals;
 use super::options::ReceiverOptions;
 use super::queue::Batch;
 use crate::recording::now_ns;
@@ -30,8 +31,13 @@ struct Control([u8; CONTROL_BYTES]);
 pub(super) struct Socket {
     socket: UdpSocket,
     gro: bool,
-    dropped: u64,
+    totals: Totals,
+    /// The addresses of the last two senders, the latest first; zeros before.
+    senders: [Address; 2],
 }
+
+/// The address of a sender as the kernel writes it.
+type Address = [u8; size_of::<libc::sockaddr_in6>()];
 
 impl Socket {
     pub(super) fn bind(address: SocketAddr, options: &ReceiverOptions) -> io::Result<Self> {
@@ -47,7 +53,7 @@ impl Socket {
         socket.set_nonblocking(true)?;
         // Kernels before 5.0 have no UDP_GRO: then each datagram needs its own call, and `gro` is false.
         let gro = options.gro && set(fd, libc::SOL_UDP, libc::UDP_GRO, &1_i32).is_ok();
-        Ok(Self { socket, gro, dropped: 0 })
+        Ok(Self { socket, gro, totals: Totals::default(), senders: Default::default() })
     }
 
     pub(super) fn address(&self) -> io::Result<SocketAddr> {
@@ -58,9 +64,9 @@ impl Socket {
         self.gro
     }
 
-    /// Number of messages that the kernel has dropped, as last read.
-    pub(super) fn dropped(&self) -> u64 {
-        self.dropped
+    /// What it counted so far; the messages that the kernel has dropped as last read.
+    pub(super) fn totals(&self) -> Totals {
+        self.totals
     }
 
     pub(super) fn kernel_buffer_bytes(&self) -> u64 {
@@ -88,8 +94,9 @@ impl Socket {
         }
     }
 
-    /// Appends the next message to `batch`, which must have room for [`LARGEST`] bytes; returns false if there is none.
-    pub(super) fn receive(&mut self, batch: &mut Batch) -> io::Result<bool> {
+    /// Appends the next message to `batch`, which must have room for [`LARGEST`] bytes; returns false if there is none. With
+    /// `ask` its sender is compared with those before.
+    pub(super) fn receive(&mut self, batch: &mut Batch, ask: bool) -> io::Result<bool> {
         let start = batch.bytes.len();
         let room = batch.bytes.spare_capacity_mut();
         let mut part = libc::iovec { iov_base: room.as_mut_ptr().cast::<c_void>(), iov_len: room.len() };
@@ -100,7 +107,13 @@ impl Socket {
         message.msg_iovlen = 1;
         message.msg_control = from_mut(&mut control).cast::<c_void>();
         message.msg_controllen = CONTROL_BYTES as _;
-        // SAFETY: `message` points to memory that lives through the call: the spare capacity of `batch`, and `control`.
+        let mut sender = Address::default();
+        if ask {
+            message.msg_name = from_mut(&mut sender).cast::<c_void>();
+            message.msg_namelen = size_of_val(&sender) as libc::socklen_t;
+        }
+        // SAFETY: `message` points to memory that lives through the call: the spare capacity of `batch`, `control`
+        // and `sender`.
         let got = unsafe { libc::recvmsg(self.socket.as_raw_fd(), &raw mut message, 0) };
         let Ok(got) = usize::try_from(got) else {
             let error = io::Error::last_os_error();
@@ -109,6 +122,9 @@ impl Socket {
                 _ => Err(error),
             };
         };
+        if ask {
+            self.note_sender(sender);
+        }
         // SAFETY: the kernel wrote `got` bytes into the spare capacity, which is at least as long.
         unsafe { batch.bytes.set_len(start + got) };
         let mut arrived_ns = None;
@@ -149,10 +165,19 @@ impl Socket {
     /// Adds the kernel's count, which has 32 bits and wraps around.
     #[allow(clippy::cast_possible_truncation)]
     fn note_dropped(&mut self, total: u32) {
-        let more = total.wrapping_sub(self.dropped as u32);
+        let more = total.wrapping_sub(self.totals.dropped_by_kernel as u32);
         // A message may contain an older count than the one that was last read.
         if more <= u32::MAX / 2 {
-            self.dropped += u64::from(more);
+            self.totals.dropped_by_kernel += u64::from(more);
+        }
+    }
+
+    /// A board may get another address; two boards take turns.
+    fn note_sender(&mut self, sender: Address) {
+        let [last, before] = self.senders;
+        if sender != last {
+            self.totals.changes_between_senders += u64::from(sender == before);
+            self.senders = [sender, last];
         }
     }
 }

@@ -187,6 +187,7 @@ impl Counters {
             dropped_by_kernel: now.dropped_by_kernel - before.dropped_by_kernel,
             dropped_by_queue,
             bytes_dropped_by_queue: now.bytes_dropped_by_queue - before.bytes_dropped_by_queue,
+            changes_between_senders: now.changes_between_senders - before.changes_between_senders,
             waiting: 0,
             ..*now
         };

@@ -433,6 +433,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
     let DecodingCounts { wire, wire_jumps, wire_repeated, wire_v2, .. } = &now.decoding;
     let (mut decoder, missing) = recording::damage(wire, *wire_jumps, *wire_repeated, wire_v2);
     decoder.insert("bytes_of_version_1_refused".to_owned(), now.decoding.wire_refused);
+    decoder.insert("changes_between_senders".to_owned(), now.capture.changes_between_senders);
     // Version 1 does not number datagrams: a recording with any of it cannot state that none is missing.
     let knows = now.decoding.wire_v2.intact > 0 && now.decoding.wire.bytes == 0;
     recording::Counts {
@@ -440,6 +441,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         recorded: now.decoding.decoded,
         dropped_by_kernel: now.capture.dropped_by_kernel,
         dropped_by_queue: now.capture.dropped_by_queue,
+        several_a_message: counters.capture.gro && counters.capture.datagrams > counters.capture.messages,
         decoder,
         missing: missing.filter(|n| *n > 0 || knows),
         bridged: now.bridged.map(Box::new),
@@ -473,5 +475,21 @@ mod tests {
         now.capture.dropped_by_queue += 2;
         let lost = losses(&now, Some(&begun)).verdict().lost;
         assert_eq!((lost["dropped_by_queue"], lost["lost_on_the_way"]), (2, 1));
+    }
+
+    #[test]
+    fn where_a_dropped_message_may_have_been_several_datagrams_it_is_not_known_what_the_way_lost() {
+        let mut now = Counters::default();
+        (now.decoding.wire_v2.datagrams, now.decoding.wire_v2.intact, now.decoding.wire_v2.missing) = (100, 100, 7);
+        (now.capture.messages, now.capture.datagrams, now.capture.dropped_by_kernel) = (100, 100, 2);
+        now.capture.gro = true;
+        let lost = losses(&now, None).verdict().lost;
+        assert_eq!((lost["dropped_by_kernel"], lost["lost_on_the_way"]), (2, 5));
+        now.capture.messages = 50;
+        let lost = losses(&now, None).verdict().lost;
+        assert_eq!((lost["dropped_by_kernel"], lost["lost_on_the_way_or_dropped"]), (2, 7));
+        assert!(!lost.contains_key("lost_on_the_way"));
+        now.decoding.wire_v2.missing = 2;
+        assert!(!losses(&now, None).verdict().lost.contains_key("lost_on_the_way_or_dropped"));
     }
 }

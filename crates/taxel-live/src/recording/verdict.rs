@@ -109,6 +109,9 @@ pub struct Counts {
     pub dropped_by_kernel: u64,
     /// Datagrams that taxel dropped because its own queue was full.
     pub dropped_by_queue: u64,
+    /// Whether datagrams came several a message (`UDP_GRO`), so that the kernel may have dropped several at once.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub several_a_message: bool,
     /// What the decoder could not use of the bytes received, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
     /// What was lost between the computer that received the datagrams and this one, if they are different.
@@ -117,7 +120,7 @@ pub struct Counts {
     /// For version 2: datagrams that the board sent and that never arrived intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
-    /// The verdict of the recording that this one was converted from.
+    /// The verdict of the recording that this one was converted from; earlier versions wrote it here, and none into the header.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converted: Option<Verdict>,
 }
@@ -171,6 +174,10 @@ pub enum Basis {
     Silent(String),
     /// Several recordings or sources.
     Together(Vec<(String, Verdict)>),
+    /// The sources of one file.
+    Sources(Vec<(String, Verdict)>),
+    /// The recording with this verdict, of which all times are later by so many us.
+    Later(i64, Verdict),
     /// The line that an earlier version wrote.
     Line(String),
 }
@@ -197,6 +204,8 @@ pub struct Condition {
     pub skipped_numbers: u64,
     /// The last counts before the end.
     pub so_far: Option<Counts>,
+    /// The verdict of the recording that this one was converted from, as the header states it.
+    pub converted: Option<Verdict>,
     /// What decoding found, if the file was decoded.
     pub decoded: Option<Found>,
     /// Whether the source is a stream of numbers.
@@ -292,6 +301,8 @@ impl Verdict {
                 Self { status: Status::Unknown, text, ..Self::default() }
             }
             Basis::Together(parts) => Self::together(parts),
+            Basis::Sources(parts) => Self::of_sources(parts),
+            Basis::Later(us, verdict) => verdict.later(us),
             Basis::Line(line) => Self::of_line(&line),
         }
     }
@@ -327,9 +338,17 @@ impl Verdict {
         ];
         // The board's numbers also skip what was dropped after it was sent, which is counted above.
         let behind: u64 = dropped.iter().filter(|(_, cause, _)| *cause != "not_recorded").map(|(n, ..)| n).sum();
-        let on_the_way = counts.missing.unwrap_or(0).saturating_sub(behind);
+        let missing = counts.missing.unwrap_or(0);
+        // Which of them were dropped is not known where more was dropped than is missing (datagrams that came again), or
+        // more datagrams than messages.
+        let several = counts.several_a_message && counts.dropped_by_kernel > 0 && missing > behind;
+        let unclear = missing.min(behind) > 0 && (several || of_board(REPEATED) > 0);
         let board = (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events");
-        let way = (on_the_way, "lost_on_the_way", "datagrams lost or damaged on the way");
+        let way = if unclear {
+            (missing, "lost_on_the_way_or_dropped", "datagrams lost or damaged on the way or among those dropped")
+        } else {
+            (missing.saturating_sub(behind), "lost_on_the_way", "datagrams lost or damaged on the way")
+        };
         let mut verdict = Self::default();
         let mut words = vec![];
         for (n, cause, what) in std::iter::once(board).chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
@@ -397,20 +416,26 @@ impl Verdict {
     /// The verdict on a source of a file.
     fn of_file(condition: Condition) -> Self {
         let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { repeated, so_far, decoded, lines, .. } = condition;
+        let Condition { repeated, so_far, converted, decoded, lines, .. } = condition;
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
         let decoded = decoded.unwrap_or_default();
         let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
         let mut no_counts = false;
         let (mut verdict, why) = match ending {
-            Some(Ending::Finished { counts }) => (Self::of_counts(&counts, nothing_lost), None),
+            Some(Ending::Finished { counts }) => {
+                let converted = converted.or(counts.converted);
+                (Self::of_counts(&Counts { converted, ..counts }, nothing_lost), None)
+            }
             ending => {
                 let why = match ending {
                     Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
                     _ if rebuilt.no_end => NO_END.to_owned(),
                     _ => "not finished: what came last is missing".to_owned(),
                 };
-                let counts = so_far.filter(|counts| counts.received > 0);
+                let counts = match converted {
+                    Some(_) => Some(Counts { converted, ..so_far.unwrap_or_default() }),
+                    None => so_far.filter(|counts| counts.received > 0),
+                };
                 no_counts = counts.is_none();
                 // The file may hold more than its counts, which are saved now and then; where parts were skipped,
                 // decoding finds faults that never came.
@@ -422,10 +447,10 @@ impl Verdict {
         };
         let came_short = !verdict.lost.is_empty();
         if unknown && why.is_some() {
-            // Numbers that the file skips, and that were not dropped before.
-            let dropped = verdict.lost.get("dropped_by_queue").copied().unwrap_or(0);
+            // Numbers that the file skips, and that were not dropped before, or lost in the file that it was converted from.
+            let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
             let datagrams = lost.entry(Topic::Datagrams).or_default();
-            *datagrams = skipped_numbers.saturating_sub(dropped).max(*datagrams);
+            *datagrams = skipped_numbers.saturating_sub(before).max(*datagrams);
         }
         let mut bad = vec![];
         for (n, cause, text) in [
@@ -503,15 +528,14 @@ impl Verdict {
         } else {
             pieces.push(format!("{before}{}", verdict.text));
         }
+        verdict.text = pieces.join("; ");
         if let Some(after) = decoded.doubtful_after_us {
             verdict.status = verdict.status.max(Status::Damaged);
-            verdict.doubtful_after_us = Some(after);
             // A recorder of an earlier version did not count jumps.
             let jumps = decoded.damage.get(JUMPS).copied().unwrap_or(1);
             verdict.damaged.entry(JUMPS.to_owned()).or_insert(jumps);
-            pieces.push(format!("times after {after} us are doubtful"));
+            verdict.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain([after]).min());
         }
-        verdict.text = pieces.join("; ");
         verdict
     }
 
@@ -532,6 +556,15 @@ impl Verdict {
     ///
     /// Equal verdicts without numbers are one.
     pub(crate) fn together(parts: Vec<(String, Self)>) -> Self {
+        Self::joined(parts, |_, sum, n| sum + n)
+    }
+
+    /// As [`Self::together`], of the sources of one file, whose damage each of them has: it counts once.
+    fn of_sources(parts: Vec<(String, Self)>) -> Self {
+        Self::joined(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
+    }
+
+    fn joined(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
         let numbers = |one: &Self| !(one.lost.is_empty() && one.damaged.is_empty() && one.noted.is_empty());
         if let [(_, first), others @ ..] = &parts[..]
             && (others.is_empty() || (others.iter().all(|(_, one)| one == first) && !numbers(first)))
@@ -539,24 +572,55 @@ impl Verdict {
             return first.clone();
         }
         let mut whole = Self { status: Status::Complete, ..Self::default() };
-        let mut pieces = vec![];
+        let mut named: Vec<(String, Self)> = vec![];
         for (name, part) in parts {
             whole.status = whole.status.max(part.status);
-            // The earliest of those that there are.
-            whole.doubtful_after_us = whole.doubtful_after_us.into_iter().chain(part.doubtful_after_us).min();
             for (sums, counts) in
                 [(&mut whole.lost, &part.lost), (&mut whole.damaged, &part.damaged), (&mut whole.noted, &part.noted)]
             {
-                counts.iter().for_each(|(cause, n)| *sums.entry(cause.clone()).or_default() += n);
+                for (cause, n) in counts {
+                    let sum = sums.entry(cause.clone()).or_default();
+                    *sum = add(cause, *sum, *n);
+                }
             }
-            pieces.push(format!("{name}: {}", part.text));
-            let taken = |name: &str| whole.parts.iter().any(|(known, _)| known == name);
+            let taken = |name: &str| named.iter().any(|(known, _)| known == name);
             let unique = (2..).map(|k| format!("{name} ({k})")).find(|other| !taken(other));
             let name = if taken(&name) { unique.unwrap_or_default() } else { name };
-            whole.parts.push((name, part));
+            named.push((name, part));
         }
-        whole.text = pieces.join("; ");
+        whole.change(|own| {
+            // The earliest of those that there are.
+            own.doubtful_after_us = named.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
+            own.parts = named;
+        });
         whole
+    }
+
+    /// The verdict on the recording whose times are later by so many us.
+    fn later(mut self, us: i64) -> Self {
+        if us != 0 && self.doubtful_after_us.is_some() {
+            self.change(|own| {
+                own.parts.iter_mut().for_each(|(_, part)| *part = std::mem::take(part).later(us));
+                own.doubtful_after_us = own.doubtful_after_us.map(|after| after.saturating_add(us));
+            });
+        }
+        self
+    }
+
+    /// Changes the parts and the time after which times are doubtful, and what the text says of them.
+    fn change(&mut self, change: impl FnOnce(&mut Self)) {
+        let own = self.text.strip_suffix(&self.end()).unwrap_or(&self.text).trim_end_matches("; ").to_owned();
+        change(self);
+        let between = if own.is_empty() || own.ends_with(": ") { "" } else { "; " };
+        self.text = format!("{own}{between}{}", self.end());
+    }
+
+    /// What the text ends with: the texts of all parts, and the time after which times are doubtful unless a part says it.
+    fn end(&self) -> String {
+        let said = self.parts.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
+        let own = self.doubtful_after_us.filter(|_| self.doubtful_after_us != said);
+        let parts = self.parts.iter().map(|(name, part)| format!("{name}: {}", part.text));
+        parts.chain(own.map(|after| format!("times after {after} us are doubtful"))).collect::<Vec<_>>().join("; ")
     }
 
     /// The verdict whose line is all that an earlier version wrote: its status, without numbers.
@@ -635,3 +699,6 @@ pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
+/// Damage that is of a file as a whole, and that each of its sources has.
+const OF_THE_FILE: [&str; 7] =
+    ["bad_chunks", "large_chunks", "skipped_bytes", "torn_bytes", "bytes_after_end", "no_summary", "no_final_counts"];

@@ -57,7 +57,7 @@ def topics(path: Path, types: Path | None = None, ros: str | None = None) -> lis
 
     Raises
     ------
-    ImportError : rosbags is not installed (``pip install taxel[ros]``)
+    ImportError : rosbags is not installed (``pip install 'taxel[ros]'``)
     FormatError : damaged, or of a kind that rosbags does not read
     ProblemError : an unknown release, or a folder without definitions
     """

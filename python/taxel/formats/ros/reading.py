@@ -88,7 +88,7 @@ def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: s
 
     Raises
     ------
-    ImportError : rosbags is not installed (``pip install taxel[ros]``)
+    ImportError : rosbags is not installed (``pip install 'taxel[ros]'``)
     FormatError : damaged, no such topic or field, no definition of its messages, or no message of the array's length
     ProblemError : an unknown release, or a folder without definitions
     """
