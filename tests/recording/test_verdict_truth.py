@@ -421,6 +421,11 @@ def test_a_merged_verdict_is_the_worst_and_keeps_those_of_its_parts(tmp_path: Pa
     (tmp_path / "other" / "bad.mcap").write_bytes((tmp_path / "bad.mcap").read_bytes())
     twice = taxel.merge([bad, taxel.open(tmp_path / "other" / "bad.mcap")], gap_us=10).verdict
     assert (twice.lost, list(twice.parts)) == ({"dropped_by_kernel": 4}, ["bad.mcap", "bad.mcap (2)"])
+    # So have two merged recordings that say the same, but not two parts of one.
+    other = taxel.merge([good, taxel.open(tmp_path / "other" / "bad.mcap"), worse], gap_us=10)
+    assert other.verdict == verdict
+    assert taxel.merge([both, other], gap_us=10).verdict.lost == {"dropped_by_kernel": 10}
+    assert taxel.merge([both.between(0, 99), both.between(99, 2**40)]).verdict.lost == {"dropped_by_kernel": 5}
 
 
 def test_a_lsa_without_its_lss_is_unfinished_and_with_damage_still(tmp_path: Path) -> None:
