@@ -288,6 +288,12 @@ def test_times_after_a_damaged_stamp_are_doubtful(seed: int, tmp_path: Path) -> 
     after = recording.verdict.doubtful_after_us
     assert after is not None
     assert f"times after {after} us are doubtful" in recording.verdict
+    # On another clock it is that of the same moment.
+    host = recording.on_clock("host")
+    moved = int(recording.clock.host_ns(after) + 500) // 1000
+    assert host.verdict.doubtful_after_us == moved
+    assert host.verdict == recording.verdict.replace(f"times after {after} us", f"times after {moved} us")
+    assert host.events.t[late].min() > moved
     # The recorder does not know the time, and takes the file's verdict.
     held = recording.verdict.to_dict() | {"doubtful_after_us": None, "text": "as recorded", "parts": []}
     ended = summary_of(json.dumps({"counters": {}, "verdict": held, "path": str(path), "tare": None}))
