@@ -26,11 +26,6 @@ class Goal:
             return False
         return self.figure <= self.limit if self.at_most else self.figure >= self.limit
 
-    def __str__(self) -> str:
-        """Return the figure with its limit."""
-        figure = "not measured" if self.figure is None else f"{self.figure:.6g}"
-        return f"{self.what}: {figure} (goal: {'at most' if self.at_most else 'at least'} {self.limit:g})"
-
 
 def at_least(limits: Mapping[str, float], figures: Mapping[str, float]) -> list[Goal]:
     """Return the goals of figures by name; one that is not among them was not measured."""

@@ -87,7 +87,7 @@ def in_turn(
     """Measure ours and each peer in turn; return ours, and what each peer found with `times`: its time over ours.
 
     A peer that takes above `OFTEN_S`, is stopped or has a saved time runs once, and its time is over our median; of the
-    others `times` is the median over the rounds, `quartiles` theirs.
+    others `times` is the median over the rounds, `quartiles` theirs. One that failed has none.
     """
     mine: list[dict[str, Any]] = []
     found: dict[str, dict[str, Any]] = {}
@@ -97,9 +97,12 @@ def in_turn(
         for name, run in peers.items():
             if not turn or ("kept" not in found[name] and found[name].get("cpu_s", LONG_S) <= OFTEN_S):
                 found[name] = run()
-                seconds[name].append(found[name].get("cpu_s", found[name].get("limit_s", LONG_S)))
+                if "failed" not in found[name]:
+                    seconds[name].append(found[name].get("cpu_s", found[name].get("limit_s", LONG_S)))
     cpu = [one["cpu_s"]["median"] for one in mine]
     for name, one in found.items():
+        if not seconds[name]:
+            continue
         over = cpu if len(seconds[name]) == rounds else [float(np.median(cpu))]
         low, one["times"], high = np.percentile(np.array(seconds[name][: len(over)]) / over, [25, 50, 75]).tolist()
         one |= {"rounds": len(over), "quartiles": [low, high]}

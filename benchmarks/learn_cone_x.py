@@ -246,7 +246,7 @@ def against(n, p, rounds, peers, *, quick):
     else:
         out["ConeX"]["certificate checked"] = bool(check_certificate(cone.problem_, cone.certificate_))
     for name, found in theirs.items():
-        found["times ConeX, at least" if "stopped" in found else "times ConeX"] = found.pop("times")
+        found["times ConeX, at least" if "stopped" in found else "times ConeX"] = found.pop("times", None)
         if found.get("verdict") == cone.status_ == "solved" and not name.startswith("HiGHS"):
             found["objective, relative difference"] = found["objective"] / out["ConeX"]["objective"] - 1
         out[name] = found

@@ -107,46 +107,78 @@ JUDGED = (
     .replace("import at_least", "import at_least, at_most, not_slower")
 )
 MET = {"ratios": {"a": 3.0, "b": 2.0, "c": 1.0}}
+ALL = """\
+  reached               3 >= 3          a
+  reached               2 <= 2          b
+  reached               1 >= 1          c
+"""
+QUIET = {"cpu": "one, AVX2", "others": 0.04, "cores": 2}
 
 
 @pytest.mark.parametrize(
     ("result", "said"),
     [
-        (MET, "3 of 3 goals reached\n"),
         (
-            {"ratios": {"a": 2.9996, "b": 2.5, "c": 0.5}},
-            "0 of 3 goals reached\n  not reached: a: 2.9996 (goal: at least 3)\n"
-            "  not reached: b: 2.5 (goal: at most 2)\n  not reached: c: 0.5 (goal: at least 1)\n",
+            MET | {"machine": QUIET},
+            "fast: 3 of 3 goals reached\n  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores\n"
+            f"  of this code\n{ALL}",
         ),
         (
-            {"ratios": {"a": 3.0, "c": 1.0}},
-            "2 of 3 goals reached\n  not reached: b: not measured (goal: at most 2)\n",
+            {"ratios": {"a": 2.9996, "b": 2.5}, "spread": {"a": [2.6, 3.1234]}, "machine": QUIET | {"others": 0.7}},
+            "fast: 0 of 3 goals reached\n  one, AVX2; commit 0123abc; other programs used 0.7 of 2 cores\n"
+            "  of this code\n"
+            "  not reached      2.9996 >= 3          a (2.6 to 3.12)\n"
+            "  not reached         2.5 <= 2          b\n"
+            "  not measured            >= 1          c\n",
         ),
-        (MET | {"machine": {"others": 0.7, "cores": 2}}, "3 of 3 goals reached; other programs used 0.7 of 2 cores\n"),
-        (MET | {"machine": {"others": 0.1, "cores": 2, "cpu": "one, AVX2"}, "kept": {}}, "3 of 3 goals reached\n"),
         (
-            MET | {"machine": {"others": None, "load": 9.7, "cores": 2}},
-            "3 of 3 goals reached; what other programs used was not measured, load 9.7\n",
+            MET | {"machine": {"load": 9.7, "cores": 2}, "made_of": {"fast": "other"}},
+            "fast: 3 of 3 goals reached\n"
+            "  unknown processor; commit 0123abc; what other programs used was not measured,\n  load 9.7\n"
+            "  of earlier code; changed: _shared, fast, logic/top.sv,",
         ),
-        (MET | {"stable": False}, "3 of 3 goals reached; times vary by more than 15 %: by its own judgement\n"),
-        (MET | {"kept": {"x": "2026"}}, "3 of 3 goals reached; 1 time of peers of another day\n"),
+        (
+            MET | {"machine": QUIET, "stable": False, "kept": {"x": "2026"}},
+            "fast: 3 of 3 goals reached\n"
+            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; 1 time of peers\n"
+            "  of another day; times vary by more than 15 %: by its own judgement\n  of this code\n" + ALL,
+        ),
         (
             MET
-            | {"results": {name: {"cpu_s": 1.0, "stable": name == "c"} for name in "abcde"}, "avx2": {"results": {}}},
-            "3 of 3 goals reached; times vary by more than 15 %: a; b and 2 more\n",
+            | {"results": {name: {"cpu_s": 1.0, "stable": name == "c"} for name in "abcde"}, "avx2": {"results": {}}}
+            | {"machine": QUIET},
+            "fast: 3 of 3 goals reached\n"
+            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; times vary by\n"
+            "  more than 15 %: a; b and 2 more\n  of this code\n" + ALL,
         ),
     ],
 )
-def test_goals_that_are_not_reached_and_doubts_are_listed(folder: Path, capsys, result: dict, said: str) -> None:
+def test_the_list_of_goals_says_what_is_reached_on_what_beside_what_and_of_which_code(
+    folder: Path, capsys, result: dict, said: str
+) -> None:
     (folder / "fast.py").write_text(JUDGED)
     shutil.copy(ROOT / "benchmarks" / "_goals.py", folder)
     (folder / "results" / "fast.json").write_text(json.dumps({"commit": "0123abc", "made_of": now(folder), **result}))
     code, out, _ = call(capsys, "bench", "--goals", "--folder", folder)
     assert code == 0
-    assert out.startswith(
-        f"fast, commit 0123abc, {result.get('machine', {}).get('cpu', 'unknown processor')}: {said}other: no result\n"
-    )
-    assert out.endswith("goals reached; 0 of 2 results of earlier code\n")
+    assert out.startswith(said)
+    assert "\n\nother: no result\n\n3 goals: " in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_the_list_of_goals_ends_with_how_many_are_reached(folder: Path, capsys) -> None:
+    (folder / "fast.py").write_text(JUDGED)
+    shutil.copy(ROOT / "benchmarks" / "_goals.py", folder)
+    saved = {"ratios": {"a": 3.0, "b": 2.5}, "made_of": {}}
+    (folder / "results" / "fast.json").write_text(json.dumps(saved))
+    out = call(capsys, "bench", "--goals", "--folder", folder)[1]
+    last = "3 goals: 1 reached, 1 not reached, 1 not measured\n2 benchmarks: 1 with a result of earlier code\n"
+    assert out.endswith(last)
+
+
+def test_the_list_of_all_goals_fits_a_terminal(capsys) -> None:
+    out = call(capsys, "bench", "--goals", "--folder", ROOT / "benchmarks")[1]
+    assert [line for line in out.splitlines() if len(line) > 80] == []
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("[!_]*.py")), ids=lambda path: path.stem)
@@ -156,7 +188,7 @@ def test_each_benchmark_states_goals_and_judges_its_saved_result(path: Path) -> 
     goals = goals_of(benchmark, result)
     assert goals
     # What earlier code did not measure is listed as not measured.
-    missing = [str(goal) for goal in goals if goal.figure is None]
+    missing = [goal.what for goal in goals if goal.figure is None]
     assert not missing or changed_parts(result, made_of(path, benchmark))
 
 
@@ -186,7 +218,7 @@ def test_a_benchmark_runs_in_a_process_of_its_own_on_no_other_calls(folder: Path
     """A peer that looks through the stack does not pay for the command line."""
     shutil.copy(ROOT / "benchmarks" / "_alone.py", folder)
     text = (folder / "fast.py").read_text()
-    calls = 'return {"ratios": {"calls": len(inspect.stack())}, "machine": {}}'
+    calls = 'return {"ratios": {"calls": len(inspect.stack())}, "machine": {"cores": 2}}'
     (folder / "fast.py").write_text("import inspect\n" + text.replace("return often(victor_purpura)", calls))
     code, out, _ = call(capsys, "bench", "fast", "--quick", "--folder", folder)
     assert code == 0
@@ -223,7 +255,6 @@ def test_the_list_of_goals_names_what_has_changed_modules_before_the_compiled_pa
     assert compiled > 1
     out = call(capsys, "bench", "fast", "--goals", "--folder", folder)[1]
     assert f"  of earlier code; changed: _shared, {compiled} compiled names\n" in out
-    assert out.endswith("; 1 of 1 results of earlier code\n")
 
 
 PEER = "import json, sys\nprint(json.dumps({'cpu_s': float(sys.argv[1]), 'verdict': 'solved'}))\n"

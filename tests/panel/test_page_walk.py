@@ -16,7 +16,7 @@ from tests.formats import bags
 from tests.formats.bags import BEGIN_NS, PALM
 from tests.formats.making import write_gaitpdb
 from tests.panel.browser import running
-from tests.panel.pages import clock, opened, press, shown, shows, span, until
+from tests.panel.pages import clock, opened, pixel, press, shown, shows, span, until
 
 import taxel
 from taxel import Array, Frames
@@ -311,3 +311,26 @@ def test_the_values_above_the_lanes_are_in_full_on_a_phone(chromium: Any, tmp_pa
             head = page.locator(f"#{name}-block h2")
             assert head.evaluate("e => e.scrollWidth <= e.clientWidth"), head.inner_text()
         assert "mm)" in page.locator("#centre-now").inner_text()
+
+
+def test_a_picture_of_missing_values_alone_has_no_force(chromium: Any, tmp_path: Path) -> None:
+    values = np.zeros((100, 6, 4))
+    values[20:40], values[60:80] = 10.0, np.nan
+    taxel.convert(Frames(values, np.arange(100) * 20_000, unit="N", array=Array(6, 4)), tmp_path / "walk.npz")
+    with shown(chromium, tmp_path / "walk.npz") as page:
+        box = page.locator("#force-lane .u-over").bounding_box()
+        for t_s, says in ((0.5, "^240 N$"), (1.0, "^0 N$"), (1.4, "^missing$"), (1.8, "^0 N$")):
+            page.mouse.move(pixel(page, t_s), box["y"] + 5)
+            shows(page, "force-sum", says)
+
+
+@pytest.mark.parametrize("feet", [1, 2])
+def test_on_a_phone_the_map_leaves_the_curves_in_sight(feet: int, chromium: Any, tmp_path: Path) -> None:
+    path = tmp_path / "walk.npz"
+    values = np.zeros((60, 8, 2))
+    values[20:40] = 100.0
+    taxel.convert(Frames(values, np.arange(60) * 20_000, unit="N", array=Array(8, 2)), path)
+    with shown(chromium, write_gaitpdb(tmp_path) if feet == 2 else path, width=390, height=844) as page:
+        assert page.locator("#pressure-frame").bounding_box()["height"] > 200
+        lane = page.locator("#force-lane").bounding_box()
+        assert lane["y"] + lane["height"] <= page.locator("footer").bounding_box()["y"]

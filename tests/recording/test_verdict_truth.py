@@ -288,6 +288,12 @@ def test_times_after_a_damaged_stamp_are_doubtful(seed: int, tmp_path: Path) -> 
     after = recording.verdict.doubtful_after_us
     assert after is not None
     assert f"times after {after} us are doubtful" in recording.verdict
+    # On another clock it is that of the same moment.
+    host = recording.on_clock("host")
+    moved = int(recording.clock.host_ns(after) + 500) // 1000
+    assert host.verdict.doubtful_after_us == moved
+    assert host.verdict == recording.verdict.replace(f"times after {after} us", f"times after {moved} us")
+    assert host.events.t[late].min() > moved
     # The recorder does not know the time, and takes the file's verdict.
     held = recording.verdict.to_dict() | {"doubtful_after_us": None, "text": "as recorded", "parts": []}
     ended = summary_of(json.dumps({"counters": {}, "verdict": held, "path": str(path), "tare": None}))
@@ -421,6 +427,11 @@ def test_a_merged_verdict_is_the_worst_and_keeps_those_of_its_parts(tmp_path: Pa
     (tmp_path / "other" / "bad.mcap").write_bytes((tmp_path / "bad.mcap").read_bytes())
     twice = taxel.merge([bad, taxel.open(tmp_path / "other" / "bad.mcap")], gap_us=10).verdict
     assert (twice.lost, list(twice.parts)) == ({"dropped_by_kernel": 4}, ["bad.mcap", "bad.mcap (2)"])
+    # So have two merged recordings that say the same, but not two parts of one.
+    other = taxel.merge([good, taxel.open(tmp_path / "other" / "bad.mcap"), worse], gap_us=10)
+    assert other.verdict == verdict
+    assert taxel.merge([both, other], gap_us=10).verdict.lost == {"dropped_by_kernel": 10}
+    assert taxel.merge([both.between(0, 99), both.between(99, 2**40)]).verdict.lost == {"dropped_by_kernel": 5}
 
 
 def test_a_lsa_without_its_lss_is_unfinished_and_with_damage_still(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use super::centre::Coordinates;
-use super::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
+use super::time_columns::{COLUMN_US, Curve, MISSING, NOTHING, TimeColumns, column_of};
 use super::weights::Weights;
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
@@ -490,7 +490,8 @@ impl ArrayState {
 
     /// Writes the current curve, and the values of channels, into a column.
     fn store_curve(&mut self, column: i64) {
-        let curve = self.curve();
+        let missing = self.pictures.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN);
+        let curve = if missing { MISSING } else { self.curve() };
         self.time_columns.set_curve(column, curve);
         let count = self.time_columns.channel_count();
         if count > 0 {

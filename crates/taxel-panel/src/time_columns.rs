@@ -33,7 +33,7 @@ const QUIET_SHARE: usize = 5;
 pub struct Curve {
     /// Sum of ticks above rest.
     pub sum: u32,
-    /// Number of taxels above rest.
+    /// Number of taxels above rest; [`MISSING`]'s where no taxel has a value.
     pub area: u32,
     /// Column of the centre of pressure; NaN where nothing is pressed.
     pub x: f32,
@@ -215,6 +215,7 @@ impl TimeColumns {
     pub(super) fn set_curve(&mut self, column: i64, curve: Curve) {
         let before = self.curve(column);
         let same = before.sum == curve.sum
+            && before.area == curve.area
             && before.x.to_bits() == curve.x.to_bits()
             && before.y.to_bits() == curve.y.to_bits();
         // A stretch without events repeats the curve before it, so it needs no block.
@@ -257,7 +258,7 @@ impl TimeColumns {
     #[must_use]
     pub fn greatest(&self, columns: Range<i64>) -> Curve {
         let greatest = |most: Curve, column| match self.curve(column) {
-            curve if curve.sum > most.sum => curve,
+            curve if curve.sum > most.sum || most.area == MISSING.area => curve,
             _ => most,
         };
         let first = self.curve(columns.start);
@@ -341,3 +342,6 @@ impl TimeColumns {
 
 /// The curve while nothing is pressed.
 pub const NOTHING: Curve = Curve { sum: 0, area: 0, x: f32::NAN, y: f32::NAN };
+
+/// The curve of a picture in which no taxel has a value.
+pub const MISSING: Curve = Curve { area: u32::MAX, ..NOTHING };

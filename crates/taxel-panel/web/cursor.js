@@ -132,6 +132,11 @@ export class Cursor {
     const now = `${value(last)} ${unit}`;
     write(part("taxel-now", HTMLElement), last === UNKNOWN_VALUE ? "" : least === greatest ? now : `${now} (${value(least)} to ${value(greatest)})`);
     const { sums } = this;
+    if (Number.isNaN(timeline.sum[place])) {
+      for (const id of ["force-sum", "picture-info"]) write(part(id, HTMLElement), "missing");
+      for (const id of ["force-area", "centre-now"]) write(part(id, HTMLElement), "");
+      return;
+    }
     const sum = `${sums.step === 1 ? whole(timeline.sum[place]) : rounded(timeline.sum[place] * sums.step)} ${sums.unit}`;
     write(part("force-sum", HTMLElement), sum);
     const area = this.sensor?.area(timeline.area[place]) ?? "";

@@ -154,8 +154,9 @@ export class Lanes {
       least[i] = known ? (history[3 * place] - zero) * step : null;
       greatest[i] = known ? (history[3 * place + 1] - zero) * step : null;
       last[i] = known ? (history[3 * place + 2] - zero) * step : null;
-      force[i] = place >= 0 ? sum[place] * this.sum_step : null;
-      touched[i] = place >= 0 ? area[place] : null;
+      const there = place >= 0 && !Number.isNaN(sum[place]);
+      force[i] = there ? sum[place] * this.sum_step : null;
+      touched[i] = there ? area[place] : null;
       const pressed = place >= 0 && !Number.isNaN(x[place]);
       column[i] = pressed ? x[place] : null;
       row[i] = pressed ? y[place] : null;

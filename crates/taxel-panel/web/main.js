@@ -144,14 +144,14 @@ function showUnits() {
   showLanes();
 }
 
-/** Shows the sum of the values: as force, N, where that is known of a pressure. */
+/** Shows the sum of the values: as force where it is in N, or known of a pressure. */
 function showSums() {
   const { unit, step } = maps.values;
   const newtons = opened?.pictures?.newtons ?? null;
   const sums = newtons === null ? { unit, step } : { unit: "N", step: newtons };
   lanes.sum_step = sums.step;
   cursor.sums = sums;
-  write(part("force-title", HTMLElement), sums.unit === "N" || sums.unit === "ticks" ? "Force" : "Sum");
+  write(part("force-title", HTMLElement), sums.unit === "N" ? "Force" : "Sum");
 }
 
 /** What the page has to place: see `Layout`. */

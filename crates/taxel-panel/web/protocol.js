@@ -4,6 +4,8 @@ export const VERSION = 1;
 
 /** The value of a taxel without any event so far. */
 export const UNKNOWN_VALUE = 65535;
+/** The area of a picture in which no taxel has a value. */
+export const MISSING_AREA = 0xffffffff;
 
 /**
  * @typedef {{ x: number[], y: number[], area?: number[], unit: "mm" | null }} TaxelPlaces

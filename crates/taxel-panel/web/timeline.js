@@ -1,6 +1,6 @@
 // What the lanes show, by columns of time; the window of time that is shown, and the one time cursor that every view shares.
 
-import { UNKNOWN_VALUE } from "./protocol.js";
+import { MISSING_AREA, UNKNOWN_VALUE } from "./protocol.js";
 import { numbering, seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
@@ -85,8 +85,9 @@ export class Timeline {
       if (spikes) this.spikes.set(spikes.subarray(i * this.rows, (i + 1) * this.rows), place * this.rows);
       else this.spikes.fill(0, place * this.rows, (place + 1) * this.rows);
       if (sums && centres) {
-        this.sum[place] = sums[4 * i];
-        this.area[place] = sums[4 * i + 1];
+        const missing = sums[4 * i + 1] === MISSING_AREA;
+        this.sum[place] = missing ? NaN : sums[4 * i];
+        this.area[place] = missing ? NaN : sums[4 * i + 1];
         this.x[place] = centres[4 * i + 2];
         this.y[place] = centres[4 * i + 3];
       }

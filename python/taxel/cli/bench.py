@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+import textwrap
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -31,6 +32,7 @@ _PATIENT = "TAXEL_BENCH_PEERS"
 _COMPILED = "taxel._core."
 #: How the rows begin that were measured with AVX2 alone (benchmarks/_instructions.py).
 _AVX2 = "AVX2: "
+_VERDICTS = ("reached", "not reached", "not measured")
 #: The share of all cores that other programs may use while times are measured.
 _BUSY = 0.1
 
@@ -49,7 +51,7 @@ def bench(
         bool,
         typer.Option(
             "--goals",
-            help="List the goals of the saved results, what speaks against their times, and whose code has changed.",
+            help="List the goals of the saved results, reached or not, what speaks against times, and changed code.",
         ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
@@ -142,17 +144,21 @@ def goals_of(benchmark: Any, result: Mapping[str, Any]) -> list[Any]:
 def doubts_of(result: Mapping[str, Any]) -> list[str]:
     """Return what speaks against the times of a result: other programs, other days, times that vary."""
     machine, kept = result.get("machine", {}), result.get("kept", {})
-    others, cores = machine.get("others"), machine.get("cores", 1)
-    if others is None:
-        doubts = [f"what other programs used was not measured, load {machine['load']:.1f}"] if "load" in machine else []
-    else:
-        doubts = [f"other programs used {others:.1f} of {counted(cores, 'core')}"] * (others > _BUSY * cores)
+    others = machine.get("others")
+    doubts = [_others(machine)] * (others is None or others > _BUSY * machine["cores"])
     doubts += [f"{counted(len(kept), 'time')} of peers of another day"] * bool(kept)
     # With AVX2 alone a row has the same name.
     vary = list(dict.fromkeys(name for name, one in _measured(result) if one.get("stable") is False))
     vary = vary or ["by its own judgement"] * (result.get("stable") is False)
     more = f" and {len(vary) - 2} more" * (len(vary) > 2)
     return doubts + [f"times vary by more than 15 %: {'; '.join(vary[:2])}{more}"] * bool(vary)
+
+
+def _others(machine: Mapping[str, Any]) -> str:
+    """Return how much other programs ran during a measurement."""
+    if machine.get("others") is None:
+        return f"what other programs used was not measured, load {machine.get('load', float('nan')):.1f}"
+    return f"other programs used {machine['others']:.1f} of {counted(machine['cores'], 'core')}"
 
 
 def _measured(part: Mapping[str, Any], name: str = "result") -> list[tuple[str, Mapping[str, Any]]]:
@@ -163,27 +169,47 @@ def _measured(part: Mapping[str, Any], name: str = "result") -> list[tuple[str, 
 
 
 def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
-    missed = total = stale = 0
+    verdicts: list[str] = []
+    stale = 0
     for name in names:
         place = folder / "results" / f"{name}.json"
         if not place.exists():
-            typer.echo(f"{name}: no result")
+            typer.echo(f"{name}: no result\n")
             continue
         result = json.loads(place.read_text(encoding="utf-8"))
         benchmark = _load(files[name])
         goals, changed = goals_of(benchmark, result), changed_parts(result, made_of(files[name], benchmark))
         stale += bool(changed)
-        lacks = [goal for goal in goals if not goal.reached]
-        missed, total = missed + len(lacks), total + len(goals)
-        doubts = "".join(f"; {doubt}" for doubt in doubts_of(result))
-        reached = f"{len(goals) - len(lacks)} of {counted(len(goals), 'goal')} reached"
-        where = result.get("machine", {}).get("cpu", "unknown processor")
-        typer.echo(f"{name}, commit {result.get('commit', 'unknown')}, {where}: {reached}{doubts}")
-        if changed:
-            typer.echo(f"  of earlier code; changed: {', '.join(changed)}")
-        for goal in lacks:
-            typer.echo(f"  not reached: {goal}")
-    typer.echo(f"{total - missed} of {counted(total, 'goal')} reached; {stale} of {len(names)} results of earlier code")
+        verdicts += [_verdict(goal) for goal in goals]
+        machine = result.get("machine", {})
+        about = [machine.get("cpu", "unknown processor"), f"commit {result.get('commit', 'unknown')}", _others(machine)]
+        about += [doubt for doubt in doubts_of(result) if doubt not in about]
+        reached = sum(goal.reached for goal in goals)
+        typer.echo(f"{name}: {reached} of {counted(len(goals), 'goal')} reached")
+        typer.echo(_wrapped("; ".join(about)))
+        typer.echo(_wrapped(f"of earlier code; changed: {', '.join(changed)}" if changed else "of this code"))
+        typer.echo("".join(f"{_row(goal, result)}\n" for goal in goals))
+    counts = [f"{verdicts.count(one)} {one}" for one in _VERDICTS]
+    typer.echo(f"{counted(len(verdicts), 'goal')}: {', '.join(counts)}")
+    typer.echo(f"{counted(len(names), 'benchmark')}: {stale} with a result of earlier code")
+
+
+def _wrapped(text: str, first: str = "  ", later: str = "  ") -> str:
+    return textwrap.fill(text, 80, initial_indent=first, subsequent_indent=later, break_on_hyphens=False)
+
+
+def _verdict(goal: Any) -> str:
+    reached, lacks, unknown = _VERDICTS
+    return unknown if goal.figure is None else reached if goal.reached else lacks
+
+
+def _row(goal: Any, result: Mapping[str, Any]) -> str:
+    """Return a goal as a row: whether it is reached, the figure, the limit, the name, and the quartiles of rounds."""
+    figure = "" if goal.figure is None else f"{goal.figure:.5g}"
+    first = f"  {_verdict(goal):<13}{figure:>10} {'<=' if goal.at_most else '>='} {goal.limit:<10.5g} "
+    spread = result.get("spread", {}).get(goal.what)
+    rounds = "" if spread is None else f" ({spread[0]:.3g} to {spread[1]:.3g})"
+    return _wrapped(goal.what + rounds, first, " " * len(first))
 
 
 class _Others:
@@ -259,6 +285,6 @@ def _table(stem: str, result: dict[str, Any], goals: Sequence[Any]) -> str:
     left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
     saved = [f"  saved, not measured in this run: {peer}: of {when}" for peer, when in result.get("kept", {}).items()]
     head = f"{stem}: ratios (ours over the peer's, above 1 is faster) with quartiles of rounds; {result['took_s']:g} s"
-    lacks = [f"  not reached: {goal}" for goal in goals if not goal.reached]
+    lacks = [_row(goal, result) for goal in goals if not goal.reached]
     doubts = [f"  {doubt}" for doubt in doubts_of(result)]
     return "\n".join([head, *rows, *left_out, *saved, *lacks, *doubts])

@@ -121,11 +121,12 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         lost.append("the calibration (it is of one of the sensors)")
     fields["zeroings"] = _zeroings(parts, shifts, lefts, lost, beside=beside)
     fields["held"] = _beside_held(parts, array, lefts) if beside else _held(parts, tables, shifts, lost)
-    # Parts of one file have the verdict of the whole, which counts once.
+    # Parts of one file, or of one merged recording, have the verdict of the whole, which counts once.
     verdicts: dict[Any, tuple[str, Verdict]] = {}
     for p, shift in zip(parts, shifts, strict=True):
-        said = Verdict(verdict_of(p))
-        verdicts.setdefault((p.path, p.name, p.label, said), (p.name, said._later(shift)))
+        said = verdict_of(p)
+        whole = id(said) if p.kind == "merged" else (p.path, p.name, p.label, said)
+        verdicts.setdefault(whole, (p.name, said._later(shift)))
     together = after(
         "merge",
         parts[0].but(lost=tuple(dict.fromkeys(line for part in parts for line in part.lost))),

@@ -20,7 +20,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import UNKNOWN, Contents
 from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
-from taxel.recording.rest import Picture, Rest, found, loaded_above, of_pictures, ticks_by_unit, tracked
+from taxel.recording.rest import Picture, Rest, flickering, found, loaded_above, of_pictures, ticks_by_unit, tracked
 from taxel.tare import Tare
 
 __all__ = ["Series", "above_rest", "above_rest_at", "readings", "series"]
@@ -115,12 +115,17 @@ def force_n(frames: Frames) -> NDArray[np.float64] | None:
 def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     """Return area, peak, sum and centre of a recording's pictures above rest (`above_rest`); None without intensities.
 
-    For events only taxels with events are computed, a block of pictures at a time: for a large sensor with few events
-    no whole picture is in memory.
+    Taxels of pictures that flicker (`taxel.recording.rest.flickering`) count as 0. For events only taxels with events
+    are computed, a block of pictures at a time: for a large sensor with few events no whole picture is in memory.
     """
     if not recording.has_events or recording.calibration is not None:
         result = above_rest(recording, tare)
-        return None if result is None else Series.of(*result)
+        if result is None or recording.has_events:
+            return None if result is None else Series.of(*result)
+        frames, above, rest = result
+        # As on the page, a taxel that jumps alone for single pictures is no load.
+        values = np.where(flickering(recording.frames()), np.float32(0), frames.values)
+        return Series.of(Frames(values, frames.t, unit=frames.unit, array=frames.array), above, rest)
     events = recording.events
     if events.present is None or events.intensity is None or not events.present.any():
         return None
