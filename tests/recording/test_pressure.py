@@ -134,3 +134,11 @@ def test_the_largest_are_those_of_pictures_at_all_events(monkeypatch: pytest.Mon
         most = getattr(every, name).max()
         assert getattr(found.largest, name).max() == pytest.approx(most, rel=1e-3)
     assert found.total.max() < found.largest.total.max()
+
+
+def test_pictures_of_missing_values_alone_are_no_peak(tmp_path: Path) -> None:
+    values = np.zeros((40, 4, 4))
+    values[10:15], values[20:30] = 7.0, np.nan
+    taxel.convert(taxel.Frames(values, np.arange(40) * 10_000, unit="N"), tmp_path / "a.npz")
+    found = json.loads(run("info", tmp_path / "a.npz", "--json").stdout)["pressure"]
+    assert (found["peak"], found["sum"]["most"]) == ({"most": 7.0, "t_us": 100_000}, 112.0)

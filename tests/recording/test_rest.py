@@ -166,3 +166,15 @@ def test_where_nothing_lay_or_the_whole_array_drifts_nothing_is_said(tmp_path: P
     falling = np.linspace(drift, 0, len(frames))[:, None, None].astype(np.float32)
     taxel.convert(taxel.Frames(frames.values + falling, frames.t, unit="ticks", array=frames.array), tmp_path / "a.npz")
     assert "something lay" not in run("info", tmp_path / "a.npz").stdout
+
+
+def test_the_page_takes_its_tare_of_the_same_time_as_train(tmp_path: Path) -> None:
+    from taxel.live._requests import _rest
+
+    source, truth = lain()
+    taxel.convert(source, tmp_path / "a.npz")
+    rows = "".join(f"{label},{t}\n" for label, times in truth.items() for t in times)
+    (tmp_path / "a.notes.csv").write_text("label,t_us\n" + rows)
+    tare = _rest(taxel.open(tmp_path / "a.npz"))
+    assert (tare.start_us, tare.stop_us > 1_900_000) == (800_000, True)
+    assert np.abs(tare.rest - 50).max() < 1

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from taxel.frames import Frames
     from taxel.labels import Labels
     from taxel.recording import Recording
-    from taxel.recording.rest import Rest
     from taxel.tare import Tare
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
@@ -145,48 +144,22 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     """
     from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
     from taxel.recorded import recorded  # noqa: PLC0415
-    from taxel.recording.pressure import readings  # noqa: PLC0415
+    from taxel.recording.lain import without_what_lay  # noqa: PLC0415
     from taxel.recording.rest import of_quiet  # noqa: PLC0415
     from taxel.tare import Tare  # noqa: PLC0415
 
-    source, note = recorded(recording), str(recording.path)
+    source = recorded(recording)
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
-    read = (source, of_quiet(source)) if isinstance(source, Frames) else readings(recording)
-    if read is not None and read[1].on and read[1].quiet_us is not None and read[1].quiet_us[0] < first:
-        span, where = _without(read[0], read[1], first), f"{recording.path}: the rest is {read[1]}"
-        if span is not None:
-            warnings.warn(f"{where}, so the tare is of a time without it", stacklevel=2)
-            return Tare.take(source, start_us=span[0], stop_us=span[1], note=note)
-        warnings.warn(f"{where}, and there is no other rest, so the tare holds it; give --tare FILE", stacklevel=2)
+    tare, said = without_what_lay(recording, first)
+    if said:
+        warnings.warn(said, stacklevel=2)
+    if tare is not None:
+        return tare
     if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_PICTURES <= len(source):
-        quiet = None if read is None else read[1].quiet_us
+        quiet = of_quiet(source).quiet_us
         if quiet is not None:
-            return Tare.take(source, start_us=quiet[0], stop_us=quiet[1], note=note)
+            return Tare.take(source, start_us=quiet[0], stop_us=quiet[1], note=str(recording.path))
     return _before(labels, recording)
-
-
-def _without(pictures: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:
-    """Return the longest time before the first label without what lay on the array, else a later quiet one, us."""
-    from taxel.recording.rest import of_quiet  # noqa: PLC0415  the command line starts quickly
-
-    assert rest.quiet_us is not None
-    assert rest.lay is not None
-    on = rest.lay > 0
-    values = pictures.values.reshape(len(pictures), -1)[:, on]
-    lain = values[slice(*np.searchsorted(pictures.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
-    free = np.flatnonzero((values < lain - rest.lay[on] / 2).all(axis=1))
-    if not len(free):
-        return None
-    runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
-    spans = [(int(pictures.t[run[0]]), min(int(pictures.t[run[-1]]), first_us)) for run in runs]
-    begin, end = max(spans, key=lambda span: span[1] - span[0])
-    if (
-        end - begin >= _LEAST_REST_US
-        and np.count_nonzero((pictures.t >= begin) & (pictures.t < end)) >= _LEAST_PICTURES
-    ):
-        return begin, end
-    later = of_quiet(pictures.between(pictures.t[free[0]], np.inf))
-    return None if later.on else later.quiet_us
 
 
 def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:

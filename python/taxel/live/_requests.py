@@ -33,6 +33,7 @@ from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.health import TaxelStatistics, Touches, judged
+from taxel.recording.lain import without_what_lay
 from taxel.recording.opening import sensors
 from taxel.tare import Tare
 from taxel.wire import Command
@@ -95,7 +96,8 @@ def _rest(recording: Recording) -> Tare:
     ends = [note.t - _BEFORE_US for note in recording.notes if note.t is not None]
     ends += [t for t, start in getattr(source, "markers", ()) if start]
     stop = min((t for t in ends if t - first >= _LEAST_REST_US), default=first + _REST_US)
-    return Tare.take(source, stop_us=stop, note=str(recording.path))
+    tare, _ = without_what_lay(recording, stop)
+    return Tare.take(source, stop_us=stop, note=str(recording.path)) if tare is None else tare
 
 
 class RequestHandler:
@@ -254,7 +256,7 @@ class RequestHandler:
             return list(convert(part, out))
 
     def train(self, recording: Path, out: Path) -> str:
-        """Train a readout on the labels of a recording, as ``taxel train`` does; return what it prints."""
+        """Train on the labels of a recording as ``taxel train`` does; return what it prints, then its warnings."""
         command = [sys.executable, "-m", "taxel", *self._training_words(recording, recording, out)]
         with self._training_lock:
             if self._training is not None:
@@ -273,7 +275,8 @@ class RequestHandler:
         if code:
             lines = [line for line in errors.splitlines() if line.strip()]
             raise ProblemError(lines[-1].removeprefix("taxel: ") if lines else f"the training ended with code {code}")
-        return printed.strip()
+        warned = [line.removeprefix("taxel: ") for line in errors.splitlines() if line.startswith("taxel: warning: ")]
+        return "\n".join([printed.strip(), *warned])
 
     def train_command(self, recording: Path, out: Path) -> str:
         """Return the command that trains the same in a shell, in the folder where taxel was started."""

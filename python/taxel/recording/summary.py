@@ -114,7 +114,8 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     curves: dict[str, Any] = {f"area_{of.area_unit}": of.area, "peak": of.peak, "sum": of.total, "force_n": of.force}
     for name, values in curves.items():
         if values is not None:
-            k = int(values.argmax())
+            # A picture of missing values alone has no peak.
+            k = int(np.where(np.isnan(values), -np.inf, values).argmax())
             facts[name] = {"most": float(values[k]), "t_us": int(of.t[k])}
     if pressed.centre is None:
         return facts

@@ -1,0 +1,54 @@
+"""The tare of a recording that began with something on the array, which was taken away later."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taxel.frames import Frames
+from taxel.recorded import recorded
+from taxel.recording.pressure import readings
+from taxel.recording.recording import Recording
+from taxel.recording.rest import Rest, of_quiet
+from taxel.tare import Tare
+
+__all__ = ["without_what_lay"]
+
+#: A tare lasts so long at least, us, and so many pictures.
+_LEAST_US, _LEAST_PICTURES = 10_000, 20
+
+
+def without_what_lay(recording: Recording, first_us: int) -> tuple[Tare | None, str]:
+    """Return the tare of a time without what lay on the array before a time, us, and the line that says so.
+
+    The time is the longest one before that time, else that of a later quiet stretch. None and "" where nothing lay;
+    None and a line where there is no such time.
+    """
+    source = recorded(recording)
+    read = (source, of_quiet(source)) if isinstance(source, Frames) else readings(recording)
+    if read is None or not read[1].on or read[1].quiet_us is None or read[1].quiet_us[0] >= first_us:
+        return None, ""
+    span, said = _without(read[0], read[1], first_us), f"{recording.path}: the rest is {read[1]}"
+    if span is None:
+        return None, f"{said}, and there is no other rest, so the tare holds it; give --tare FILE"
+    tare = Tare.take(source, start_us=span[0], stop_us=span[1], note=str(recording.path))
+    return tare, f"{said}, so the tare is of a time without it"
+
+
+def _without(pictures: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:
+    """Return the longest time before the first label without what lay on the array, else a later quiet one, us."""
+    assert rest.quiet_us is not None
+    assert rest.lay is not None
+    on = rest.lay > 0
+    values = pictures.values.reshape(len(pictures), -1)[:, on]
+    lain = values[slice(*np.searchsorted(pictures.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
+    free = np.flatnonzero((values < lain - rest.lay[on] / 2).all(axis=1))
+    if not len(free):
+        return None
+    runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
+    spans = [(int(pictures.t[run[0]]), min(int(pictures.t[run[-1]]), first_us)) for run in runs]
+    begin, end = max(spans, key=lambda span: span[1] - span[0])
+    count = np.count_nonzero((pictures.t >= begin) & (pictures.t < end))
+    if end - begin >= _LEAST_US and count >= _LEAST_PICTURES:
+        return begin, end
+    later = of_quiet(pictures.between(pictures.t[free[0]], np.inf))
+    return None if later.on else later.quiet_us
