@@ -1,7 +1,8 @@
-// Bytes of a datagram of version 2: its header, its body out of the buffer, its promise, and the CRC-32C of all of them.
+// Units of a datagram of version 2, two bytes each, the first in the low bits: its header, its body out of the buffer, its
+// promise, and the CRC-32C of all of them.
 //
-// Throughput: a byte a clock in which the link accepts one.
-// Latency: five clocks from `send` to the first byte.
+// Throughput: a unit a clock in which the link accepts one.
+// Latency: five clocks from `send` to the first unit.
 // Loses nothing: while the link waits, so does it.
 module taxel_datagram_sender #(
     parameter int ROWS = 64,
@@ -17,7 +18,7 @@ module taxel_datagram_sender #(
     input  logic                   send,      // one clock, where not sending
     input  taxel_types::datagram_t datagram,
     output logic                   sending,   // from the clock after `send` on
-    output logic [7:0]             tdata,
+    output logic [15:0]            tdata,
     output logic                   tvalid,
     input  logic                   tready,
     output logic                   tlast
@@ -26,16 +27,16 @@ module taxel_datagram_sender #(
   import taxel_types::*;
 
   localparam logic [4:0] STRIDE = 5'(ROWS > 1 ? $clog2(ROWS) : 0);
-  localparam int HEADER = 18;  // bytes
-  localparam int SPAN = 2;
-  localparam int CHECKSUM = 4;
+  localparam int HEADER = 9;  // units
+  localparam int SPAN = 1;
+  localparam int CHECKSUM = 2;
 
   logic [15:0] buffer[2048];
   datagram_t now;
   logic [143:0] head;
   logic moves;
 
-  // Four stages, which move together: what is fetched stands in a register as memory answers late, the byte is chosen,
+  // Four stages, which move together: what is fetched stands in a register as memory answers late, the unit is chosen,
   // and its CRC follows.
   typedef enum logic [1:0] {HEAD, BODY, PROMISE, SUM} part_t;
 
@@ -43,14 +44,13 @@ module taxel_datagram_sender #(
     logic        valid;
     logic        last;
     part_t       part;
-    logic [10:0] at;    // byte of the datagram
+    logic [9:0]  at;    // unit of the datagram
   } place_t;
 
   logic busy;
-  logic [10:0] at, body_end, promise_end, last_at;
+  logic [9:0] at, body_end, promise_end, last_at;
   place_t fetched, read, chosen;
-  logic [15:0] unit_fetched, unit_read;
-  logic [7:0] data;
+  logic [15:0] unit_fetched, unit_read, data;
   logic [31:0] crc;
 
   assign moves   = !tvalid || tready;
@@ -62,32 +62,32 @@ module taxel_datagram_sender #(
   always_ff @(posedge clk) begin
     if (write) buffer[{bank, place}] <= unit;
     // They stand before the header has gone.
-    body_end    <= 11'(HEADER) + {now.units, 1'b0};
-    promise_end <= body_end + 11'(SPAN);
-    last_at     <= promise_end + 11'(CHECKSUM - 1);
+    body_end    <= 10'(HEADER) + now.units;
+    promise_end <= body_end + 10'(SPAN);
+    last_at     <= promise_end + 10'(CHECKSUM - 1);
     sending     <= send || busy || fetched.valid || read.valid || chosen.valid || tvalid;
     if (moves) begin
       fetched <= '{
           valid: busy,
-          last: at == last_at && at >= 11'(HEADER),
-          part: at < 11'(HEADER) ? HEAD : at < body_end ? BODY : at < promise_end ? PROMISE : SUM,
+          last: at == last_at && at >= 10'(HEADER),
+          part: at < 10'(HEADER) ? HEAD : at < body_end ? BODY : at < promise_end ? PROMISE : SUM,
           at: at
       };
-      unit_fetched <= buffer[{now.bank, 10'((at - 11'(HEADER)) >> 1)}];
+      unit_fetched <= buffer[{now.bank, at - 10'(HEADER)}];
       read         <= fetched;
       unit_read    <= unit_fetched;
       chosen       <= read;
       case (read.part)
-        HEAD: data <= 8'(head >> {read.at[4:0], 3'd0});
-        BODY: data <= read.at[0] ^ HEADER[0] ? unit_read[15:8] : unit_read[7:0];
-        default: data <= read.at[0] ^ HEADER[0] ? now.span[15:8] : now.span[7:0];
+        HEAD: data <= 16'(head >> {read.at[3:0], 4'd0});
+        BODY: data <= unit_read;
+        default: data <= now.span;
       endcase
       tvalid <= chosen.valid;
       tlast  <= chosen.last;
-      tdata  <= chosen.part == SUM ? ~crc[7:0] : data;
-      if (chosen.valid) crc <= chosen.part == SUM ? crc >> 8 : crc_32c(crc, data);
-      at <= at + 11'd1;
-      if (at == last_at && at >= 11'(HEADER)) busy <= 1'b0;
+      tdata  <= chosen.part == SUM ? ~crc[15:0] : data;
+      if (chosen.valid) crc <= chosen.part == SUM ? crc >> 16 : crc_32c(crc, data);
+      at <= at + 10'd1;
+      if (at == last_at && at >= 10'(HEADER)) busy <= 1'b0;
     end
     if (send) begin
       now  <= datagram;

@@ -55,7 +55,8 @@ module taxel_ethernet_board #(
   logic [1:0] ramp_pair;
   logic [63:0][1:0] samples;
   logic [2:0] rsel;  // no multiplexers: a channel for each line
-  wire unused = &rsel;
+  logic tkeep;       // a beat is a byte
+  wire unused = &{rsel, tkeep};
 
   ODDRX1F of_ramp (.SCLK(clk_fast), .RST(1'b0), .D0(ramp_pair[0]), .D1(ramp_pair[1]), .Q(ramp));
 
@@ -74,7 +75,7 @@ module taxel_ethernet_board #(
       .DELAY(2 + 3)
   ) core (
       .clk, .clk_fast, .reset, .ramp(ramp_pair), .comparators(samples), .rsel, .csel_reg_clk_out, .csel_reg_din_out,
-      .rx, .tx, .tdata, .tvalid, .tready, .tlast, .record_sync, .frame_sync_out, .col_change_sync, .col_read_sync,
+      .rx, .tx, .tdata, .tkeep, .tvalid, .tready, .tlast, .record_sync, .frame_sync_out, .col_change_sync, .col_read_sync,
       .row_read_sync
   );
 

@@ -17,23 +17,13 @@ module taxel_session (
   logic [31:0] crc, of_count;
   logic counted_before;
 
-  // A CRC with two more bytes is a sum: of what becomes of its low 16 bits, of the others, and of what becomes of the
-  // bytes.
-  function automatic logic [31:0] of_word(logic [15:0] word);
-    logic [31:0] sum;
-    sum = '0;
-    for (int k = 0; k < 16; k++) begin
-      sum ^= {32{word[k]}} & crc_32c(crc_32c(32'd0, 8'(16'(1 << k))), 8'(16'(1 << k) >> 8));
-    end
-    return sum;
-  endfunction
-
   assign session = ~crc[15:0];
 
   always_ff @(posedge clk) begin
     counted_before <= counted;
-    of_count       <= of_word(count);
-    if (counted_before) crc <= of_word(crc[15:0]) ^ 32'(crc[31:16]) ^ of_count;
+    // The CRC with two more bytes is a sum of what becomes of it and of them.
+    of_count       <= crc_32c(32'd0, count);
+    if (counted_before) crc <= crc_32c(crc, 16'd0) ^ of_count;
     if (reset) begin
       counted_before <= 1'b0;
       crc            <= '1;

@@ -3,7 +3,7 @@
 // `clk` has 100 MHz, `clk_fast` 150 MHz. The ramp and the comparators have two bits a fast clock, one for each half, the first
 // in bit 0: on a board these come from the pins' both-edge cells, which are no part of this module.
 //
-// Throughput: a taxel in 10 clocks in version 1 of the wire, in 3 to 5 in version 2 (docs/hardware.md).
+// Throughput: a taxel in 10 clocks in version 1 of the wire, in 3 to 4 in version 2, to 5 where the link has one byte (docs/hardware.md).
 // Latency: an event leaves when its datagram is over: at the end of its frame, or as it is full.
 // Loses events and markers that find the queue full, and commands for whose answer there is no room: counted, and reported by
 // status lines.
@@ -22,6 +22,7 @@ module taxel_top #(
     parameter int HOLD_US = 0,                // for how long an event may wait for others
     parameter int HEARTBEAT_US = 10_000,      // between promises that nothing has happened
     parameter int STATES_US = 1_000_000,      // in which all lines' values, and the totals, are repeated; 0: never
+    parameter int LINK_BYTES = 1,             // of a beat of the link, 1 or 4
     parameter int DELAY = 2                   // fast clocks from the ramp's pair to the samples taken during it
 ) (
     input  logic                     clk,
@@ -36,8 +37,9 @@ module taxel_top #(
     // The serial line.
     input  logic                     rx,
     output logic                     tx,
-    // Datagrams' payloads.
-    output logic [7:0]               tdata,
+    // Datagrams' payloads, the first byte of a beat in its low bits; `tkeep` says which bytes there are.
+    output logic [8*LINK_BYTES-1:0]  tdata,
+    output logic [LINK_BYTES-1:0]    tkeep,
     output logic                     tvalid,
     input  logic                     tready,
     output logic                     tlast,
@@ -168,7 +170,8 @@ module taxel_top #(
   // Datagrams: each version waits until the other one's have gone.
   logic pop_v1, pop_v2, busy_v1, sorted, entry_taken, idle_sorter, idle_v2, tvalid_v1, tvalid_v2, tlast_v1, tlast_v2;
   logic write, bank, send, sending, leaving, room_link;
-  logic [7:0] tdata_v1, tdata_v2;
+  logic [7:0] tdata_v1;
+  logic [15:0] tdata_v2;
   logic [9:0] place;
   logic [15:0] unit;
   event_t entry;
@@ -180,10 +183,10 @@ module taxel_top #(
   logic of_v1;  // nothing of version 2 is gathered, waits or leaves: known a clock later, in which no event can follow
   always_ff @(posedge clk) of_v1 <= idle_sorter && idle_v2;
 
-  taxel_stream_register #(.BITS(9)) link (
-      .clk, .reset, .valid_in(tvalid_v1 || tvalid_v2), .ready_in(room_link),
-      .data_in(busy_v1 ? {tlast_v1, tdata_v1} : {tlast_v2, tdata_v2}),
-      .valid_out(tvalid), .ready_out(tready), .data_out({tlast, tdata})
+  taxel_link #(.BYTES(LINK_BYTES)) link (
+      .clk, .reset, .valid(tvalid_v1 || tvalid_v2), .ready(room_link), .paired(!busy_v1),
+      .data(busy_v1 ? 16'(tdata_v1) : tdata_v2), .last(busy_v1 ? tlast_v1 : tlast_v2),
+      .tdata, .tkeep, .tvalid, .tready, .tlast
   );
 
   taxel_packer_v1 #(.VALUED(VALUED)) packer_v1 (

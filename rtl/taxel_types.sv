@@ -79,31 +79,33 @@ package taxel_types;
     return {e.x, e.y, e.more, e.value};
   endfunction
 
-  // What a byte becomes in a CRC of reflected bits.
-  function automatic logic [31:0] crc_of_byte(logic [31:0] polynomial, logic [7:0] data);
+  // What two bytes, the first in the low bits, become in a CRC of reflected bits.
+  function automatic logic [31:0] crc_of_unit(logic [31:0] polynomial, logic [15:0] unit);
     logic [31:0] c;
-    c = 32'(data);
-    for (int k = 0; k < 8; k++) c = c[0] ? (c >> 1) ^ polynomial : c >> 1;
+    c = 32'(unit);
+    for (int k = 0; k < 16; k++) c = c[0] ? (c >> 1) ^ polynomial : c >> 1;
     return c;
   endfunction
 
-  // A CRC with one more byte: the sum of what its bits become, each of which is a constant.
-  function automatic logic [31:0] crc_reflected(logic [31:0] polynomial, logic [31:0] crc, logic [7:0] data);
+  // Each of the next two is a sum of what bits become, which are constants.
+  // Of datagrams of version 2: CRC-32C with two more bytes.
+  function automatic logic [31:0] crc_32c(logic [31:0] crc, logic [15:0] unit);
+    logic [31:0] c;
+    logic [15:0] x;
+    c = crc >> 16;
+    x = crc[15:0] ^ unit;
+    for (int k = 0; k < 16; k++) c ^= {32{x[k]}} & crc_of_unit(32'h82F63B78, 16'(1 << k));
+    return c;
+  endfunction
+
+  // Of Ethernet's frames: CRC-32 with one more byte. It is as the second of two of which the first is 0.
+  function automatic logic [31:0] crc_32(logic [31:0] crc, logic [7:0] data);
     logic [31:0] c;
     logic [7:0] x;
     c = crc >> 8;
     x = crc[7:0] ^ data;
-    for (int k = 0; k < 8; k++) c ^= {32{x[k]}} & crc_of_byte(polynomial, 8'(1 << k));
+    for (int k = 0; k < 8; k++) c ^= {32{x[k]}} & crc_of_unit(32'hEDB88320, 16'(256 << k));
     return c;
-  endfunction
-
-  // Of datagrams of version 2: CRC-32C; of Ethernet's frames: CRC-32.
-  function automatic logic [31:0] crc_32c(logic [31:0] crc, logic [7:0] data);
-    return crc_reflected(32'h82F63B78, crc, data);
-  endfunction
-
-  function automatic logic [31:0] crc_32(logic [31:0] crc, logic [7:0] data);
-    return crc_reflected(32'hEDB88320, crc, data);
   endfunction
 
   // A datagram of version 2 without its body.

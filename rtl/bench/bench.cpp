@@ -52,7 +52,7 @@ struct Bench {
     uint64_t clock = 0;
     int phase = 0;
     uint32_t random = 1;
-    uint32_t ready_of = 256;          // of 256 clocks the link accepts a byte in so many
+    uint32_t ready_of = 256;          // of 256 clocks the link accepts a beat in so many
 
     // What no reset reaches begins with random bits.
     explicit Bench(int seed) : top(prepared(context, seed)) {
@@ -184,8 +184,11 @@ struct Bench {
     // What the link accepts at the edge to come.
     void before_slow() {
         if (top.tvalid && top.tready) {
-            payload.push_back(top.tdata);
-            last.push_back(top.tlast);
+            const int bytes = top.tkeep == 15 ? 4 : top.tkeep == 7 ? 3 : top.tkeep == 3 ? 2 : 1;
+            for (int k = 0; k < bytes; k++) {
+                payload.push_back(top.tdata >> (8 * k));
+                last.push_back(top.tlast && k == bytes - 1);
+            }
         }
     }
 

@@ -10,6 +10,7 @@ from logic import PACKAGES, QUIET, RTL, run
     [
         ({"ROWS": 80}, "COLUMNS, ROWS: at most 128, and steps that are a power of two"),
         ({"CHANNELS": 32}, "CHANNELS: the converter has 16 or 64"),
+        ({"LINK_BYTES": 2}, "LINK_BYTES: the link has 1 or 4"),
     ],
 )
 def test_a_build_that_is_not_supported_is_refused(parameters, message):

@@ -33,6 +33,7 @@ MODULES = {
     "ethernet_board": ["COLUMNS=3 ROWS=5 BAUD_CLOCKS=8 RESET_CLOCKS=60"],
     "ethernet_frame": [""],
     "event_fifo": ["DEPTH=4 BITS=8", "DEPTH=5 BITS=12"],
+    "link": ["BYTES=1", "BYTES=4"],
     "line_select": ["COLUMNS=9", "COLUMNS=6 HALF=3"],
     "line_sorter": ["ROWS=64", "ROWS=20"],
     "mux_ctrl": ["COLUMNS=5 STEPS=2", "COLUMNS=3 STEPS=1"],
@@ -55,7 +56,10 @@ MODULES = {
     "stream_register": ["BITS=12"],
     "synchroniser": [""],
     "time_stamper": [""],
-    "top": ["COLUMNS=3 ROWS=20 QUEUE=1024 STATES_US=0 BAUD_CLOCKS=8 FAULT_CLOCKS=1000000000"],
+    "top": [
+        f"COLUMNS=3 ROWS=20 QUEUE=1024 STATES_US=0 BAUD_CLOCKS=8 FAULT_CLOCKS=1000000000 LINK_BYTES={link_bytes}"
+        for link_bytes in (1, 4)
+    ],
     "totals": [""],
     "uart_rx": ["CLOCKS=8", "CLOCKS=17"],
     "uart_tx": ["CLOCKS=5"],

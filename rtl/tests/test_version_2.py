@@ -10,22 +10,24 @@ from taxel.wire import Command, Decoder
 
 #: Options of version 2 with which each kind of datagram comes within few frames.
 OFTEN = {"board": 513, "states_us": 700, "heartbeat_us": 60}
-#: Columns, rows, channels, what a value is compared with, what an event holds, for how long it may wait.
+#: Columns, rows, channels, what a value is compared with, what an event holds, for how long it may wait; bytes of
+#: the link.
 BUILDS = [
-    (8, 8, 16, "last_sent", "value", 0),
-    (5, 7, 16, "last_sample", "difference", 300),
-    (9, 64, 16, "last_sent", "nothing", 40),
-    (6, 128, 64, "last_sent", "value", 0),
+    (8, 8, 16, "last_sent", "value", 0, 1),
+    (5, 7, 16, "last_sample", "difference", 300, 4),
+    (9, 64, 16, "last_sent", "nothing", 40, 1),
+    (6, 128, 64, "last_sent", "value", 0, 4),
 ]
 
 
-def built(columns: int, rows: int, channels: int, previous: str, intensity: str, hold_us: int) -> Pair:
+def built(columns: int, rows: int, channels: int, previous: str, intensity: str, hold_us: int, link_bytes: int) -> Pair:
     """Return a pair in a session whose number is not that of a quiet first frame."""
     rng = np.random.default_rng([columns, rows])
     first = rng.integers(0, 1200, (rows, columns)).astype(np.uint16)
     first[-1, -1] = NOT_RETURNED
     options = OFTEN | {"hold_us": hold_us}
-    return Pair(columns, rows, channels, previous=previous, intensity=intensity, first=first, version_2=options)
+    values = {"previous": previous, "intensity": intensity}
+    return Pair(columns, rows, channels, first=first, version_2=options, LINK_BYTES=link_bytes, **values)
 
 
 def in_version_2(pair: Pair) -> None:
@@ -105,10 +107,12 @@ def test_a_link_that_is_behind_repeats_fewer_lines_each_in_its_turn_with_its_val
     assert decoders[0].counts.repaired == decoders[1].counts.repaired
 
 
-@pytest.mark.parametrize(("columns", "rows", "channels", "previous", "intensity", "hold_us"), BUILDS)
-def test_random_pressures_and_writes_in_both_versions(columns, rows, channels, previous, intensity, hold_us):
+@pytest.mark.parametrize(("columns", "rows", "channels", "previous", "intensity", "hold_us", "link_bytes"), BUILDS)
+def test_random_pressures_and_writes_in_both_versions(
+    columns, rows, channels, previous, intensity, hold_us, link_bytes
+):
     rng = np.random.default_rng([columns, rows, channels])
-    pair = built(columns, rows, channels, previous, intensity, hold_us)
+    pair = built(columns, rows, channels, previous, intensity, hold_us, link_bytes)
     if rows <= 64:
         # Time for ramps of more than 255 ticks.
         held = pair.board.registers

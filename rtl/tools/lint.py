@@ -18,7 +18,7 @@ from logic import PACKAGES, QUIET, RTL, run, verilator
 #: Builds that differ in what is elaborated; a board is one with the cells' models of the bench.
 BUILDS: tuple[tuple[str, dict[str, int]], ...] = (
     ("taxel_top", {}),
-    ("taxel_top", {"COLUMNS": 5, "ROWS": 7, "PREVIOUS_SAMPLE": 1, "DIFFERENCE": 1, "VALUED": 0}),
+    ("taxel_top", {"COLUMNS": 5, "ROWS": 7, "PREVIOUS_SAMPLE": 1, "DIFFERENCE": 1, "VALUED": 0, "LINK_BYTES": 4}),
     ("taxel_ethernet_board", {}),
 )
 

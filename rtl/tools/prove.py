@@ -44,6 +44,7 @@ PACKAGE, SELECT, PACKER_V2 = "taxel_registers.sv", "taxel_line_select.sv", "taxe
 FRAME = "taxel_ethernet_frame.sv"
 COLUMN, RAMP, ARRAY = "taxel_comparator_column.sv", "taxel_ramp_counter.sv", "taxel_comparator_array.sv"
 UART = "taxel_uart_rx.sv"
+LINK, STREAM = "taxel_link.sv", "taxel_stream_register.sv"
 SENDER, SORTER, DETECTOR = "taxel_datagram_sender.sv", "taxel_line_sorter.sv", "taxel_change_detector.sv"
 PROOFS = (
     Proof(
@@ -154,15 +155,14 @@ PROOFS = (
         ("taxel_types.sv", SENDER),
         "smtbmc yices",
         (
-            (SENDER, "? unit_read[15:8] : unit_read[7:0]", "? unit_read[7:0] : unit_read[15:8]"),
-            (SENDER, "promise_end <= body_end + 11'(SPAN);", "promise_end <= body_end;"),
-            (SENDER, "promise_end + 11'(CHECKSUM - 1)", "promise_end + 11'(CHECKSUM)"),
+            (SENDER, "BODY: data <= unit_read;", "BODY: data <= unit_fetched;"),
+            (SENDER, "promise_end <= body_end + 10'(SPAN);", "promise_end <= body_end;"),
+            (SENDER, "promise_end + 10'(CHECKSUM - 1)", "promise_end + 10'(CHECKSUM)"),
             (SENDER, "crc  <= '1;", "crc  <= '0;"),
-            (SENDER, "~crc[7:0]", "crc[7:0]"),
-            (SENDER, "chosen.part == SUM ? crc >> 8", "chosen.part[1] ? crc >> 8"),
+            (SENDER, "~crc[15:0]", "crc[15:0]"),
+            (SENDER, "chosen.part == SUM ? crc >> 16", "chosen.part[1] ? crc >> 16"),
             (SENDER, "crc_32c(crc, data)", "crc_32c(crc, tdata)"),
-            ("taxel_types.sv", "32'h82F63B78", "32'h82F63B70"),
-            (SENDER, "10'((at - 11'(HEADER)) >> 1)", "10'((at - 11'(HEADER - 2)) >> 1)"),
+            (SENDER, "at - 10'(HEADER)}", "at - 10'(HEADER - 1)}"),
             (SENDER, "buffer[{bank, place}] <= unit", "buffer[{1'b0, place}] <= unit"),
             (SENDER, "now.dropped, now.differences", "now.differences, now.dropped"),
             (SENDER, "{now.line[2:0], STRIDE}", "{now.line[3:1], STRIDE}"),
@@ -170,6 +170,43 @@ PROOFS = (
         ),
         induction=3,
         depth=50,
+    ),
+    Proof(
+        "crc_proof",
+        ("taxel_types.sv",),
+        "smtbmc yices",
+        (
+            ("taxel_types.sv", "32'h82F63B78", "32'h82F63B70"),
+            ("taxel_types.sv", "32'hEDB88320", "32'hEDB88300"),
+            ("taxel_types.sv", "c = crc >> 16;", "c = crc >> 8;"),
+            ("taxel_types.sv", "x = crc[15:0] ^ unit;", "x = crc[15:0];"),
+            ("taxel_types.sv", "16'(256 << k)", "16'(1 << k)"),
+        ),
+        induction=1,
+        depth=1,
+    ),
+    Proof(
+        "link_proof",
+        (STREAM, LINK),
+        "smtbmc yices",
+        (
+            (LINK, "assign ready   = room && second == paired;", "assign ready   = room;"),
+            (LINK, "assign ends    = last && second == paired;", "assign ends    = last;"),
+            (LINK, "second ? data[15:8] : data[7:0]", "data[7:0]"),
+            (LINK, "if (valid && room) second <=", "if (valid) second <="),
+            (LINK, "(to == 2'd3 || last)", "to == 2'd3"),
+            (LINK, "assign to      = at + 2'(paired);", "assign to      = at;"),
+            (LINK, "else if (2'(k) == to)", "else if (2'(k) != to)"),
+            (LINK, "2'(k) <= to;", "2'(k) <= at;"),
+            (LINK, "if (valid && room) begin", "if (valid) begin"),
+            (LINK, "last ? 2'd0 : to + 2'd1", "to + 2'd1"),
+            (LINK, "held <= beat;", ""),
+            (STREAM, "valid_in || !ready_in;", "valid_in;"),
+            (STREAM, "ready_in ? data_in : second", "data_in"),
+            (STREAM, "if (ready_in) second <= data_in;", "second <= data_in;"),
+        ),
+        induction=2,
+        depth=14,
     ),
     Proof(
         "sorter_proof",

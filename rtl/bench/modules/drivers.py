@@ -88,11 +88,17 @@ async def accept(clk: Any, valid: Any, ready: Any, get: Callable[[], Any], pace:
         await FallingEdge(clk)
 
 
-def datagrams(came: list[tuple[int, int]]) -> list[bytes]:
-    """Return whole datagrams of a stream of bytes, each with whether it is the last of its datagram."""
+def beat(data: Any, keep: int) -> bytes:
+    """Return the bytes of a beat, the first in the low bits: as many as `keep` has ones."""
+    assert keep & keep + 1 == 0, keep
+    return (int(data.value) & (1 << 8 * keep.bit_length()) - 1).to_bytes(keep.bit_length(), "little")
+
+
+def datagrams(came: list[tuple[bytes, int]]) -> list[bytes]:
+    """Return whole datagrams of a stream of beats, each with whether it is the last of its datagram."""
     whole, held = [], bytearray()
-    for byte, last in came:
-        held.append(byte)
+    for data, last in came:
+        held += data
         if last:
             whole.append(bytes(held))
             held.clear()

@@ -1,10 +1,10 @@
-"""The sender of version 2: header, body, promise and CRC-32C, byte by byte, while the next body is written."""
+"""The sender of version 2: header, body, promise and CRC-32C, unit by unit, while the next body is written."""
 
 import random
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import Pace, accept, begin, clocks, datagrams, reset, settled, vary
+from drivers import Pace, accept, beat, begin, clocks, datagrams, reset, settled, vary
 from models import Datagram
 from structs import pack
 
@@ -18,10 +18,10 @@ async def bytes_are_those_of_the_page(dut):
     cocotb.start_soon(vary(dut.clk, 500, write_pace, link_pace))
     came, expected, bank = [], [], 0
 
-    def byte():
-        return int(dut.tdata.value), int(dut.tlast.value)
+    def unit():
+        return beat(dut.tdata, 0b11), int(dut.tlast.value)
 
-    task = cocotb.start_soon(accept(dut.clk, dut.tvalid, dut.tready, byte, link_pace, came))
+    task = cocotb.start_soon(accept(dut.clk, dut.tvalid, dut.tready, unit, link_pace, came))
     for k in range(60):
         if k in (20, 40):
             # What is on its way at a reset is not sent.
@@ -33,7 +33,7 @@ async def bytes_are_those_of_the_page(dut):
             expected.clear()
             session = random.randrange(1 << 16)
             dut.session.value = session
-            task = cocotb.start_soon(accept(dut.clk, dut.tvalid, dut.tready, byte, link_pace, came))
+            task = cocotb.start_soon(accept(dut.clk, dut.tvalid, dut.tready, unit, link_pace, came))
         units = random.choice([0, 0, 1, 2, 7, 40, 688 if k % 20 == 5 else 3])
         body = [random.randrange(1 << 16) for _ in range(units)]
         for place in range(units):

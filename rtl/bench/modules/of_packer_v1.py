@@ -5,7 +5,7 @@ from collections import deque
 
 import cocotb
 from cocotb.triggers import FallingEdge
-from drivers import Pace, accept, begin, datagrams, settled, vary
+from drivers import Pace, accept, beat, begin, datagrams, settled, vary
 from models import datagrams_1, words_1
 from structs import NUMBERS, pack
 
@@ -44,7 +44,7 @@ async def events_become_words_in_datagrams(dut):
     cocotb.start_soon(vary(dut.clk, 400, push_pace, ready_pace, link_pace))
 
     def byte():
-        return int(dut.tdata.value), int(dut.tlast.value)
+        return beat(dut.tdata, 1), int(dut.tlast.value)
 
     cocotb.start_soon(accept(dut.clk, dut.tvalid, dut.tready, byte, link_pace, came))
     # The queue: what is pushed comes to its output later; `frame` is that of the events to come.

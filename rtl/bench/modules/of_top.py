@@ -6,7 +6,7 @@ import re
 import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
-from drivers import Pace, accept, begin, clocks, datagrams, same
+from drivers import Pace, accept, beat, begin, clocks, datagrams, same
 from models import NOT_RETURNED, Chain, Comparators, Scan, Version2, crc_32c, datagrams_1, words_1
 
 
@@ -90,7 +90,7 @@ async def datagrams_and_lines_are_those_of_the_page(dut):
     await begin(dut, rx=1, tready=0, comparators=0)
 
     def payload():
-        return int(dut.tdata.value), int(dut.tlast.value)
+        return beat(dut.tdata, int(dut.tkeep.value)), int(dut.tlast.value)
 
     cocotb.start_soon(accept(dut.clk, dut.tvalid, dut.tready, payload, link, came))
     for task in (comparators, line_in, line_out, shift_registers):
