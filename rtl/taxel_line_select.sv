@@ -4,7 +4,7 @@
 // After reset, and where there are more lines than before, the whole chain is shifted through, as what it holds is not known.
 // A pulse takes 2 x HALF clocks, so a jump over n lines settles n pulses later.
 //
-// Throughput: a line every 2 x HALF clocks for each place of the jump, and three more.
+// Throughput: a line every 2 x HALF clocks for each pulse of the jump, and HALF + 2 more.
 // Latency: as long.
 // Loses a jump that the next line's start cuts short: then no line or two are driven, until ascending lines have passed all
 // places.

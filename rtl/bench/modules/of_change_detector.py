@@ -12,6 +12,9 @@ from structs import NUMBERS, pack, unpack
 EVENT, MARKER, FRAME, FLUSH = (NUMBERS[f"ENTRY_{name}"] for name in ("EVENT", "MARKER", "FRAME", "FLUSH"))
 MARKERS = NUMBERS["MARKERS"]
 
+#: Clocks from a read's report to its first taxel's event, and what may go ahead of a frame's first taxel.
+LATENCY, AHEAD = 7, 6
+
 
 def drawn(frames, build):
     """Return the reads of frames: their fields, those of the frame before, and their trip times by row."""
@@ -80,6 +83,9 @@ class Model:
         expected = {"frame": self.frame, "lost": self.lost, **fields}
         wrong = {name: value for name, value in expected.items() if getattr(seen, name) != value}
         assert not wrong, (clock, wrong, seen)
+        if seen.kind == EVENT:
+            late = clock - self.reported - LATENCY - seen.y // self.build["STEPS"]
+            assert 0 <= late <= (AHEAD if self.first_of_frame else 0), late
         self.lost, self.pushed = 0, 1
         return True
 
@@ -116,6 +122,7 @@ class Model:
 
     def read(self, read, counts):
         build, form, ended = self.build, read["format"], read["ended"]
+        self.first_of_frame = read["frame_first"]
         first = read["frame_first"] and not read["initial_frame"]
         after_sent = first and not ended["initial_frame"]
         if after_sent:
@@ -242,6 +249,7 @@ async def entries_are_those_of_the_page(dut):
             first_of |= (sample + 1 & 1 if seen else random.getrandbits(1)) << c
             at |= (sample >> 1 if seen else random.getrandbits(15)) << 15 * c
         dut.read_done.value, dut.tripped.value, dut.first.value, dut.at.value = 1, tripped, first_of, at
+        model.reported = clock
         await run(1)
         dut.read_done.value, dut.tripped.value, dut.at.value = 0, 0, 0
         await run(build["CHANNELS"] + MARKERS + 2 + 7)

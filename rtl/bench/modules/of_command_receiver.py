@@ -8,9 +8,9 @@ from cocotb.triggers import FallingEdge
 
 
 def parsed(data):
-    """Return the commands in a stream, and how many bytes belong to none, those of an unfinished end left out."""
+    """Return commands, each with its last byte's place, and how many bytes belong to none, the end left out."""
     commands, held, skipped = [], [], 0
-    for byte in data:
+    for place, byte in enumerate(data):
         if byte & 0x80:
             skipped += len(held)
             held = [byte]
@@ -22,7 +22,7 @@ def parsed(data):
             value = 0
             for k in range(4):
                 value = value << 8 | (held[0] >> (3 - k) & 1) << 7 | held[k + 1]
-            commands.append((held[0] >> 4 & 7, value))
+            commands.append((place, held[0] >> 4 & 7, value))
             held = []
     return commands, skipped
 
@@ -49,7 +49,9 @@ async def whole_commands_come_out_and_damage_is_counted(dut):
         await FallingEdge(dut.clk)
         skipped += int(dut.skipped.value)
         if int(dut.command.value):
-            found.append((int(dut.number.value), int(dut.value.value)))
+            # It stands a clock after its last byte.
+            assert valid
+            found.append((len(data) - len(waiting) - 1, int(dut.number.value), int(dut.value.value)))
     assert (found, skipped) == parsed(data)
     assert len(found) > 300
     assert skipped > 100

@@ -8,6 +8,9 @@ from drivers import Pace, accept, beat, begin, clocks, datagrams, reset, settled
 from models import Datagram
 from structs import pack
 
+#: Clocks from `send` to the first byte.
+LATENCY = 5
+
 
 @cocotb.test()
 async def bytes_are_those_of_the_page(dut):
@@ -60,6 +63,12 @@ async def bytes_are_those_of_the_page(dut):
         dut.send.value, dut.datagram.value = 0, random.getrandbits(len(dut.datagram))
         await settled()
         assert int(dut.sending.value)
+        # The first byte stands so many clocks after the datagram.
+        for _ in range(LATENCY - 1):
+            assert not int(dut.tvalid.value)
+            await FallingEdge(dut.clk)
+            await settled()
+        assert int(dut.tvalid.value)
         expected.append(datagram.encoded(stride, board, session))
         bank ^= 1
     link_pace.often = 1.0

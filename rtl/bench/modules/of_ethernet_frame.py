@@ -8,6 +8,8 @@ from drivers import begin, reset, settled
 
 from ethernet import GAP, payload_of
 
+#: Clocks from a payload to the first byte of its frame.
+LATENCY = 5
 #: The module's addresses and ports, where none are given.
 ADDRESSES = {"macs": bytes([255] * 6 + [0] * 6), "ips": bytes(8), "ports": bytes(4)}
 
@@ -19,6 +21,7 @@ async def payloads_become_frames(dut):
     random.shuffle(waiting)
     expected, frame, frames, gap, gaps, shown, taken = list(waiting), bytearray(), [], -1000, [], None, None
     byte, quiet = 0, 0
+    pause, waited = 0, None  # clocks to the next payload, and since it waits where the gap is over
     while quiet < 2000:
         if random.random() < 0.0003:
             # A reset breaks the frame that is being sent off.
@@ -27,10 +30,12 @@ async def payloads_become_frames(dut):
                 waiting.insert(0, shown)
             elif frame:
                 expected.remove(taken)
-            shown, gap = None, -1000
+            shown, gap, waited = None, -1000, None
             frame.clear()
-        if shown is None and waiting and random.random() < random.choice([0.01, 1]):
+        pause, waited = pause - 1, None if waited is None else waited + 1
+        if shown is None and waiting and pause < 0:
             shown = waiting.pop(0)
+            waited = 0 if not frame and not -1000 <= gap <= GAP else None
         dut.waits.value = int(shown is not None)
         dut.length.value = len(shown) if shown else 0
         dut.fetched.value = byte
@@ -39,9 +44,10 @@ async def payloads_become_frames(dut):
         at = int(dut.at.value)
         byte = shown[at] if shown and at < len(shown) else random.randrange(256)
         if int(dut.taken.value):
-            taken, shown = shown, None
+            taken, shown, pause = shown, None, random.choice([0, 1, random.randrange(60)])
         if int(dut.enable.value):
             frame.append(int(dut.txd.value))
+            assert len(frame) > 1 or waited in (None, LATENCY)
             if len(frame) == 1 and gap >= 0:
                 gaps.append(gap)
             gap = 0

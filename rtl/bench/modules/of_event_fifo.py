@@ -7,6 +7,9 @@ import cocotb
 from cocotb.triggers import FallingEdge
 from drivers import Pace, begin, reset, settled, vary
 
+#: Clocks from a word to its place at the output, where nothing waits.
+LATENCY = 5
+
 
 @cocotb.test()
 async def words_come_out_once_and_in_order(dut):
@@ -15,10 +18,12 @@ async def words_come_out_once_and_in_order(dut):
     await begin(dut, push=0, pop=0)
     cocotb.start_soon(vary(dut.clk, 700, push_pace, pop_pace))
     queue, most, empty, since_pop, popped = deque(), 0, 0, 0, 0
+    alone = None  # clocks since a word came where nothing waited
     for _ in range(9 * 700):
         if random.random() < 0.001:
             await reset(dut, push=0, pop=0)
             queue.clear()
+            alone = None
         await settled()
         ready = int(dut.ready.value)
         assert int(dut.empty.value) == (not queue)
@@ -26,6 +31,10 @@ async def words_come_out_once_and_in_order(dut):
             assert int(dut.oldest.value) == queue[0]
         # Three more stand behind the ring.
         assert len(queue) >= depth if int(dut.full.value) else len(queue) <= depth + 2
+        if alone is not None:
+            alone += 1
+            assert ready == (alone == LATENCY)
+            alone = None if ready else alone
         since_pop = 0 if ready or not queue else since_pop + 1
         assert since_pop <= 5
         push, pop = not int(dut.full.value) and push_pace(), bool(ready) and pop_pace()
@@ -33,6 +42,8 @@ async def words_come_out_once_and_in_order(dut):
         dut.push.value, dut.entered.value, dut.pop.value = int(push), word, int(pop)
         most, empty, popped = max(most, len(queue)), empty + (not queue), popped + pop
         await FallingEdge(dut.clk)
+        if push and not queue:
+            alone = 0
         if pop:
             queue.popleft()
         if push:

@@ -13,7 +13,7 @@ async def in_time_a_single_line_is_driven(dut):
     columns, half = int(dut.COLUMNS.value), int(dut.HALF.value)
     await begin(dut, start=0)
     chain = Chain([random.getrandbits(1) for _ in range(columns)])
-    lines = columns
+    lines, at, known = columns, 0, 0
     levels = [0, 0]
 
     async def clock():
@@ -28,15 +28,21 @@ async def in_time_a_single_line_is_driven(dut):
     for k in range(300):
         if k % 100 == 99:
             await reset(dut, start=0)
-            chain.clock = 0
+            chain.clock = known = 0
         if k % 100 == 0 or random.random() < 0.1:
             lines = random.randrange(1, columns + 1)
         line = random.randrange(lines)
         dut.start.value, dut.line.value, dut.lines.value = 1, line, lines - 1
         await clock()
         dut.start.value, dut.line.value, dut.lines.value = 0, random.randrange(128), random.randrange(128)
-        # Two halves a place and one more, and two clocks.
-        for _ in range((2 * columns + 1) * half + 2 + random.randrange(4)):
+        # Two halves a pulse, one more where a new one goes in, and two clocks.
+        on = at < line < lines <= known
+        pulses = columns if lines > known else line - at if on else max(lines - at, line + 1)
+        for left in reversed(range((2 * pulses + (not on)) * half + 2 - 1)):
             await clock()
+            assert levels[0] == (left > 0) or left > half
         assert chain.driven(lines) == [line], k
-        assert not levels[0]
+        at, known = line, lines
+        for _ in range(random.randrange(4)):
+            await clock()
+            assert not levels[0]

@@ -50,6 +50,7 @@ async def events_become_words_in_datagrams(dut):
     # The queue: what is pushed comes to its output later; `frame` is that of the events to come.
     shown = False
     frame = since = 0
+    began = False
     while since < 200:
         if queue and not shown:
             shown = ready_pace()
@@ -59,7 +60,10 @@ async def events_become_words_in_datagrams(dut):
         if shown:
             dut.oldest.value = queue[0]
         await settled()
-        if int(dut.pop.value):
+        # A byte stands the clock after an event was taken.
+        assert int(dut.tvalid.value) or not began
+        began = bool(int(dut.pop.value))
+        if began:
             assert shown
             queue.popleft()
             shown = False

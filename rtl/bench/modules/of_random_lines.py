@@ -23,5 +23,5 @@ async def lines_come_in_the_order_that_is_drawn(dut):
             await FallingEdge(dut.clk)
             dut.next.value = 0
             dut.first.value = random.getrandbits(1)
-            await clocks(dut.clk, 7 + random.choice([0, 0, 5]))
+            await clocks(dut.clk, 6 + random.choice([0, 0, 6]))
             assert int(dut.line.value) == line, (frame, k)
