@@ -313,10 +313,11 @@ def test_the_values_above_the_lanes_are_in_full_on_a_phone(chromium: Any, tmp_pa
         assert "mm)" in page.locator("#centre-now").inner_text()
 
 
-def test_a_picture_of_missing_values_alone_has_no_force(chromium: Any, tmp_path: Path) -> None:
-    values = np.zeros((100, 6, 4))
+@pytest.mark.parametrize("seconds", [2, 4, 60])
+def test_a_picture_of_missing_values_alone_has_no_force(seconds: int, chromium: Any, tmp_path: Path) -> None:
+    values = np.zeros((100 * seconds // 2, 6, 4))
     values[20:40], values[60:80] = 10.0, np.nan
-    taxel.convert(Frames(values, np.arange(100) * 20_000, unit="N", array=Array(6, 4)), tmp_path / "walk.npz")
+    taxel.convert(Frames(values, np.arange(len(values)) * 20_000, unit="N", array=Array(6, 4)), tmp_path / "walk.npz")
     with shown(chromium, tmp_path / "walk.npz") as page:
         box = page.locator("#force-lane .u-over").bounding_box()
         for t_s, says in ((0.5, "^240 N$"), (1.0, "^0 N$"), (1.4, "^missing$"), (1.8, "^0 N$")):

@@ -8,7 +8,7 @@ use super::array_state::{ArrayState, RestSource};
 use super::encoded_spikes::EncodedSpikes;
 use super::player::Player;
 use super::taxel_history::TaxelHistory;
-use super::time_columns::{COLUMN_US, Curve, NOTHING, SPAN, TimeColumns, column_of};
+use super::time_columns::{COLUMN_US, Curve, MISSING, NOTHING, SPAN, TimeColumns, column_of};
 
 /// Bytes of the header.
 const HEADER: usize = 128;
@@ -91,7 +91,8 @@ impl<'a> ShownColumns<'a> {
 
     fn curve(&self, column: i64) -> Curve {
         let parts = self.parts(column).into_iter().filter(|(_, columns)| !columns.is_empty());
-        let greatest = |most: Curve, one: Curve| if one.sum > most.sum { one } else { most };
+        let greatest =
+            |most: Curve, one: Curve| if one.sum > most.sum || most.area == MISSING.area { one } else { most };
         parts.map(|(store, columns)| store.greatest(columns)).reduce(greatest).unwrap_or(NOTHING)
     }
 

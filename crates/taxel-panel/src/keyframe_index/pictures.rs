@@ -17,7 +17,7 @@ use taxel_live::recording::Remarks;
 use super::{ChangeReader, KeyframeIndex, Pictures, Read};
 use crate::array_state::{Keyframe, RestSource};
 use crate::centre::Coordinates;
-use crate::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
+use crate::time_columns::{COLUMN_US, Curve, MISSING, NOTHING, TimeColumns, column_of};
 use crate::weights::Weights;
 
 /// Memory that the curves may take, bytes.
@@ -378,6 +378,7 @@ impl PictureIndex {
             load.sum_y += above * y;
             load.area += u32::from(above > 0);
         }
+        load.known = source.picture(k).iter().any(|&ticks| ticks != UNKNOWN);
         load
     }
 }
@@ -390,6 +391,8 @@ struct Load {
     sum_x: u64,
     sum_y: u64,
     area: u32,
+    /// Whether any taxel has a value.
+    known: bool,
 }
 
 impl Load {
@@ -400,12 +403,13 @@ impl Load {
             sum_x: self.sum_x + other.sum_x,
             sum_y: self.sum_y + other.sum_y,
             area: self.area + other.area,
+            known: self.known || other.known,
         }
     }
 
     fn curve(self, at: &Coordinates, weights: &Weights) -> Curve {
         if self.sum == 0 {
-            return NOTHING;
+            return if self.known { NOTHING } else { MISSING };
         }
         let (x, y) = at.centre(self.sum, self.sum_x, self.sum_y);
         Curve { sum: weights.sum(self.sum, self.weighted), area: self.area, x, y }
