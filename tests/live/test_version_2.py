@@ -85,6 +85,34 @@ def test_two_boards_that_send_to_one_port_are_told(tmp_path, wire, boards):
     assert taxel.open(path).verdict.to_dict() == verdict.to_dict()
 
 
+@pytest.mark.parametrize("lost", [0, 3])
+def test_what_comes_late_from_before_a_recording_hides_no_loss_in_it(tmp_path, lost):
+    board, frames = Board(Registers(wire_version=2)), [np.full(4096, 20 + 10 * (k % 2), np.uint16) for k in range(4)]
+    sent = [one for frame in frames for one in board.frame(frame)]
+    assert len(sent) > 20
+    late = sent[4:7]
+    path = tmp_path / "two.mcap"
+    with (
+        taxel.live.Live(0, host="127.0.0.1", record_later=True) as live,
+        udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as link,
+    ):
+
+        def send(some):
+            before = live.counters["decoded"]
+            for one in some:
+                link.sendto(one, live.address)
+            until(lambda: live.counters["decoded"] == before + len(some))
+
+        send([*sent[:4], *sent[7:10]])
+        live.record(path)
+        send([*late, *sent[10:14], *sent[14 + lost :]])
+        verdict = live.end_recording().verdict
+        assert live.counters["wire_v2"]["missing"] == lost
+    assert verdict.lost == ({"lost_on_the_way": lost} if lost else {})
+    assert verdict.status == ("lost" if lost else "complete")
+    assert taxel.open(path).verdict.lost == verdict.lost
+
+
 def test_raw_bytes_of_version_2_are_refused_and_nothing_is_left(tmp_path):
     path = tmp_path / "two.lsa"
     live = taxel.live.Live(0, host="127.0.0.1", record=path)

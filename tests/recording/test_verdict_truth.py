@@ -207,6 +207,26 @@ def test_what_was_overtaken_when_the_last_counts_were_saved_is_not_lost(lost: in
     assert verdict.status == ("lost" if lost else "unfinished")
 
 
+@pytest.mark.parametrize("then", [1, 2])
+def test_of_what_version_1_sent_after_the_last_counts_nothing_is_known_to_be_there(then: int, tmp_path: Path) -> None:
+    sent, path = sent_by_a_board(), tmp_path / "a.mcap"
+    events = some_events(400, intensity=False)
+    later = sent[20:40] if then == 2 else [taxel.wire.encode(events[k : k + 10]) for k in range(0, 400, 10)]
+    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
+    for number, one in enumerate([*sent[:20], *later]):
+        writer.datagram(START_NS + number * 100_000_000, number, one)
+        if number == 19:
+            writer.counts(START_NS, json.dumps({"received": 20, "recorded": 20, "missing": 0}))
+    del writer
+    recording = taxel.open(path)
+    assert bool(recording.counts["decoder"]["bytes"]) == (then == 1)
+    told = "until then: nothing lost after arrival (version 1" if then == 1 else "until then: nothing lost"
+    assert told in recording.verdict
+    assert ("version 1" in recording.verdict) == (then == 1)
+    # Those of the first second, in which they might have been damaged ones of version 2.
+    assert ("bytes_of_version_1_refused" in recording.verdict.damaged) == (then == 1)
+
+
 def test_datagrams_of_version_1_that_come_again_are_noted(tmp_path: Path) -> None:
     events = some_events(400, intensity=False)
     events.markers = ()

@@ -132,6 +132,11 @@ impl SenderDecoder {
         self.repeated
     }
 
+    /// Notes that a recording begins, as [`v2::Decoder::begin_recording`] does.
+    pub fn begin_recording(&mut self) {
+        self.two.begin_recording();
+    }
+
     /// Notes that the host has set the board to this version of the wire.
     pub fn expect(&mut self, version: u8, out: &mut Events) {
         if version != self.version {

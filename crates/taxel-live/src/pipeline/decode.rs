@@ -231,6 +231,11 @@ impl DecodeStage {
         counters.board.marked_start = self.events.markers.last().map(|m| m.start).or(counters.board.marked_start);
     }
 
+    /// Notes that a recording begins.
+    pub(super) fn begin_recording(&mut self) {
+        self.decoder.begin_recording();
+    }
+
     /// Sets the version of the wire to which the board was set; returns whether it is a different one.
     pub(super) fn expect(&mut self, version: u8) -> bool {
         let other = version != self.decoder.version();

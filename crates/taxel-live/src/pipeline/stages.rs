@@ -213,7 +213,12 @@ impl Stages {
         if next.is_some() {
             self.separate()?;
         }
-        self.record.switch(next, self.decode.held())
+        let begins = next.is_some();
+        let ended = self.record.switch(next, self.decode.held())?;
+        if begins {
+            self.decode.begin_recording();
+        }
+        Ok(ended)
     }
 
     /// Notes that the board was set to this version of the wire.

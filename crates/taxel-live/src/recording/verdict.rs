@@ -220,6 +220,8 @@ pub struct Found {
     pub damage: BTreeMap<String, u64>,
     /// For version 2: sequence numbers that are missing.
     pub missing: Option<u64>,
+    /// Whether some of it was of version 1, which numbers nothing.
+    pub unnumbered: bool,
     /// The time after which times are doubtful, us.
     pub doubtful_after_us: Option<i64>,
 }
@@ -228,9 +230,11 @@ impl Found {
     /// What a decoder found; `origin_us` is added to its times.
     #[must_use]
     pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
-        let (causes, missing) =
+        let (mut causes, missing) =
             damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.two().counts());
-        Self { damage: causes, missing, doubtful_after_us: sender.ahead().after.map(|t| t + origin_us) }
+        causes.insert(REFUSED.to_owned(), sender.refused());
+        let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);
+        Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us }
     }
 }
 
@@ -668,7 +672,8 @@ fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64) -> Counts
     // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
     // among the board's numbers too.
     let missing = found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue);
-    counts.missing = missing.filter(|n| counts.missing.is_some() || *n > 0).or(counts.missing);
+    let knows = counts.missing.is_some() && !found.unnumbered;
+    counts.missing = missing.or(counts.missing).filter(|n| knows || *n > 0);
     counts
 }
 
@@ -699,6 +704,8 @@ pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
+/// Bytes of version 1 from a board that sends version 2.
+pub(crate) const REFUSED: &str = "bytes_of_version_1_refused";
 /// Damage that is of a file as a whole, and that each of its sources has.
 const OF_THE_FILE: [&str; 7] =
     ["bad_chunks", "large_chunks", "skipped_bytes", "torn_bytes", "bytes_after_end", "no_summary", "no_final_counts"];

@@ -41,6 +41,9 @@ pub struct Counts {
     pub checksum: u64,
     /// Sequence numbers that never arrived intact: between the first and the last of a session, and after a reset from 0 on.
     pub missing: u64,
+    /// By how much fewer numbers from before the beginning of a recording are missing since it began.
+    #[serde(skip)]
+    pub filled: i64,
     /// Datagrams of an unknown kind; skipped.
     pub unknown_kind: u64,
     /// Datagrams with unknown flags; decoded.
@@ -70,7 +73,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// The difference from an earlier state of these counts; 0 for `missing` if missing numbers have arrived since.
+    /// The difference from an earlier state of these counts, that at the beginning of a recording.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
@@ -82,7 +85,8 @@ impl Counts {
             long: self.long - earlier.long,
             foreign: self.foreign - earlier.foreign,
             checksum: self.checksum - earlier.checksum,
-            missing: self.missing.saturating_sub(earlier.missing),
+            missing: self.missing.saturating_add_signed(self.filled - earlier.filled).saturating_sub(earlier.missing),
+            filled: 0,
             unknown_kind: self.unknown_kind - earlier.unknown_kind,
             unknown_flags: self.unknown_flags - earlier.unknown_flags,
             malformed: self.malformed - earlier.malformed,

@@ -59,6 +59,8 @@ pub struct Decoder {
     sessions: Vec<Session>,
     /// Missing sequence numbers of sessions that are no longer kept.
     missed_before: u64,
+    /// Of these sessions, by how much fewer numbers were missing when they were dropped than when a recording began.
+    filled_before: i64,
     /// The host's clock when the last datagram arrived, and the latest time at that moment, us.
     last_arrival: Option<(i64, i64)>,
     latest: i64,
@@ -84,6 +86,7 @@ impl Decoder {
             board: None,
             sessions: vec![],
             missed_before: 0,
+            filled_before: 0,
             last_arrival: None,
             latest: 0,
             goes_on: false,
@@ -115,7 +118,13 @@ impl Decoder {
     #[must_use]
     pub fn counts(&self) -> Counts {
         let missing = self.missed_before + self.sessions.iter().map(Session::missing).sum::<u64>();
-        Counts { missing, ..self.counts }
+        let filled = self.filled_before + self.sessions.iter().map(|session| session.filled).sum::<i64>();
+        Counts { missing, filled, ..self.counts }
+    }
+
+    /// Notes that a recording begins: what is missing so far is not missing in it, nor found again where it comes late.
+    pub fn begin_recording(&mut self) {
+        self.sessions.iter_mut().for_each(|session| session.from = session.highest + 1);
     }
 
     /// The totals in the board's last status datagram.
@@ -328,7 +337,9 @@ impl Decoder {
         self.counts.resets += u64::from(!began);
         self.status_number = i64::MIN;
         if self.sessions.len() == SESSIONS {
-            self.missed_before += self.sessions.remove(0).missing();
+            let session = self.sessions.remove(0);
+            self.missed_before += session.missing();
+            self.filled_before += session.filled;
         }
         self.sessions.push(Session::new(header, offset, !began));
         (self.sessions.len() - 1, !began)

@@ -12,6 +12,9 @@ pub(super) struct Session {
     lowest: i64,
     pub(super) highest: i64,
     received: u64,
+    /// The number from which on a recording counts, and by how much fewer numbers before it are missing since it began.
+    pub(super) from: i64,
+    pub(super) filled: i64,
     /// A bit for each number modulo the window: whether its datagram has arrived.
     seen: Vec<u64>,
     /// Added to the board's times, us.
@@ -31,6 +34,8 @@ impl Session {
             lowest: if from_0 { 0 } else { first },
             highest: first,
             received: 0,
+            from: i64::MIN,
+            filled: 0,
             seen: vec![0; WINDOW / 64],
             offset,
             latest: header.base,
@@ -87,11 +92,15 @@ impl Session {
             self.clear((self.highest + 1).max(number + 1 - WINDOW as i64), number);
             self.highest = number;
         }
+        let missing = self.missing();
         self.lowest = self.lowest.min(number);
         let (word, bit) = place(number);
         let new = self.seen[word] & bit == 0;
         self.seen[word] |= bit;
         self.received += u64::from(new);
+        if number < self.from {
+            self.filled += missing as i64 - self.missing() as i64;
+        }
         Some(new)
     }
 

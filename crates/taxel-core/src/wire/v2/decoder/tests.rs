@@ -1,5 +1,7 @@
 //! Tests of the decoder of version 2.
 
+use rand::{Rng, SeedableRng, rngs::StdRng};
+
 use super::*;
 use crate::board::Board;
 use crate::wire::Registers;
@@ -44,6 +46,35 @@ fn changes_as_they_are_go_the_short_way_where_the_machine_has_it() {
         bytes[sum..].copy_from_slice(&sealed);
         let plain = decoder.plain(std::iter::once(&bytes[..]), stream_rows(bytes.len()), &mut events);
         assert_eq!(plain.datagrams, taken, "{kind:?}, flags {flags}, {body:?}");
+    }
+}
+
+#[test]
+fn a_recording_misses_what_is_lost_since_it_began_whatever_comes_late_from_before() {
+    let mut draw = StdRng::seed_from_u64(5);
+    for _ in 0..200 {
+        let mut decoder = Decoder::new(Array::thesis());
+        let mut events = Events::empty(Array::thesis());
+        let begins = draw.random_range(1..100_u32);
+        let mut order: Vec<u32> = (7..200).filter(|_| draw.random_bool(0.9)).collect();
+        for k in 0..order.len() {
+            if draw.random_bool(0.1) {
+                let other = (k + draw.random_range(0..20)).min(order.len() - 1);
+                order[k..=other].rotate_left(1);
+            }
+        }
+        let (before, since) = order.split_at(begins as usize);
+        for &number in before {
+            decoder.push(&datagram(Kind::Small, 1, number, 0, &[]), None, &mut events);
+        }
+        let then = decoder.counts();
+        decoder.begin_recording();
+        for &number in since {
+            decoder.push(&datagram(Kind::Small, 1, number, 0, &[]), None, &mut events);
+        }
+        let (highest, last) = (before.iter().max().unwrap(), order.iter().max().unwrap());
+        let missing = (highest + 1..=*last).filter(|number| !since.contains(number)).count();
+        assert_eq!(decoder.counts().since(&then).missing, missing as u64);
     }
 }
 
