@@ -153,6 +153,19 @@ impl std::str::FromStr for Compression {
 }
 
 impl Header {
+    /// The channels of the source: a board, a stream of numbers, or pictures.
+    fn topics(&self) -> impl Iterator<Item = Topic> {
+        let (stream, pictures) = (self.stream.is_some(), self.pictures.is_some());
+        let belongs = move |topic: &Topic| match topic {
+            Topic::Samples => stream,
+            Topic::Pictures => pictures,
+            Topic::Datagrams => !stream && !pictures,
+            Topic::Counts => true,
+            _ => !stream,
+        };
+        Topic::ALL.into_iter().filter(belongs)
+    }
+
     /// Checks the properties that a file states.
     pub(crate) fn check(&self) -> taxel_core::Result<()> {
         self.array.check()?;

@@ -267,7 +267,7 @@ impl Reader {
             messages: read(data),
             skipped_numbers: remarks.numbers.skipped(),
             so_far: remarks.counts.clone(),
-            converted: self.header().converted.clone(),
+            converted: self.header().converted.clone().map(Box::new),
             decoded: None,
             lines: data == Topic::Samples,
         }

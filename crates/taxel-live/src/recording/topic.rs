@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Header;
-
 /// A channel of a recording. Its number is the same in every file, so that a file is readable even if its first chunk,
 /// which contains the channel records, is damaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -52,19 +50,6 @@ impl Topic {
         Self::Samples,
         Self::Pictures,
     ];
-
-    /// The channels of a source: a board, a stream of numbers, or pictures.
-    pub(super) fn of_source(source: &Header) -> impl Iterator<Item = Self> {
-        let (stream, pictures) = (source.stream.is_some(), source.pictures.is_some());
-        let belongs = move |topic: &Self| match topic {
-            Self::Samples => stream,
-            Self::Pictures => pictures,
-            Self::Datagrams => !stream && !pictures,
-            Self::Counts => true,
-            _ => !stream,
-        };
-        Self::ALL.into_iter().filter(belongs)
-    }
 
     /// The channel's name in a file.
     #[must_use]

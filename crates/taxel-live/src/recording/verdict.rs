@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use taxel_core::wire::{self, SenderDecoder};
 
-use super::Topic;
+use super::topic::Topic;
 use crate::bridged::Bridged;
 
 /// The wording of version 1 when nothing was dropped between the socket and the file.
@@ -122,7 +122,7 @@ pub struct Counts {
     pub missing: Option<u64>,
     /// The verdict of the recording that this one was converted from; earlier versions wrote it here, and none into the header.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub converted: Option<Verdict>,
+    pub converted: Option<Box<Verdict>>,
 }
 
 /// How a recording ended, as the file states.
@@ -205,7 +205,7 @@ pub struct Condition {
     /// The last counts before the end.
     pub so_far: Option<Counts>,
     /// The verdict of the recording that this one was converted from, as the header states it.
-    pub converted: Option<Verdict>,
+    pub converted: Option<Box<Verdict>>,
     /// What decoding found, if the file was decoded.
     pub decoded: Option<Found>,
     /// Whether the source is a stream of numbers.
@@ -324,7 +324,7 @@ impl Verdict {
     /// The verdict on counts; `nothing_lost` is the line if they show no loss and do not count what was sent.
     pub(crate) fn of_counts(counts: &Counts, nothing_lost: &str) -> Self {
         if let Some(verdict) = &counts.converted {
-            return verdict.clone();
+            return verdict.as_ref().clone();
         }
         let bridged = counts.bridged.as_deref().copied().unwrap_or_default();
         let of_board = |cause: &str| counts.decoder.get(cause).copied().unwrap_or(0);

@@ -57,7 +57,7 @@ impl ChunkWriter {
         let opening = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
         writer.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: opening.clone() })?;
         for (k, source) in std::iter::once(header).chain(&header.sources).enumerate() {
-            for topic in Topic::of_source(source) {
+            for topic in source.topics() {
                 let schema = match topic.schema() {
                     None => 0,
                     Some((name, encoding, text)) => writer.mcap.add_schema(name, encoding, text)?,
