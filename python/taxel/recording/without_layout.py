@@ -125,7 +125,8 @@ def _unit(name: str, times: NDArray[np.float64]) -> list[str]:
     said = (unit_of(name) or "").replace("µ", "u")
     unit = said if said in UNITS_US else "s"
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} pictures/s"] * (step > 0) + ['or "ms" or "us"'] * (not said)
+    notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} pictures/s"] if step > 0 else []
+    notes += ['or "ms" or "us"'] * (not said)
     return [f"time_unit = {_quoted(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
 
 
