@@ -217,6 +217,19 @@ def test_what_cancels_in_a_coefficient_is_no_proof() -> None:
     assert Neuron(tau=10.0).potential([1e9, 0.0], plain, [20.0])[0] > 0.3
 
 
+@pytest.mark.parametrize("silence", [5e-324, 1e-323, 1e-300, 1e-30, 1.0])
+@pytest.mark.parametrize("target", [0.0, 1.0, 1e30])
+@pytest.mark.parametrize("margin", [True, False])
+def test_what_a_sum_of_floats_loses_is_no_proof(silence: float, target: float, margin: bool) -> None:
+    """Of a problem that has a solution: a row of silence too small beside a target's, taken once with either sign."""
+    trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
+    cone = ConeX(neuron=Neuron(tau=10.0), lb=-1.0, ub=1.0).fit([trains], [[20.0]])
+    assert cone.status_ == "solved"
+    rows = [Row("target", 0, 0), Row("silence", 0, 40.0), Row("target", 0, 0)]
+    proof = Certificate(rows, np.array([target, silence, -target]), 1.0, True, "")
+    assert not check_certificate(cone.problem_, proof, margin=margin)
+
+
 @pytest.mark.parametrize("time", ["grid", "continuous"])
 def test_the_check_states_its_rows_itself(time, monkeypatch):
     cone = refuted(3, time=time)

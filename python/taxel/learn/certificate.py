@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from fractions import Fraction
+from operator import mul
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,7 +73,10 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
     lb, ub = (np.broadcast_to(np.asarray(bound, np.float64), trains) for bound in (cone.lb, cone.ub))
     most = np.maximum(np.abs(lb), np.abs(ub))
     g, size, demanded, silent, terms = np.zeros(trains), 0.0, 0.0, False, 0.0
-    for (kind, pattern, at), multiplier in zip(certificate.rows, certificate.multipliers, strict=True):
+    sides: list[list[float]] = []
+    # Their scale proves nothing; the smallest of floats would lose its products.
+    multipliers = np.ldexp(certificate.multipliers, -np.frexp(np.abs(certificate.multipliers).max(initial=0.0))[1])
+    for (kind, pattern, at), multiplier in zip(certificate.rows, multipliers, strict=True):
         if not 0 <= pattern < len(rows):
             raise ProblemError(f"certificate: a row of pattern {pattern}, there are {len(rows)}")
         if multiplier < 0 and kind != "target":
@@ -80,13 +85,18 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
         coefficients, sizes, limit = here.named(kind, at, f"certificate: pattern {pattern},", margin=margin)
         g = g + multiplier * coefficients
         demanded += multiplier * limit
+        sides.append([*coefficients, limit])
         silent |= kind == "silence" and multiplier > 0
         size += abs(multiplier) * (sizes @ most + abs(limit))
         terms = max(terms, here.roundings + here.counts.max(initial=0))
     least = np.minimum(lb * g, ub * g).sum()
     rounding = (len(certificate.rows) + trains + terms) * np.finfo(float).eps * size
-    cancels = silent and not margin and min(problem.margin) > 0 and demanded == 0 and not g.any()
-    return bool(cancels or least - demanded > rounding)
+    if silent and not margin and min(problem.margin) > 0 and demanded == 0 and not g.any():
+        # In fractions, as a sum of floats loses a product that is small enough.
+        exact = [Fraction(multiplier) for multiplier in multipliers]
+        if not any(sum(map(mul, exact, map(Fraction, column))) for column in zip(*sides, strict=True)):
+            return True
+    return bool(least - demanded > rounding)
 
 
 def check_gap(
