@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
 
 import taxel
 from taxel import Verdict, _core
@@ -190,6 +193,35 @@ def test_loss_in_a_board_s_own_last_second_is_seen_in_a_file_without_its_end(tmp
     del writer
     verdict = taxel.open(path).verdict
     assert (verdict.status, verdict.lost) == ("lost", {"lost_on_the_way": 1})
+
+
+@pytest.mark.parametrize("keeps", [lambda n: True, lambda n: n % 3 != 1, lambda n: n < 12, lambda n: n > 27])
+def test_what_another_program_left_out_of_a_finished_file_is_lost(keeps: Callable[[int], bool], tmp_path: Path) -> None:
+    """A summary that fits what is there says nothing of what was there."""
+    record(tmp_path / "a.mcap", some_events())
+    with (tmp_path / "a.mcap").open("rb") as source, (tmp_path / "b.mcap").open("wb") as file:
+        reader, writer, channels, left_out = make_reader(source), Writer(file), {}, 0
+        writer.start("taxel")
+        metadata = [(one.name, one.metadata) for one in reader.iter_metadata()]
+        for one in metadata[:1]:
+            writer.add_metadata(*one)
+        for schema, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.topic not in channels:
+                known = schema and writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(
+                    channel.topic, channel.message_encoding, known or 0, channel.metadata
+                )
+            if channel.topic == "/datagrams" and not keeps(message.sequence):
+                left_out += 1
+                continue
+            times = message.log_time, message.data, message.publish_time, message.sequence
+            writer.add_message(channels[channel.topic], *times)
+        for one in metadata[1:]:
+            writer.add_metadata(*one)
+        writer.finish()
+    verdict = taxel.open(tmp_path / "b.mcap").verdict
+    assert verdict.lost == ({"lost_in_file": left_out} if left_out else {})
+    assert verdict.status == ("lost" if left_out else "complete after arrival")
 
 
 @pytest.mark.parametrize("lost", [0, 2])

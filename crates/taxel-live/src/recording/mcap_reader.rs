@@ -236,10 +236,14 @@ impl Reader {
         let (name, data) = (&self.header().name, data_of(self.header()));
         let read = |topic: Topic| remarks.messages.get(&topic).copied().unwrap_or(0);
         let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
-        let total = |topic: Topic| match (totals, &self.ending) {
-            (Some(totals), _) => totals.get(&topic.channel_name(self.source, name)).copied(),
-            (None, Some(Ending::Finished { counts })) if topic == data => Some(counts.recorded),
-            _ => None,
+        // Another program may have written the file anew without some messages, and a summary that fits: the recorder's own
+        // count says how many there were.
+        let total = |topic: Topic| {
+            let stated = totals.and_then(|totals| totals.get(&topic.channel_name(self.source, name)).copied());
+            match &self.ending {
+                Some(Ending::Finished { counts }) if topic == data => stated.max(Some(counts.recorded)),
+                _ => stated,
+            }
         };
         let mut unread = unread.clone();
         if let Some((0, indexed)) = self.blocks.skipped.first() {
