@@ -343,10 +343,10 @@ impl Verdict {
         // The board's numbers also skip what was dropped after it was sent, which is counted above.
         let behind: u64 = dropped.iter().filter(|(_, cause, _)| *cause != "not_recorded").map(|(n, ..)| n).sum();
         let missing = counts.missing.unwrap_or(0);
-        // Which of them were dropped is not known where more was dropped than is missing (datagrams that came again), or
-        // more datagrams than messages.
+        // Which of them were dropped is not known where more was dropped than is missing (datagrams that came again, or came
+        // after the last number), or more datagrams than messages.
         let several = counts.several_a_message && counts.dropped_by_kernel > 0 && missing > behind;
-        let unclear = missing.min(behind) > 0 && (several || of_board(REPEATED) > 0);
+        let unclear = missing.min(behind) > 0 && (several || missing < behind || of_board(REPEATED) > 0);
         let board = (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events");
         let way = if unclear {
             (missing, "lost_on_the_way_or_dropped", "datagrams lost or damaged on the way or among those dropped")
