@@ -244,6 +244,15 @@ def test_tables_without_a_layout_print_the_one_that_reads_them(
     assert recording.frames().t.tolist() == expected_us.tolist()
 
 
+def test_a_table_of_one_picture_without_a_layout_prints_no_rate(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,x,y\n1,2,3\n")
+    said = layout_said_of(tmp_path / "a.csv")
+    assert "pictures/s" not in said
+    (tmp_path / "a.layout.toml").write_text(said)
+    frames = taxel.open(tmp_path / "a.csv").frames()
+    assert (frames.values.tolist(), frames.t.tolist()) == ([[[2.0, 3.0]]], [1_000_000])
+
+
 def test_a_folder_of_tables_without_a_layout_says_the_same(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(lines(VALUES))
     (tmp_path / "read me.txt").write_text("of a hand")
