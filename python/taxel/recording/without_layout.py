@@ -43,6 +43,8 @@ def refuse_without_layout(path: Path) -> None:
         )
     if not is_foreign(path) or (path.suffix.lower() == ".npz" and not stored_names(path)):
         return
+    if path.suffix.lower() in (".csv", ".h5", ".hdf5"):
+        kind_of(path)  # refuses what is not of the kind that its name says
     if path.suffix.lower() not in ARRAYS:
         said = _of_table(text.beginning(path))
         if said is None:
@@ -50,8 +52,6 @@ def refuse_without_layout(path: Path) -> None:
         holds, lines = said
         says = "says how to read it"
     else:
-        if path.suffix.lower() not in (".npy", ".npz"):
-            kind_of(path)  # refuses what is not of the kind that its name says
         there = shapes_of(path)
         name = next((name for name, shape in there.items() if len(shape) in (2, 3)), None)
         if name is None:
