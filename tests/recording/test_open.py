@@ -141,6 +141,17 @@ def test_a_plain_npz_or_csv_gets_the_thesis_array_or_one_that_fits(tmp_path: Pat
         taxel.open(tmp_path / "b.csv", array=THESIS)
 
 
+@pytest.mark.parametrize("ending", ["npz", "h5"])
+def test_pictures_on_a_given_array_of_another_size_are_refused_by_its_name(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"a.{ending}"
+    taxel.convert(Frames(np.zeros((2, 4, 4), np.float32), [0, 7]), path)
+    for array in (taxel.Array(3, 5), taxel.Array(2, 8), taxel.Array(1, 16)):
+        size = " x ".join(map(str, array.shape))
+        with pytest.raises(taxel.ProblemError, match=f"array: {size} taxels; .*a.{ending} holds pictures of 4 x 4$"):
+            taxel.open(path, array=array)
+    assert taxel.open(path, array=taxel.Array(4, 4, 5.0)).array.pitch_mm == 5.0
+
+
 @pytest.mark.parametrize("pictures", [False, True])
 def test_a_csv_is_the_same_however_much_of_it_is_read_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pictures: bool

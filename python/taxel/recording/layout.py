@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from taxel._base.messages import first_line
@@ -12,10 +14,22 @@ from taxel.formats.layout import Layout, packaged
 from taxel.frames import Frames
 from taxel.recording.contents import Contents, alone, once
 
-__all__ = ["laid_out", "on_array"]
+__all__ = ["check_size", "laid_out", "on_array"]
 
 #: Units that say nothing: what a table or a stream of numbers holds.
 _UNSAID = ("counts", "as sent")
+
+
+def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
+    """Refuse a given array of other rows and columns than a file's pictures.
+
+    Raises
+    ------
+    ProblemError : other rows or columns
+    """
+    if size != array.shape:
+        held = " x ".join(map(str, size))
+        raise ProblemError(f"array: {array.rows} x {array.columns} taxels; {path} holds pictures of {held}")
 
 
 def on_array(of: Contents, array: Array) -> Contents:

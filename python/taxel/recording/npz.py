@@ -25,6 +25,7 @@ from taxel.formats.checks import table as limited
 from taxel.frames import Frames
 from taxel.recording.contents import Contents
 from taxel.recording.description import about_of, json_of
+from taxel.recording.layout import check_size
 
 __all__ = ["TEXTS", "around", "columns_of", "contents_of", "read_npz", "write_npz"]
 
@@ -89,6 +90,7 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
     Raises
     ------
     FormatError : a column is missing or invalid, or the columns are not those of which the file has the checksum
+    ProblemError : the given sensor has other rows or columns than the pictures
     """
     if _DIGEST in columns and not np.array_equal(columns[_DIGEST], _digest_of(columns)):
         raise FormatError(f"{path}: damaged: what it holds is not what was written")
@@ -102,6 +104,8 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
     # A sensor of unknown pitch says nothing against the pitch of the file.
     says_less = array is not None and described is not None and not array._is_measured and described.fits(array)
     sensor = described if says_less else array or described
+    if array is not None and values is not None and values.ndim == 3:
+        check_size(path, values.shape[1:], array)
     try:
         if "values" in columns and "t" in columns:
             unit = str(columns.get("unit", "counts"))

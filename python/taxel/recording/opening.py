@@ -23,7 +23,7 @@ from taxel.recording.contents import Contents, several
 from taxel.recording.csv import check_head, read_csv
 from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, is_label_table, is_own_table, kind_of
-from taxel.recording.layout import laid_out, on_array
+from taxel.recording.layout import check_size, laid_out, on_array
 from taxel.recording.npz import read_npz
 from taxel.recording.read_foreign import is_foreign, read_foreign
 from taxel.recording.read_lsa import read_lsa
@@ -74,7 +74,8 @@ def open_any(
         that `taxel.formats` reads; a ROS bag; or a folder of either kind.
     array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
-        a larger one if events lie outside it. Of a ROS bag rows and columns, for messages that do not state them.
+        a larger one if events lie outside it. A .mcap holds its own, which is kept. Of a ROS bag rows and
+        columns, for messages that do not state them.
     layout : path, optional
         The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
         ``layout.toml`` beside it, if there is one.
@@ -209,10 +210,9 @@ def _on_given(of: Contents, array: Array) -> Contents:
     ------
     ProblemError : another number of taxels, rows or columns
     """
-    own, taxels = of.array, array.rows * array.columns
-    if own.shape not in (array.shape, (1, taxels)):
-        size = f"{array.rows} x {array.columns}"
-        raise ProblemError(f"array: {size} taxels; {of.path} holds pictures of {own.rows} x {own.columns}")
+    own = of.array
+    if own.shape != (1, array.rows * array.columns):
+        check_size(of.path, own.shape, array)
     says_more = array.shape != own.shape or (array._is_measured and not own._is_measured)
     return on_array(of, array) if says_more else of
 
