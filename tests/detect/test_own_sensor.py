@@ -205,11 +205,29 @@ def test_advice_names_the_rule_that_won_or_the_recipe_of_its_inputs() -> None:
         )
     assert advised(other, [example], scored(6), scored(12), None)["contact"].helps == "more labels"
     row = Example(Frames(np.zeros((2, 1, 4)), [0, 1], unit="V", array=Array(1, 4)), labels)
-    assert advised(other, [row], scored(6), scored(12), None)["contact"].helps == "--array"
+    assert advised(other, [row], scored(6), scored(12), None)["contact"].helps == "--array 8x8xMM"
     learners = dict(zip(("contact", "foot_off"), of_area.learners.values(), strict=True))
     gait = other._replace(readout=taxel.Readout(of_area.readout.encoder, learners))
     assert advised(gait, [row], scored(6), scored(12), None)["contact"].helps == "more labels"
     assert advised(gait, [example], scored(6), scored(12), None, rule)["contact"].helps == "the plain rule"
+
+
+def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help() -> None:
+    frames, labels = touched((8, 8), 5, gain=200.0, noise=1.0)
+    tare = Tare.take(frames, stop_us=900_000)
+    plan = Recipe.load("touch", None, LABELS, measured_floor([Example(frames, labels, tare)]))
+
+    def helps(count: int, found: int) -> str:
+        first = {label: times[:count] for label, times in labels.items()}
+        example, times = Example(frames, first, tare), labels["contact"]
+        some = score(taxel.Detections(["contact"] * found, times[:found], times[:found]), {"contact": first["contact"]})
+        advice = advised(trained([example], plan, None), [example], some, some, None)
+        return f"{advice['contact'].helps}: {advice['contact'].because}" if advice else ""
+
+    assert helps(5, 12).startswith("labels of all events: 7.2 of 13.0 s lie before the first or behind the last one")
+    assert helps(5, 3).startswith("more labels: ")
+    assert helps(12, 9).startswith("more labels: ")
+    assert helps(12, 12) == ""
 
 
 def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail(

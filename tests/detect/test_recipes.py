@@ -54,9 +54,11 @@ def test_every_kind_of_recording_has_one_recipe() -> None:
     kinds = [kind for one in every.values() for kind in one["fits"]]
     assert len(kinds) == len(set(kinds))
     assert all("other" in one for one in every.values())
-    frames = np.zeros((2, 1, 1))
+    frames = np.zeros((2, 1, 33))
     found = {unit: recipes.fitting(Frames(frames, [0, 1000], unit=unit)) for unit in ("counts", "N", "kPa")}
     assert found == {"counts": "gait_plate", "N": "gait_insole", "kPa": "gait_channel"}
+    few = Frames(np.zeros((2, 1, 32)), [0, 1000], unit="counts")
+    assert recipes.fitting(few, ["contact", "lift"]) == "gait_channel"
     assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) in recipes.names()
 
 

@@ -27,7 +27,25 @@ def test_a_folder_of_no_or_of_several_formats_is_refused(tmp_path):
     write_gaitpdb(tmp_path)
     with pytest.raises(FormatError, match=r"several formats \(gaitpdb, pedar\)"):
         list(formats.trials(tmp_path))
+    with pytest.raises(FormatError, match=r"several formats \(gaitpdb, pedar\): name one file"):
+        taxel.open(tmp_path)
     assert len(list(formats.trials(tmp_path, "pedar"))) == 2
+
+
+def test_the_folder_that_one_is_in_opens_by_a_dot(tmp_path, monkeypatch):
+    (tmp_path / "trials").mkdir()
+    write_pedar(tmp_path / "trials")
+    monkeypatch.chdir(tmp_path / "trials")
+    names = [one.name for one in taxel.open(tmp_path / "trials")]
+    for place in (".", "./", Path()):
+        assert [one.name for one in taxel.open(place)] == names
+    (tmp_path / "trials" / "deeper").mkdir()
+    monkeypatch.chdir(tmp_path / "trials" / "deeper")
+    assert [one.name for one in taxel.open("..")] == names
+
+
+def test_a_format_is_one_that_there_is(tmp_path):
+    write_pedar(tmp_path)
     with pytest.raises(ProblemError, match="format is 'zebris': must be one of"):
         list(formats.trials(tmp_path, "zebris"))
     with pytest.raises(FileNotFoundError):

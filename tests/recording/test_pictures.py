@@ -280,6 +280,8 @@ def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest
     code, said, _ = call(capsys, "info", tmp_path / "one.mcap")
     assert code == 0
     assert "pictures are numbered" in said
+    assert "at picture " in said
+    assert " us" not in said
     assert " s)" not in said
     assert "pictures/s" not in said
     timed = one.at_rate(40)

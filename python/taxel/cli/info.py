@@ -251,7 +251,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "calibration", facts["calibration"]
     if facts["pressure"] is not None:
         yield "rest", facts["rest"]["text"]
-        yield from _pressure(facts["pressure"], _begin_us(facts))
+        yield from _pressure(facts["pressure"], _begin_us(facts), timed=facts["timed"])
     elif facts["rest"] is not None and facts["rest"]["falls"]:
         yield "rest", facts["rest"]["text"]
     if facts["notes"]:
@@ -305,7 +305,7 @@ def _begin_us(facts: dict[str, Any]) -> int:
     return beginning_us(np.array([] if facts["from_us"] is None else [facts["from_us"]], np.int64))
 
 
-def _pressure(pressed: dict[str, Any], begin_us: int) -> Iterator[tuple[str, str]]:
+def _pressure(pressed: dict[str, Any], begin_us: int, *, timed: bool) -> Iterator[tuple[str, str]]:
     for name, words, unit in (
         ("area_mm2", "contact area", "mm2"),
         ("area_taxels", "contact area", "taxels"),
@@ -315,7 +315,8 @@ def _pressure(pressed: dict[str, Any], begin_us: int) -> Iterator[tuple[str, str
         if name in pressed:
             most = pressed[name]["most"]
             size = counted(int(most), "taxel") if unit == "taxels" else f"{most:g} {unit}"
-            yield words, f"at most {size}, at {pressed[name]['t_us'] - begin_us} us"
+            at = pressed[name]["t_us"] - begin_us
+            yield words, f"at most {size}, at {f'{at} us' if timed else f'picture {at}'}"
     for unit, more in (("mm", " mm"), ("taxels", ""), ("places", " in units of the places")):
         across, down = ("column", "row") if unit == "taxels" else ("x", "y")
         if pressed.get(f"centre_{unit}") is not None:

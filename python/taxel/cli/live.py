@@ -393,7 +393,7 @@ def _silence(now: dict[str, Any], place: str) -> str:
     if arrival["state"] == "quiet":
         return f"quiet: {since}"
     within_ms = to_ms(arrival["heartbeat_us"])
-    return f"lost: {since} from the board, though it sent a heartbeat every {within_ms:g} ms or sooner"
+    return f"silent: {since} from the board, though it sent a heartbeat every {within_ms:g} ms or sooner"
 
 
 def _state(now: dict[str, Any], place: str) -> Text:

@@ -13,7 +13,7 @@ from taxel._base.messages import counted
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example, checked
-from taxel.detect.label_times import TOUCH, Off, held_by_tare, off_by
+from taxel.detect.label_times import TOUCH, Off, held_by_tare, off_by, unlabelled
 from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.scoring import Score
@@ -39,6 +39,8 @@ _TWO_FOLDS, _FIVE_FOLDS = 4, 10
 _PARTS, _LOOKS = 8, 40
 #: A touched taxel reads so many times its drift.
 _TIMES = 4
+#: From this share of the time before the first label and behind the last one on, some labels may be missing there.
+_UNLABELLED = 0.25
 #: Kinds of touch are told apart where chance would tell as many with at most this probability.
 _CHANCE = 0.05
 
@@ -61,14 +63,15 @@ def advised(
     """Return what may help each label of which more than 5 % are missed or false.
 
     Other times of the labels where most of them lie at one distance of more than 50 ms from what the sensor felt. More
-    labels where there are fewer than four. The recipe that fits recording and labels, if a named one was taken that
-    does not. Another tare where it holds a touch, where taxels read above their rest before touches begin, or where
-    nothing was felt of most labels that are missed. Else the plain rule, where it makes at most half the mistakes on
-    the same labels; or the recipe that learns from the same quantities, if this one does not. For contact and lift of
-    channels, and kinds of touch that they do not tell, their distance. Other kinds of touch where neither neuron nor
-    rule tells more of them than chance would. Else more labels, where on its own training data the readout makes at
-    most half the mistakes, as it learnt by heart what these data have. Else a search of other parameters, if the recipe
-    lists any.
+    labels where there are fewer than four. Labels of all events where more are false than missed, and a quarter of the
+    time or more lies before the first label or behind the last. The recipe that fits recording and labels, if a named
+    one was taken that does not. Another tare where it holds a touch, where taxels read above their rest before touches
+    begin, or where nothing was felt of most labels that are missed. Else the plain rule, where it makes at most half
+    the mistakes on the same labels; or the recipe that learns from the same quantities, if this one does not. For
+    contact and lift of channels, and kinds of touch that they do not tell, their distance. Other kinds of touch where
+    neither neuron nor rule tells more of them than chance would. Else more labels, where on its own training data the
+    readout makes at most half the mistakes, as it learnt by heart what these data have. Else a search of other
+    parameters, if the recipe lists any.
 
     Parameters
     ----------
@@ -99,6 +102,7 @@ def advised(
     channels, recipe = lacks_neighbours(examples), _other_recipe(made, examples)
     return {
         label: _of_labels(label, scored[label], times, recipe)
+        or _of_time(label, scored[label], sound)
         or _of_tare(made, label, scored[label], times)
         or _advice(
             made,
@@ -133,6 +137,18 @@ def _of_labels(label: str, scored: Score, times: _OfTimes, recipe: Advice | None
             "more labels", f"{there}; {_TWO_FOLDS} are the least to score it held out, {_FIVE_FOLDS} for five folds"
         )
     return recipe
+
+
+def _of_time(label: str, scored: Score, examples: Sequence[Example]) -> Advice | None:
+    """Return that events may lack labels before the first and behind the last, where much time lies there."""
+    outside, whole = unlabelled(examples, label)
+    if scored.false <= scored.missed or outside < _UNLABELLED * whole:
+        return None
+    return Advice(
+        "labels of all events",
+        f"{outside / 1e6:.1f} of {whole / 1e6:.1f} s lie before the first or behind the last one, and an event without "
+        "its label counts as false: label those too, or cut the recording (taxel cut) to what is labelled",
+    )
 
 
 def _other_recipe(made: Trained, examples: Sequence[Example]) -> Advice | None:
@@ -180,8 +196,10 @@ def _advice(
     if rule is not None and 2 * rule.rank[0] <= wrong:
         return _by_rule(made, rule.rank[0], wrong)
     if channels and (_for_touch(made) or chance):
-        because = "channels in a row at a known distance have neighbours; then the recipe touch fits"
-        return Advice("--array", f"{because}, as --array 1x24x5mm")
+        array = made.readout.array
+        size = "ROWSxCOLUMNSxMM" if array is None else f"{array.rows}x{array.columns}xMM"
+        because = "channels in a row at a known distance, MM mm, have neighbours; then the recipe touch fits"
+        return Advice(f"--array {size}", because)
     if chance and any(isinstance(one, Moments) for one in made.recipe.encoder._each()):
         return Advice(
             "other kinds", f"{chance}: no input tells these kinds apart, or the labels are too few or mixed up"

@@ -16,7 +16,7 @@ from taxel.detect.loads import Loads, clock_of, lacks_neighbours
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
-__all__ = ["TOUCH", "Off", "held_by_tare", "off_by"]
+__all__ = ["TOUCH", "Off", "held_by_tare", "off_by", "unlabelled"]
 
 #: So many loaded taxels are a touch, the smallest that there is.
 TOUCH = 2.0
@@ -89,6 +89,31 @@ def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple
     for k, end in enumerate(np.searchsorted(apart, apart + _SAME_MS, side="right")):
         if end - k >= least and (alike := len(np.unique(which[k:end]))) >= least:
             yield Off(float(np.median(apart[k:end])), alike, len(times)), float(apart[end - 1] - apart[k])
+
+
+def unlabelled(examples: Sequence[Example], label: str) -> tuple[int, int]:
+    """Return how long recordings last further before their first label and behind their last than labels lie apart, us.
+
+    And how long they last. Of an example without the label nothing counts.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+    label : str
+    """
+    outside = whole = 0
+    for one in examples:
+        times = np.sort(one.labels.get(label, np.empty(0, np.int64)))
+        if isinstance(one.source, SpikeTrains):
+            first, last = (round(to_us(edge)) for edge in (one.source.start, one.source.stop))
+        else:
+            t = one.source.t  # type: ignore[union-attr]
+            first, last = (int(t[0]), int(t[-1])) if len(t) else (0, 0)
+        if len(times):
+            apart = int(np.diff(times).max(initial=0))
+            outside += max(0, int(times[0]) - first - apart) + max(0, last - int(times[-1]) - apart)
+            whole += last - first
+    return outside, whole
 
 
 def held_by_tare(examples: Sequence[Example], noise_floor: float) -> int:

@@ -352,6 +352,8 @@ class Fitting:
         self._names = [called(k, one) for k, one in enumerate(examples)]
         self._sources = sources if followed is None else [only(one, quantities[followed.train]) for one in sources]
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
+        for name, times in zip(self._names, felt, strict=True):
+            self._check_apart(name, times, learner._on_grid().refractory)
         later = [np.zeros(len(times), np.int64) for times in felt]
         if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
             later = [later_us(one, ages, to_ms(t), delay_ms) for one, t in zip(sources, felt, strict=True)]
@@ -384,6 +386,16 @@ class Fitting:
         if followed is not None:
             return silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, neuron.step_ms)
         return None
+
+    def _check_apart(self, name: str, times: NDArray[np.int64], refractory_ms: float) -> None:
+        """Refuse labels, as they were felt, closer to each other than the neuron can fire."""
+        times = np.sort(times)
+        for k in np.flatnonzero(np.diff(times) <= to_us(refractory_ms))[:1]:
+            before, t = times[k : k + 2].tolist()
+            raise ProblemError(
+                f"{self._label}: {name} has one at {t} us, {t - before} us after the one before; must be more than "
+                f"{refractory_ms:g} ms apart, as it fires once in that time. Are times in us, and each there once?"
+            )
 
     def _check_felt(self, trains: Sequence[SpikeTrains]) -> None:
         """Refuse an example with targets and without any spike up to them."""

@@ -200,7 +200,9 @@ class Layout:
         True
         """
         folder = [path / "layout.toml"] if path.is_dir() else []
-        for candidate in (path.with_name(_name(path)), *folder, path.with_name("layout.toml")):
+        # "." and ".." have no name beside which a file could lie.
+        named = path if path.name not in ("", "..") else path.resolve()
+        for candidate in (named.with_name(_name(named)), *folder, named.with_name("layout.toml")):
             if candidate.is_file():
                 return candidate
         return None

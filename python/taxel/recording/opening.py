@@ -241,7 +241,7 @@ def _folder(folder: Path, how: How) -> list[Recording]:
         if len(names) != 1:
             for file in files if not names else ():
                 refuse_without_layout(file)
-            problem = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
+            problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
             deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
             hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
             there = f"there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}"

@@ -1,11 +1,11 @@
 """Recipes by name, one data file each: where none is named, `taxel train` chooses the one that fits the recording.
 
-A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", units of frames, or
-"grids": frames of taxels with known neighbours, whose labels are all its own neurons' before what fits the unit, any
-others where nothing fits it), the encoder, or several as `encoders` by name, whether labels are moved to what the
-sensor felt (`align`), what all neurons share (`learner`), what is a neuron's own (`neurons`), which labels are `also`
-called otherwise, and the parameters of any `other` label, or whose they are; without `other` it is for its neurons'
-labels alone. A new recipe is a new file in this folder.
+A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", units of frames, or "many
+UNIT": units of frames of a grid or of more than 32 channels, or "grids": frames of taxels with known neighbours, whose
+labels are all its own neurons' before what fits the unit, any others where nothing fits it), the encoder, or several as
+`encoders` by name, whether labels are moved to what the sensor felt (`align`), what all neurons share (`learner`), what
+is a neuron's own (`neurons`), which labels are `also` called otherwise, and the parameters of any `other` label, or
+whose they are; without `other` it is for its neurons' labels alone. A new recipe is a new file in this folder.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ __all__ = ["chosen", "fitting", "for_labels", "knows", "names", "read"]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
-#: Of more taxels than these a grid's kinds of touch are not learnt by `_ANY`, whose 22 trains a taxel take minutes.
+#: More taxels than these are many: a grid's kinds of touch are then not learnt by `_ANY`, whose 22 trains a taxel take
+#: minutes.
 _MOST_CHANNELS = 32
 
 
@@ -93,9 +94,11 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     steps = grids is not None and any(_own(values, label) for label in others for values in every.values())
     if grids is not None and not steps and len(others) > 1:
         return grids, f"kinds of touch on {what}"
-    if source.unit in of:
-        return of[source.unit], f"pictures in {source.unit}"
-    if grids is not None and array.taxels > _MOST_CHANNELS and not steps:
+    many = array.taxels > _MOST_CHANNELS
+    for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
+        if unit in of:
+            return of[unit], f"pictures in {source.unit}"
+    if grids is not None and many and not steps:
         return grids, what
     return _ANY, f"{what} in {source.unit}"
 
