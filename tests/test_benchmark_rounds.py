@@ -102,15 +102,18 @@ def test_peers_run_in_turn_with_ours_and_long_ones_once(clock: Clock) -> None:
         "slow": clock.peer("s", 50.0),
         "stopped": clock.peer("x", 60.0, stopped="after 60 s", limit_s=60),
         "broken": clock.peer("b", 0.0, failed=["ImportError"]),
-        "saved": clock.peer("k", 0.0, cpu_s=300.0, kept="2026-11-20"),
     }
     ours, found = _peer.in_turn(clock.run("o", 1.0, 1.0, 1.0, 2.0), peers, 3)
-    assert clock.called == "oofsxbkofof"
+    assert clock.called == "oofsxbofof"
     assert ours["cpu_s"]["rounds"] == [1.0, 1.0, 2.0]
     assert found.pop("broken") == {"failed": ["ImportError"]}
     times = {name: (one["times"], one["rounds"]) for name, one in found.items()}
-    assert times == {"fast": (2.0, 3), "slow": (50.0, 1), "stopped": (60.0, 1), "saved": (300.0, 1)}
+    assert times == {"fast": (2.0, 3), "slow": (50.0, 1), "stopped": (60.0, 1)}
     assert found["fast"]["quartiles"] == [1.5, 2.5]
+    told = _peer.ratios_of({"small": {"ours": ours, **found}})
+    assert told["ratios"] == {"small, fast": 2.0, "small, slow": 50.0, "small, stopped": 60.0}
+    assert told["spread"] == {"small, fast": [1.5, 2.5]}
+    assert told["larger"] == ["small, stopped"]
 
 
 def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:

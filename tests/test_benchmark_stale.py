@@ -18,8 +18,7 @@ from taxel.report import installed_sources
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
-import _peer  # noqa: E402  what benchmarks share
-import _rounds  # noqa: E402
+import _rounds  # noqa: E402  what benchmarks share
 
 BENCHMARK = '''"""How fast is it?"""
 from _goals import at_least
@@ -138,10 +137,10 @@ QUIET = {"cpu": "one, AVX2", "others": 0.04, "cores": 2}
             "  of earlier code; changed: _shared, fast, logic/top.sv,",
         ),
         (
-            MET | {"machine": QUIET, "stable": False, "kept": {"x": "2026"}},
+            MET | {"machine": QUIET, "stable": False},
             "fast: 3 of 3 goals reached\n"
-            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; 1 time of peers\n"
-            "  of another day; times vary by more than 15 %: by its own judgement\n  of this code\n" + ALL,
+            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; times vary by\n"
+            "  more than 15 %: by its own judgement\n  of this code\n" + ALL,
         ),
         (
             MET
@@ -255,55 +254,3 @@ def test_the_list_of_goals_names_what_has_changed_modules_before_the_compiled_pa
     assert compiled > 1
     out = call(capsys, "bench", "fast", "--goals", "--folder", folder)[1]
     assert f"  of earlier code; changed: _shared, {compiled} compiled names\n" in out
-
-
-PEER = "import json, sys\nprint(json.dumps({'cpu_s': float(sys.argv[1]), 'verdict': 'solved'}))\n"
-
-
-@pytest.fixture
-def peer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A peer that reports its time, with a file of the test for saved times."""
-    monkeypatch.setattr(_peer, "KEPT", tmp_path / "peers.json")
-    monkeypatch.setenv(_peer.PATIENT, "1")
-    (tmp_path / "slow.py").write_text(PEER)
-    return str(tmp_path / "slow.py")
-
-
-def ask(peer: str, seconds: float, *, quick: bool = False) -> dict[str, object]:
-    return _peer.ask(peer, seconds, packages="numpy", limit=900, quick=quick)
-
-
-def test_the_time_of_a_peer_that_needs_minutes_is_saved_and_marked_as_saved(peer: str) -> None:
-    assert "kept" not in ask(peer, 300.0)
-    again = ask(peer, 300.0)
-    assert again["cpu_s"] == 300.0
-    assert _peer.processor() in str(again["kept"])
-    assert _peer.kept_of({"a": {"slow": again, "ours": {}}}) == {"a, slow": again["kept"]}
-    assert "kept" not in ask(peer, 300.0, quick=True)
-
-
-def test_a_quick_peer_is_measured_each_time(peer: str) -> None:
-    ask(peer, 3.0)
-    assert "kept" not in ask(peer, 3.0)
-
-
-def test_a_saved_time_counts_only_on_its_processor_and_for_its_code(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    ask(peer, 300.0)
-    Path(peer).write_text(PEER + "# a comment\n")
-    assert "kept" in ask(peer, 300.0)
-    with monkeypatch.context() as other:
-        other.setattr(_peer, "processor", lambda: "another model")
-        other.delenv(_peer.PATIENT)
-        assert "kept" not in ask(peer, 300.0)
-    with monkeypatch.context() as other:
-        other.setattr(_peer, "version", lambda package: "0.0")
-        other.delenv(_peer.PATIENT)
-        assert "kept" not in ask(peer, 300.0)
-    Path(peer).write_text(PEER.replace("solved", "infeasible"))
-    assert ask(peer, 300.0)["verdict"] == "infeasible"
-
-
-def test_the_time_of_a_peer_that_was_stopped_is_not_saved(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(_peer.PATIENT)
-    ask(peer, 300.0)
-    assert not _peer.KEPT.exists()

@@ -26,8 +26,6 @@ from taxel.cli._app import app
 
 __all__ = ["bench", "changed_parts", "doubts_of", "goals_of", "made_of"]
 
-#: Set by --peers: benchmarks then wait for peers that need minutes (benchmarks/_peer.py).
-_PATIENT = "TAXEL_BENCH_PEERS"
 #: How the parts of a result begin that are compiled.
 _COMPILED = "taxel._core."
 #: How the rows begin that were measured with AVX2 alone (benchmarks/_instructions.py).
@@ -44,9 +42,6 @@ def bench(
         "benchmarks"
     ),
     quick: Annotated[bool, typer.Option(help="Run few rounds, as a test; writes no result.")] = False,
-    peers: Annotated[
-        bool, typer.Option("--peers", help="Wait for peers that need minutes, and save their times for this processor.")
-    ] = False,
     goals: Annotated[
         bool,
         typer.Option(
@@ -81,8 +76,6 @@ def bench(
             f"{', '.join(changed[:3])}{' ...' * (len(changed) > 3)}: changed since the last commit, "
             "which a result names; commit first, or give --quick"
         )
-    if peers:
-        os.environ[_PATIENT] = "1"
     for stem in names:
         begun, others, benchmark = time.monotonic(), _Others(), _load(files[stem])
         result = _run(files[stem], quick=quick)
@@ -142,11 +135,10 @@ def goals_of(benchmark: Any, result: Mapping[str, Any]) -> list[Any]:
 
 
 def doubts_of(result: Mapping[str, Any]) -> list[str]:
-    """Return what speaks against the times of a result: other programs, other days, times that vary."""
-    machine, kept = result.get("machine", {}), result.get("kept", {})
+    """Return what speaks against the times of a result: other programs, times that vary."""
+    machine = result.get("machine", {})
     others = machine.get("others")
     doubts = [_others(machine)] * (others is None or others > _BUSY * machine["cores"])
-    doubts += [f"{counted(len(kept), 'time')} of peers of another day"] * bool(kept)
     # With AVX2 alone a row has the same name.
     vary = list(dict.fromkeys(name for name, one in _measured(result) if one.get("stable") is False))
     vary = vary or ["by its own judgement"] * (result.get("stable") is False)
@@ -283,8 +275,7 @@ def _table(stem: str, result: dict[str, Any], goals: Sequence[Any]) -> str:
         for name, one in ratios.items()
     ]
     left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
-    saved = [f"  saved, not measured in this run: {peer}: of {when}" for peer, when in result.get("kept", {}).items()]
     head = f"{stem}: ratios (ours over the peer's, above 1 is faster) with quartiles of rounds; {result['took_s']:g} s"
     lacks = [_row(goal, result) for goal in goals if not goal.reached]
     doubts = [f"  {doubt}" for doubt in doubts_of(result)]
-    return "\n".join([head, *rows, *left_out, *saved, *lacks, *doubts])
+    return "\n".join([head, *rows, *left_out, *lacks, *doubts])
