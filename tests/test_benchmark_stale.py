@@ -92,6 +92,23 @@ def test_a_change_in_what_is_measured_is_named(folder: Path, file: str, old: str
     assert changed(folder) == moved
 
 
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("recording_open", ["taxel.recording.cut", "taxel.recording.opening", "taxel._core.RecordingReader"]),
+        ("panel", ["taxel.cli.view", "taxel.cli.info", "taxel.cli.convert", "crates/taxel-panel/web/main.js"]),
+        ("bridge", ["taxel.cli.bridge", "taxel._core.Remote"]),
+        ("information", ["taxel.cli.information"]),
+    ],
+)
+def test_code_that_runs_in_another_process_or_on_the_page_counts(name: str, parts: list[str]) -> None:
+    path = ROOT / "benchmarks" / f"{name}.py"
+    before = made_of(path, _load(path))
+    changed = changed_parts({"made_of": before | dict.fromkeys(parts, "other")}, before)
+    assert set(parts) <= before.keys()
+    assert len(changed) == len(parts)
+
+
 def test_a_result_without_its_sources_is_stale(folder: Path) -> None:
     (folder / "results" / "fast.json").write_text("{}")
     assert changed(folder) == ["its sources were not recorded"]
