@@ -27,6 +27,9 @@ from recording_write import BYTES, HEADER, datagrams
 
 from taxel import _core
 
+#: Words of the figures that are better when smaller.
+SMALLER = ("/ decoded",)
+
 
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
