@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from taxel import wire
+from taxel import SpikeTrains, wire
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks"))
 import _peer
 import _rounds
+import _touch
 import wire_decode
 
 
@@ -114,6 +115,24 @@ def test_peers_run_in_turn_with_ours_and_long_ones_once(clock: Clock) -> None:
     assert told["ratios"] == {"small, fast": 2.0, "small, slow": 50.0, "small, stopped": 60.0}
     assert told["spread"] == {"small, fast": [1.5, 2.5]}
     assert told["larger"] == ["small, stopped"]
+
+
+@pytest.mark.parametrize(
+    ("theirs", "share"),
+    [
+        ([(1000, 0, 1), (3000, 1, -1)], 1.0),
+        ([(1000, 0, 1), (2000, 1, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 0, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 1, 1)], 0.5),
+        ([(1000, 0, 1)], 1.0),
+        ([(3000, 1, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 1, -1), (3000, 0, 1), (3000, 0, 1)], 0.5),
+    ],
+)
+def test_spikes_are_equal_in_time_train_and_value(theirs: list[tuple[int, ...]], share: float) -> None:
+    """Ours may go on after the last of the NumPy version, and must not have others before."""
+    ours = SpikeTrains.from_lists([[1.0], [3.0]], stop=4.0, values=[[1.0], [-1.0]])
+    assert _touch.shared(ours, theirs) == share
 
 
 def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:
