@@ -1,4 +1,4 @@
-"""One frame's exact network of 64 x 64 taxels: against dense solves by NumPy, and with wires against SciPy's sparse one.
+"""One frame's exact network of 64 x 64 taxels: against NumPy's dense solves, and with wires against SciPy's sparse one.
 
 Peers without wire resistance: ``numpy.linalg.solve`` of all 128 lines' balances with a right-hand side a read column,
 and of the 64 that are left when the read columns' lines, which only taxels join, are eliminated. With it (8192
@@ -15,7 +15,6 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from taxel.simulate.circuit import Fabric, VirtualGround
-
 
 #: By the ratio's name, ours and the peer.
 PAIRS = {

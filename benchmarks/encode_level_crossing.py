@@ -27,7 +27,7 @@ def numpy_crossing(frames: Frames, levels: list[float], share: float) -> list[An
     for t, picture in zip(frames.t[1:], frames.values[1:], strict=True):
         now = picture >= np.where(above, off_at, on_at)
         if (now != above).any():
-            spikes += [(t, train[place], 1 if now[place] else -1) for place in zip(*np.nonzero(now != above))]
+            spikes += [(t, train[place], 1 if now[place] else -1) for place in map(tuple, np.argwhere(now != above))]
             above = now
     return spikes
 
