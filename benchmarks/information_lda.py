@@ -3,8 +3,9 @@
 15 000 trials of 1000 ternary features, 300 classes, once of spikes drawn independently, whose scatter has full rank,
 and once of rasters as of an array, in which features determine each other exactly. *One fold*: both train on nine
 tenths of the same table (ours as int8, scikit-learn as float32, with which it is fastest) and predict the rest, with
-one BLAS thread. *Ten folds*: ours, whose folds share what they sum, beside ten times one of scikit-learn, which trains
-each from nothing. Predictions are compared, trial by trial. Then 150 000 x 5000, ten folds, once, with the time and the largest memory; there BLAS has all cores.
+one BLAS thread. *Ten folds*: ours, whose folds share what they sum, beside ten times one of scikit-learn, which
+trains each from nothing. Predictions are compared, trial by trial. Then 150 000 x 5000, ten folds, once, with the
+time and the largest memory; there BLAS has all cores.
 
 Peer: scikit-learn's `svd` and `lsqr`. Unit: CPU seconds of one fold and of ten. Goal: not slower than either,
 and the same predictions.
