@@ -4,7 +4,8 @@ Sender and receiver share this machine, over loopback, the sender a process of i
 sends as the board does, each 192 us the events of a frame, in datagrams of at most 280 words, which the kernel cuts
 out of one train (UDP_SEGMENT). *Beside faery*: both receive from the same sender, paced alike, one send call a
 datagram of 111 events, ours in words of 5 bytes, faery's in its own format of 13 ("t64_x16_y16_on8"); in turn. `DOES`
-says what each latency is; the cores are the CPU time of the receiving process.  faery looks for packets every 20 ms;
+says what each latency is; the cores are the CPU time of the receiving process.
+faery looks for packets every 20 ms;
 *a socket loop* is the plain Python receiver: `recv`, and NumPy's view of faery's format, which asks for no decoding.
 
 Peer: faery's UDP receiver, and a socket loop. Unit: us from sending to decoded; cores; datagrams lost. Goal: 21.3

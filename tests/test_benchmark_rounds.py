@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from taxel import SpikeTrains, wire
+from taxel import Array, SpikeTrains, wire
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks"))
 import _peer
 import _rounds
 import _touch
+import latency
 import wire_decode
 
 
@@ -133,6 +134,22 @@ def test_spikes_are_equal_in_time_train_and_value(theirs: list[tuple[int, ...]],
     """Ours may go on after the last of the NumPy version, and must not have others before."""
     ours = SpikeTrains.from_lists([[1.0], [3.0]], stop=4.0, values=[[1.0], [-1.0]])
     assert _touch.shared(ours, theirs) == share
+
+
+def test_latencies_of_rounds_are_summed_where_they_count_and_else_the_median() -> None:
+    rounds = [{"found": n, "lost": {"queue": 1}, "late": {"p50": p}} for n, p in ((3, 1.0), (4, 9.0), (5, 2.0))]
+    assert latency.together(rounds) == {
+        "found": 12,
+        "lost": {"queue": 3},
+        "late": {"p50": 2.0, "p50 quartiles": [1.5, 5.5]},
+    }
+
+
+def test_a_touch_is_answered_once() -> None:
+    """The neuron of the latency does not fire again for one touch, and does for the next."""
+    neuron, weights, *_ = latency.readout(Array(8, 8))[0].neurons["contact"]
+    spikes = SpikeTrains.from_lists([[10.0, 10.0 + latency.EACH_US * 0.75e-3], []], stop=60.0)
+    assert len(neuron.run(weights, spikes)) == 2
 
 
 def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:
