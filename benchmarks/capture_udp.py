@@ -103,7 +103,7 @@ link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
 link.bind(("127.0.0.1", port))
 stream = (np.frombuffer(link.recv(65536), kind) for _ in iter(int, 1))
 """
-PEERS = {"faery": "faery", "socket loop": "numpy"}
+PEERS = {"faery": "faery"}
 RECEIVE = """
 import json, os, sys, time
 import numpy as np
