@@ -10,15 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from taxel import Array, SpikeTrains, wire
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks"))
+import _memory
 import _peer
 import _rounds
 import _touch
 import latency
+import learn_cone_x
 import wire_decode
 
 
@@ -171,3 +174,58 @@ def test_the_c_loop_decodes_what_ours_does(tmp_path: Path, into: str) -> None:
         if columns is not None:
             assert np.array_equal(columns.t[: len(ours)], ours.t)
             assert name != "pairs" or np.array_equal(columns.intensity[: len(ours)], ours.intensity)
+
+
+def judged(**of_peer: Any) -> dict[str, bool]:
+    """Return the goals of a solved and an infeasible case of the memory task, with one peer in both."""
+    ours = {"verdict": "solved", "objective": 1.0}, {"verdict": "infeasible", "certificate checked": True}
+    name = next(iter(learn_cone_x.PEERS))
+    peer = {"verdict": "solved", "objective, relative difference": 1e-9} | of_peer
+    cases = {"1/1": {"ConeX": ours[0], name: peer}, "2/2": {"ConeX": ours[1], name: {"verdict": "infeasible"}}}
+    return {goal.what: goal.reached for goal in learn_cone_x.goals({"cases": cases}) if "times" not in goal.what}
+
+
+def test_conex_must_agree_with_its_peers() -> None:
+    agree, apart = "1/1, share of peers with ConeX's verdict", "1/1, objectives differ by at most"
+    for of_peer, lacks in (
+        ({}, set()),
+        ({"verdict": "infeasible"}, {agree}),
+        ({"objective, relative difference": -1e-4}, {apart}),
+    ):
+        found = {what: reached for what, reached in judged(**of_peer).items() if what.startswith(("1/1, ", "2/2, "))}
+        assert {what for what, reached in found.items() if not reached} == lacks
+        assert found["2/2, certificate of infeasibility checked"]
+
+
+def test_a_peer_with_rows_on_demand_gets_those_that_its_solution_breaks() -> None:
+    """The rows that it ends with are enough: the verdict and the least weights are those of all rows."""
+    n, p, held = 20, 3, [np.empty((0, 20))]
+    equal = _memory.equalities(n, p)
+
+    def solve(rows: Any, limits: Any) -> tuple[str, Any, float]:
+        held[0] = np.concatenate([held[0], rows])
+        most.extend(limits)
+        return answer(held[0], np.array(most))
+
+    def answer(rows: Any, limits: Any) -> tuple[str, Any, float]:
+        found = minimize(
+            lambda w: 0.5 * w @ w,
+            np.zeros(n),
+            jac=lambda w: w,
+            bounds=[(-_memory.BOUND, _memory.BOUND)] * n,
+            constraints=[
+                {"type": "eq", "fun": lambda w: equal @ w - _memory.THETA_0, "jac": lambda w: equal},
+                *([{"type": "ineq", "fun": lambda w: limits - rows @ w, "jac": lambda w: -rows}] if len(rows) else []),
+            ],
+            tol=1e-12,
+        )
+        return "solved", found.x, float(found.fun)
+
+    most: list[float] = []
+    verdict, objective = _memory.on_demand(n, p, solve)
+    rows, limits = _memory.every_row(n, p)
+    _, w, least = answer(rows, limits)
+    assert verdict == "solved"
+    assert 0 < len(held[0]) < len(rows) / 4
+    assert (rows @ w <= limits + 1e-7).all()
+    assert objective == pytest.approx(least, rel=1e-6)
