@@ -1,13 +1,16 @@
 """CPU time and losses of receiving, and latency from sending to decoded, beside faery's UDP receiver.
 
 Sender and receiver share this machine, over loopback, the sender a process of its own. *The worst case*: the sender
-sends as the board does, each 192 us the events of a frame, in datagrams of at most 280 words, which the kernel cuts out
-of one train (UDP_SEGMENT). *Beside faery*: both receive from the same sender, paced alike, one send call a datagram of
-111 events, ours in words of 5 bytes, faery's in its own format of 13 ("t64_x16_y16_on8"); in turn. `DOES` says what
-each latency is; the cores are the CPU time of the receiving process.
+sends as the board does, each 192 us the events of a frame, in datagrams of at most 280 words, which the kernel cuts
+out of one train (UDP_SEGMENT). *Beside faery*: both receive from the same sender, paced alike, one send call a
+datagram of 111 events, ours in words of 5 bytes, faery's in its own format of 13 ("t64_x16_y16_on8"); in turn. `DOES`
+says what each latency is; the cores are the CPU time of the receiving process.
+faery looks for packets every 20 ms;
+*a socket loop* is the plain Python receiver: `recv`, and NumPy's view of faery's format, which asks for no decoding.
 
-Peer: faery's UDP receiver. Unit: us from sending to decoded; cores; datagrams lost. Goal: 21.3 million events/s without
-a loss in .15 core (receiving alone .05); beside faery up to 1e7 events/s p50 below 50 us, p99 below 1 ms.
+Peer: faery's UDP receiver, and a socket loop. Unit: us from sending to decoded; cores; datagrams lost. Goal: 21.3
+million events/s without a loss in .15 core (receiving alone .05); beside faery up to 1e7 events/s p50 below 50 us,
+p99 below 1 ms.
 """
 
 from __future__ import annotations
@@ -47,6 +50,7 @@ ALIKE = 111
 DOES = {
     "taxel": "from the kernel's stamp to the end of decoding in the pipeline's thread, and the time of the send call",
     "faery": "from the clock just before the send call to the packet of events in Python",
+    "socket loop": "the same, of one thread that does nothing else",
 }
 
 SEND = """
@@ -86,12 +90,26 @@ p50, p99, most = np.percentile(calls, [50, 99, 100]) / 1e3
 print(json.dumps({"datagrams": len(calls), "call_us": {"p50": p50, "p99": p99, "max": most}}))
 """
 
-FAERY_RECEIVE = """
+#: How each peer names its packets of events, from the port on.
+FAERY = """
+import faery
+stream = iter(faery.events_stream_from_udp((64, 64), ("127.0.0.1", port), format="t64_x16_y16_on8"))
+"""
+LOOP = """
+import socket
+kind = np.dtype([("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("on", "?")])
+link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+link.bind(("127.0.0.1", port))
+stream = (np.frombuffer(link.recv(65536), kind) for _ in iter(int, 1))
+"""
+PEERS = {"faery": "faery"}
+RECEIVE = """
 import json, os, sys, time
-import faery, numpy as np
+import numpy as np
 port = int(sys.argv[1])
 late, events = [], 0
-stream = iter(faery.events_stream_from_udp((64, 64), ("127.0.0.1", port), format="t64_x16_y16_on8"))
+{stream}
 print("ready", flush=True)
 begun = time.process_time()
 for packet in stream:
@@ -101,8 +119,8 @@ for packet in stream:
     events += len(packet)
     late.append(now - int(packet["t"][0]))
 p50, p99 = np.percentile(late, [50, 99]) if late else (0, 0)
-print(json.dumps({"events": events, "p50_us": float(p50), "p99_us": float(p99), "max_us": float(max(late, default=0)),
-                  "cpu_s": time.process_time() - begun}), flush=True)
+print(json.dumps({{"events": events, "p50_us": float(p50), "p99_us": float(p99), "max_us": float(max(late, default=0)),
+                  "cpu_s": time.process_time() - begun}}), flush=True)
 os._exit(0)
 """
 
@@ -194,9 +212,10 @@ def beside_faery(rate: float, seconds: float, scratch: Path) -> dict[str, Any]:
     }
 
 
-def faery(rate: float, seconds: float, port: int) -> dict[str, Any]:
-    """Receive with faery the datagrams of a sender of `rate` events a second, in faery's format."""
-    receiver = subprocess.Popen([sys.executable, "-c", FAERY_RECEIVE, str(port)], stdout=subprocess.PIPE, text=True)
+def received(stream: str, rate: float, seconds: float, port: int) -> dict[str, Any]:
+    """Receive with a peer the datagrams of a sender of `rate` events a second, in faery's format."""
+    code = RECEIVE.format(stream=stream)
+    receiver = subprocess.Popen([sys.executable, "-c", code, str(port)], stdout=subprocess.PIPE, text=True)
     assert receiver.stdout is not None
     receiver.stdout.readline()
     time.sleep(0.3)
@@ -207,12 +226,12 @@ def faery(rate: float, seconds: float, port: int) -> dict[str, Any]:
         receiver.kill()
         receiver.communicate()
         return {"failed": "its receiver never got the end mark"}
-    received = json.loads(printed.splitlines()[-1])
+    came = json.loads(printed.splitlines()[-1])
     return {
         "sent_events_per_s": ALIKE * sent["datagrams"] / seconds,
-        "arrived": received["events"] / (ALIKE * sent["datagrams"]),
-        "cores": received["cpu_s"] / seconds,
-        "latency": {"p50": received["p50_us"], "p99": received["p99_us"], "max": received["max_us"]},
+        "arrived": came["events"] / (ALIKE * sent["datagrams"]),
+        "cores": came["cpu_s"] / seconds,
+        "latency": {"p50": came["p50_us"], "p99": came["p99_us"], "max": came["max_us"]},
     }
 
 
@@ -234,32 +253,30 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
 
 def run(*, quick: bool) -> dict[str, Any]:
     rounds, seconds = (1, 0.5) if quick else (5, 2.0)
-    load, absent = os.getloadavg()[0], missing({"faery": "faery"})
+    load, absent = os.getloadavg()[0], missing(PEERS)
     with tempfile.TemporaryDirectory() as folder:
         scratch = Path(folder)
         worst: dict[str, list[dict[str, Any]]] = {name: [] for name in WAYS}
+        streams = {name: of for name, of in {"faery": FAERY, "socket loop": LOOP}.items() if name not in absent}
         rows: dict[float, dict[str, list[dict[str, Any]]]] = {
-            rate: {"taxel": [], **({} if absent else {"faery": []})} for rate in RATES
+            rate: {name: [] for name in ("taxel", *streams)} for rate in RATES
         }
         for turn in range(rounds):
             for name, how in WAYS.items():
                 worst[name].append(ours(WORST, seconds, scratch, **how))
             for k, rate in enumerate(RATES):
                 rows[rate]["taxel"].append(beside_faery(rate, seconds, scratch))
-                if not absent:
-                    rows[rate]["faery"].append(faery(rate, seconds, 42_000 + 10 * turn + k))
+                for n, (name, stream) in enumerate(streams.items()):
+                    rows[rate][name].append(received(stream, rate, seconds, 42_000 + 100 * n + 10 * turn + k))
     latency = {
         f"{rate:.0e} events/s": {name: _spread(row) for name, row in peers.items()} for rate, peers in rows.items()
     }
     turns = {
-        f"faery's {what} over ours at {rate:.0e} events/s": of
-        for rate, both in rows.items()
+        f"{name}'s {what} over ours at {rate:.0e} events/s": of
+        for rate, all_of in rows.items()
+        for name in streams
         for what, find in (("p50", lambda row: row["latency"]["p50"]), ("cores", lambda row: row["cores"]))
-        if (
-            of := [
-                find(b) / find(a) for a, b in zip(both["taxel"], both.get("faery", ()), strict=False) if "latency" in b
-            ]
-        )
+        if (of := [find(b) / find(a) for a, b in zip(all_of["taxel"], all_of[name], strict=True) if "latency" in b])
     }
     p50s = [row["latency"]["p50"] for peers in rows.values() for row in peers["taxel"]]
     return {

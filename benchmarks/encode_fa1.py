@@ -17,12 +17,12 @@ from taxel import Frames
 from taxel.encode import FA1
 
 
-def numpy_fa1(frames: Frames, theta_0: float) -> list[Any]:
-    """Return (t, taxel, polarity) by equations 5.1 to 5.5; T 0.192 ms."""
-    spikes = []
-    jump, fall = 0.192 * 20 * theta_0, 0.05 * theta_0
+def numpy_fa1(frames: Frames, theta_0: float, fall: float = 0.05) -> list[Any]:
+    """Return (t, taxel, polarity) by equations 5.1 to 5.5; T 0.192 ms, the threshold falls by `fall` a sample."""
+    spikes, shape = [], frames.values[0].shape
+    jump, fall = 0.192 * 20 * theta_0, fall * theta_0
     last = np.maximum(frames.values[0], 0).astype(np.float64) ** 0.7
-    u, theta, fired = np.zeros((64, 64)), np.full((64, 64), theta_0), np.zeros((64, 64), bool)
+    u, theta, fired = np.zeros(shape), np.full(shape, theta_0), np.zeros(shape, bool)
     for t, picture in zip(frames.t[1:], frames.values[1:], strict=True):
         rho = np.maximum(picture, 0).astype(np.float64) ** 0.7
         theta = np.where(fired, theta + jump, np.where(theta > theta_0, theta - fall, theta_0))

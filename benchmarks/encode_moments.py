@@ -21,7 +21,7 @@ LEVELS = 20
 
 
 def numpy_moments(frames: Frames, tare: Tare) -> list[Any]:
-    """Return (t, level, reached or left) of area, total, peak and the displacement of the centre."""
+    """Return (t, train of a level that is reached or left) of area, total, peak and the displacement of the centre."""
     spaced = [np.geomspace(*RANGES[name], LEVELS) for name in ("area", "total", "peak", "displacement_mm")]
     which = np.repeat([0, 1, 2, 3, 3, 4, 4], LEVELS)
     levels = np.concatenate([*spaced, -spaced[3], spaced[3], -spaced[3]])
@@ -41,7 +41,9 @@ def numpy_moments(frames: Frames, tare: Tare) -> list[Any]:
             origin = None
         reached = np.where(levels > 0, moments[which] >= levels, moments[which] <= levels)
         if before is not None and (reached != before).any():
-            spikes += [(t, level) for level in np.flatnonzero(reached != before)]
+            spikes += [
+                (t, level if reached[level] else len(levels) + level) for level in np.flatnonzero(reached != before)
+            ]
         before = reached
     return spikes
 

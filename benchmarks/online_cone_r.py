@@ -88,7 +88,7 @@ def compared(parameters, footfalls, steps):
         "online_s": {"median": float(np.median(mine)), "largest": float(mine.max())},
         "from nothing_s": {"median": float(np.median(whole)), "solving alone": float(np.median(solve))},
         "ratio, median": float(np.median(mine / whole)),
-        "ratio, quartiles": np.percentile(mine / whole, [25, 75]).tolist(),
+        "times": np.percentile(whole / mine, [25, 50, 75]).tolist(),
         "ratio to solving alone, median": float(np.median(mine / solve)),
         "objectives differ by at most": float(off.max()),
         "engine": online.engine_,
@@ -112,4 +112,11 @@ def run(*, quick):
             results[event] = compared(*found, steps)
     if not results:
         results["drawn"] = compared(*drawn(), steps)
-    return {"question": __doc__.splitlines()[0], **stamp(), "results": results}
+    times = {f"{event}, from nothing over OnlineConeR": one["times"] for event, one in results.items()}
+    return {
+        "question": __doc__.splitlines()[0],
+        **stamp(),
+        "results": results,
+        "ratios": {name: middle for name, (_, middle, _) in times.items()},
+        "spread": {name: [low, high] for name, (low, _, high) in times.items()},
+    }

@@ -10,7 +10,6 @@ read no datagram, a quarter of either at most.
 
 from __future__ import annotations
 
-import json
 import statistics
 import subprocess
 import sys
@@ -19,37 +18,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import _opening
 import numpy as np
 from _goals import Goal, at_most
+from _opening import STEPS
 from _rounds import compared, stamp, summary
 from recording_write import BYTES, HEADER, datagrams
 
 from taxel import _core
 
-#: The code of each process, with the file's path as `path` and a folder as `folder`.
-STEPS = {
-    "imported": "",
-    "opened": "taxel.open(path)",
-    "listed": "r = taxel.open(path); r.notes, r.registers, r.zeroings, r.detections, r.verdict, list(r.sources)",
-    "decoded": "from taxel import _core; _core.RecordingReader(path).decode('direct')",
-    "read": "taxel.open(path).events",
-    "sliced": "r = taxel.open(path); r.between(0, float(r.events.t[-1]) / 2).events",
-    "cut": "taxel.cut(taxel.open(path), columns=slice(0, 32))",
-    "cut, its events": "taxel.cut(taxel.open(path), columns=slice(0, 32))[0].events",
-    "copied": "taxel.convert(path, folder + '/copy.mcap', overwrite=True)",
-    "to .npz": "taxel.convert(taxel.open(path).between(0, 1e5), folder + '/copy.npz', overwrite=True)",
-}
-MEASURED = """
-import pathlib, sys, time
-import taxel
-taxel.open
-path, folder = sys.argv[1:]
-cpu, wall = time.process_time(), time.perf_counter()
-{step}
-done = time.process_time() - cpu, time.perf_counter() - wall
-peak = pathlib.Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0]
-print(*done, int(peak) / 1024)
-"""
+#: Words of the figures that are better when smaller.
+SMALLER = ("/ decoded",)
 
 
 def goals(result: Mapping[str, Any]) -> list[Goal]:
@@ -69,11 +48,9 @@ def run(*, quick: bool) -> dict[str, Any]:
         writer.datagrams(np.arange(n, dtype=np.int64) * 13_100, np.arange(n, dtype=np.uint64), offsets, raw)
         writer.finish("{}")
         for _ in range(rounds):
-            for name, step in STEPS.items():
-                code = MEASURED.format(step=step)
-                done = subprocess.run(
-                    [sys.executable, "-c", code, path, folder], capture_output=True, text=True, check=True
-                )
+            for name in STEPS:
+                command = [sys.executable, Path(_opening.__file__), name, path, folder]
+                done = subprocess.run(command, capture_output=True, text=True, check=True)
                 found[name].append([float(value) for value in done.stdout.split()])
     none = statistics.median(one[2] for one in found["imported"])
     results = {
@@ -95,7 +72,3 @@ def run(*, quick: bool) -> dict[str, Any]:
         "ratios": ratios,
         "spread": spread,
     }
-
-
-if __name__ == "__main__":
-    print(json.dumps(run(quick="--quick" in sys.argv), indent=1))

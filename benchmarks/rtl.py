@@ -86,6 +86,10 @@ def played(build: Build, ticks: Any, seconds: float) -> dict[str, float]:
     return {"bench": bench / seconds, "whole": whole / seconds, "events": events}
 
 
+#: Words of the figures that are better when smaller.
+SMALLER = ("CPU s",)
+
+
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
     return at_most({f"{name}, CPU s a second of board time": one for name, one in GOALS.items()}, result["ratios"])

@@ -10,13 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from taxel import wire
+from taxel import Array, SpikeTrains, wire
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks"))
+import _memory
 import _peer
 import _rounds
+import _touch
+import latency
+import learn_cone_x
 import wire_decode
 
 
@@ -102,15 +107,52 @@ def test_peers_run_in_turn_with_ours_and_long_ones_once(clock: Clock) -> None:
         "slow": clock.peer("s", 50.0),
         "stopped": clock.peer("x", 60.0, stopped="after 60 s", limit_s=60),
         "broken": clock.peer("b", 0.0, failed=["ImportError"]),
-        "saved": clock.peer("k", 0.0, cpu_s=300.0, kept="2026-11-20"),
     }
     ours, found = _peer.in_turn(clock.run("o", 1.0, 1.0, 1.0, 2.0), peers, 3)
-    assert clock.called == "oofsxbkofof"
+    assert clock.called == "oofsxbofof"
     assert ours["cpu_s"]["rounds"] == [1.0, 1.0, 2.0]
     assert found.pop("broken") == {"failed": ["ImportError"]}
     times = {name: (one["times"], one["rounds"]) for name, one in found.items()}
-    assert times == {"fast": (2.0, 3), "slow": (50.0, 1), "stopped": (60.0, 1), "saved": (300.0, 1)}
+    assert times == {"fast": (2.0, 3), "slow": (50.0, 1), "stopped": (60.0, 1)}
     assert found["fast"]["quartiles"] == [1.5, 2.5]
+    told = _peer.ratios_of({"small": {"ours": ours, **found}})
+    assert told["ratios"] == {"small, fast": 2.0, "small, slow": 50.0, "small, stopped": 60.0}
+    assert told["spread"] == {"small, fast": [1.5, 2.5]}
+    assert told["larger"] == ["small, stopped"]
+
+
+@pytest.mark.parametrize(
+    ("theirs", "share"),
+    [
+        ([(1000, 0, 1), (3000, 1, -1)], 1.0),
+        ([(1000, 0, 1), (2000, 1, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 0, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 1, 1)], 0.5),
+        ([(1000, 0, 1)], 1.0),
+        ([(3000, 1, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 1, -1), (3000, 0, 1), (3000, 0, 1)], 0.5),
+    ],
+)
+def test_spikes_are_equal_in_time_train_and_value(theirs: list[tuple[int, ...]], share: float) -> None:
+    """Ours may go on after the last of the NumPy version, and must not have others before."""
+    ours = SpikeTrains.from_lists([[1.0], [3.0]], stop=4.0, values=[[1.0], [-1.0]])
+    assert _touch.shared(ours, theirs) == share
+
+
+def test_latencies_of_rounds_are_summed_where_they_count_and_else_the_median() -> None:
+    rounds = [{"found": n, "lost": {"queue": 1}, "late": {"p50": p}} for n, p in ((3, 1.0), (4, 9.0), (5, 2.0))]
+    assert latency.together(rounds) == {
+        "found": 12,
+        "lost": {"queue": 3},
+        "late": {"p50": 2.0, "p50 quartiles": [1.5, 5.5]},
+    }
+
+
+def test_a_touch_is_answered_once() -> None:
+    """The neuron of the latency does not fire again for one touch, and does for the next."""
+    neuron, weights, *_ = latency.readout(Array(8, 8))[0].neurons["contact"]
+    spikes = SpikeTrains.from_lists([[10.0, 10.0 + latency.EACH_US * 0.75e-3], []], stop=60.0)
+    assert len(neuron.run(weights, spikes)) == 2
 
 
 def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:
@@ -132,3 +174,58 @@ def test_the_c_loop_decodes_what_ours_does(tmp_path: Path, into: str) -> None:
         if columns is not None:
             assert np.array_equal(columns.t[: len(ours)], ours.t)
             assert name != "pairs" or np.array_equal(columns.intensity[: len(ours)], ours.intensity)
+
+
+def judged(**of_peer: Any) -> dict[str, bool]:
+    """Return the goals of a solved and an infeasible case of the memory task, with one peer in both."""
+    ours = {"verdict": "solved", "objective": 1.0}, {"verdict": "infeasible", "certificate checked": True}
+    name = next(iter(learn_cone_x.PEERS))
+    peer = {"verdict": "solved", "objective, relative difference": 1e-9} | of_peer
+    cases = {"1/1": {"ConeX": ours[0], name: peer}, "2/2": {"ConeX": ours[1], name: {"verdict": "infeasible"}}}
+    return {goal.what: goal.reached for goal in learn_cone_x.goals({"cases": cases}) if "times" not in goal.what}
+
+
+def test_conex_must_agree_with_its_peers() -> None:
+    agree, apart = "1/1, share of peers with ConeX's verdict", "1/1, objectives differ by at most"
+    for of_peer, lacks in (
+        ({}, set()),
+        ({"verdict": "infeasible"}, {agree}),
+        ({"objective, relative difference": -1e-4}, {apart}),
+    ):
+        found = {what: reached for what, reached in judged(**of_peer).items() if what.startswith(("1/1, ", "2/2, "))}
+        assert {what for what, reached in found.items() if not reached} == lacks
+        assert found["2/2, certificate of infeasibility checked"]
+
+
+def test_a_peer_with_rows_on_demand_gets_those_that_its_solution_breaks() -> None:
+    """The rows that it ends with are enough: the verdict and the least weights are those of all rows."""
+    n, p, held = 20, 3, [np.empty((0, 20))]
+    equal = _memory.equalities(n, p)
+
+    def solve(rows: Any, limits: Any) -> tuple[str, Any, float]:
+        held[0] = np.concatenate([held[0], rows])
+        most.extend(limits)
+        return answer(held[0], np.array(most))
+
+    def answer(rows: Any, limits: Any) -> tuple[str, Any, float]:
+        found = minimize(
+            lambda w: 0.5 * w @ w,
+            np.zeros(n),
+            jac=lambda w: w,
+            bounds=[(-_memory.BOUND, _memory.BOUND)] * n,
+            constraints=[
+                {"type": "eq", "fun": lambda w: equal @ w - _memory.THETA_0, "jac": lambda w: equal},
+                *([{"type": "ineq", "fun": lambda w: limits - rows @ w, "jac": lambda w: -rows}] if len(rows) else []),
+            ],
+            tol=1e-12,
+        )
+        return "solved", found.x, float(found.fun)
+
+    most: list[float] = []
+    verdict, objective = _memory.on_demand(n, p, solve)
+    rows, limits = _memory.every_row(n, p)
+    _, w, least = answer(rows, limits)
+    assert verdict == "solved"
+    assert 0 < len(held[0]) < len(rows) / 4
+    assert (rows @ w <= limits + 1e-7).all()
+    assert objective == pytest.approx(least, rel=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -13,13 +14,12 @@ from types import SimpleNamespace
 import pytest
 from shell import call
 
-from taxel.cli.bench import _load, _Others, changed_parts, goals_of, made_of
+from taxel.cli.bench import _better, _load, _Others, _table, changed_parts, goals_of, made_of
 from taxel.report import installed_sources
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
-import _peer  # noqa: E402  what benchmarks share
-import _rounds  # noqa: E402
+import _rounds  # noqa: E402  what benchmarks share
 
 BENCHMARK = '''"""How fast is it?"""
 from _goals import at_least
@@ -93,6 +93,23 @@ def test_a_change_in_what_is_measured_is_named(folder: Path, file: str, old: str
     assert changed(folder) == moved
 
 
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("recording_open", ["taxel.recording.cut", "taxel.recording.opening", "taxel._core.RecordingReader"]),
+        ("panel", ["taxel.cli.view", "taxel.cli.info", "taxel.cli.convert", "crates/taxel-panel/web/main.js"]),
+        ("bridge", ["taxel.cli.bridge", "taxel.live.bridge"]),
+        ("information", ["taxel.cli.information"]),
+    ],
+)
+def test_code_that_runs_in_another_process_or_on_the_page_counts(name: str, parts: list[str]) -> None:
+    path = ROOT / "benchmarks" / f"{name}.py"
+    before = made_of(path, _load(path))
+    changed = changed_parts({"made_of": before | dict.fromkeys(parts, "other")}, before)
+    assert set(parts) <= before.keys()
+    assert len(changed) == len(parts)
+
+
 def test_a_result_without_its_sources_is_stale(folder: Path) -> None:
     (folder / "results" / "fast.json").write_text("{}")
     assert changed(folder) == ["its sources were not recorded"]
@@ -124,6 +141,14 @@ QUIET = {"cpu": "one, AVX2", "others": 0.04, "cores": 2}
             f"  of this code\n{ALL}",
         ),
         (
+            MET | {"ratios": {"a": 3.0, "b": 2.5, "c": 4.0}, "larger": ["c"], "machine": QUIET, "date": "2026-11-25"},
+            "fast: 2 of 3 goals reached\n  one, AVX2; commit 0123abc, 2026-11-25; other programs used 0.0 of 2 cores\n"
+            "  of this code\n"
+            "  not reached         2.5 <= 2          b\n"
+            "  reached               3 >= 3          a\n"
+            "  reached             > 4 >= 1          c\n",
+        ),
+        (
             {"ratios": {"a": 2.9996, "b": 2.5}, "spread": {"a": [2.6, 3.1234]}, "machine": QUIET | {"others": 0.7}},
             "fast: 0 of 3 goals reached\n  one, AVX2; commit 0123abc; other programs used 0.7 of 2 cores\n"
             "  of this code\n"
@@ -138,18 +163,18 @@ QUIET = {"cpu": "one, AVX2", "others": 0.04, "cores": 2}
             "  of earlier code; changed: _shared, fast, logic/top.sv,",
         ),
         (
-            MET | {"machine": QUIET, "stable": False, "kept": {"x": "2026"}},
+            MET | {"machine": QUIET, "stable": False},
             "fast: 3 of 3 goals reached\n"
-            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; 1 time of peers\n"
-            "  of another day; times vary by more than 15 %: by its own judgement\n  of this code\n" + ALL,
+            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; not stable by\n"
+            "  its own judgement\n  of this code\n" + ALL,
         ),
         (
             MET
             | {"results": {name: {"cpu_s": 1.0, "stable": name == "c"} for name in "abcde"}, "avx2": {"results": {}}}
             | {"machine": QUIET},
             "fast: 3 of 3 goals reached\n"
-            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; times vary by\n"
-            "  more than 15 %: a; b and 2 more\n  of this code\n" + ALL,
+            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; quartiles more\n"
+            "  than 15 % of the median apart: a; b and 2 more\n  of this code\n" + ALL,
         ),
     ],
 )
@@ -160,10 +185,79 @@ def test_the_list_of_goals_says_what_is_reached_on_what_beside_what_and_of_which
     shutil.copy(ROOT / "benchmarks" / "_goals.py", folder)
     (folder / "results" / "fast.json").write_text(json.dumps({"commit": "0123abc", "made_of": now(folder), **result}))
     code, out, _ = call(capsys, "bench", "--goals", "--folder", folder)
-    assert code == 0
+    assert code == 1
     assert out.startswith(said)
     assert "\n\nother: no result\n\n3 goals: " in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(("b", "code"), [(2.0, 0), (2.5, 1), (None, 1)])
+def test_goals_that_are_not_reached_or_not_measured_end_with_1(
+    folder: Path, capsys, b: float | None, code: int
+) -> None:
+    (folder / "fast.py").write_text(JUDGED)
+    shutil.copy(ROOT / "benchmarks" / "_goals.py", folder)
+    ratios = {name: one for name, one in (MET["ratios"] | {"b": b}).items() if one is not None}
+    (folder / "results" / "fast.json").write_text(json.dumps({"ratios": ratios, "made_of": {}}))
+    assert call(capsys, "bench", "fast", "--goals", "--folder", folder)[0] == code
+
+
+def test_benchmarks_are_listed_with_what_they_took(folder: Path, capsys) -> None:
+    (folder / "results" / "fast.json").write_text(json.dumps({"took_s": 12.4}))
+    code, out, _ = call(capsys, "bench", "--folder", folder)
+    assert (code, out.splitlines()) == (
+        0,
+        [f"fast{'12 s':>33}  How fast is it?", f"other{'no result':>32}  How fast is it?"],
+    )
+
+
+@pytest.mark.parametrize("saved", [{}, {"left out": {}}, {"left out": {"peer": "not installed"}}, None])
+def test_a_result_with_peers_is_not_replaced_by_one_without(
+    folder: Path, capsys, monkeypatch: pytest.MonkeyPatch, saved: dict | None
+) -> None:
+    monkeypatch.setattr("taxel.cli.bench._changed", lambda folder: [])
+    monkeypatch.setattr(
+        "taxel.cli.bench._run",
+        lambda file, quick: {"ratios": {"of the run": 1.0}, "machine": {"cores": 2}, "left out": {"peer": "absent"}},
+    )
+    place = folder / "results" / "fast.json"
+    place.unlink()
+    if saved is not None:
+        place.write_text(json.dumps({"took_s": 1.0} | saved))
+    code, _, err = call(capsys, "bench", "fast", "--folder", folder)
+    if saved is None or saved.get("left out"):
+        assert code == 0
+        assert "of the run" in place.read_text()
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", json.loads(place.read_text())["date"])
+    else:
+        assert code
+        assert "has peer, which is left out here; make bench" in err
+        assert json.loads(place.read_text()) == {"took_s": 1.0} | saved
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("[!_]*.py")), ids=lambda path: path.stem)
+def test_the_table_says_which_way_a_figure_is_better_as_its_goal_does(path: Path) -> None:
+    result = json.loads((path.parent / "results" / f"{path.stem}.json").read_text())
+    benchmark = _load(path)
+    for goal in goals_of(benchmark, result):
+        if goal.what in result.get("ratios", {}):
+            assert _better(goal.what, benchmark) == f"{'smaller' if goal.at_most else 'larger'} is better"
+    stated = (*getattr(benchmark, "SMALLER", ()), *getattr(benchmark, "COUNTS", ()))
+    # What earlier code did not measure has no row yet.
+    assert all(word in path.read_text() for word in stated)
+
+
+def test_the_table_groups_figures_and_says_of_bounds_that_they_are_bounds() -> None:
+    result = {"ratios": {"a": 3.0, "b, cores": 2.0, "touches": 5}, "spread": {"a": [2.5, 3.5]}, "larger": ["a"]}
+    benchmark = SimpleNamespace(goals=lambda result: [], SMALLER=("cores",), COUNTS=("touches",))
+    assert _table("fast", result | {"took_s": 2.0, "machine": QUIET}, benchmark).splitlines()[1:] == [
+        "  larger is better:",
+        "    a: > 3 (2.5 to 3.5)",
+        "  smaller is better:",
+        "    b, cores: 2",
+        "  counts:",
+        "    touches: 5",
+    ]
 
 
 def test_the_list_of_goals_ends_with_how_many_are_reached(folder: Path, capsys) -> None:
@@ -255,55 +349,3 @@ def test_the_list_of_goals_names_what_has_changed_modules_before_the_compiled_pa
     assert compiled > 1
     out = call(capsys, "bench", "fast", "--goals", "--folder", folder)[1]
     assert f"  of earlier code; changed: _shared, {compiled} compiled names\n" in out
-
-
-PEER = "import json, sys\nprint(json.dumps({'cpu_s': float(sys.argv[1]), 'verdict': 'solved'}))\n"
-
-
-@pytest.fixture
-def peer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A peer that reports its time, with a file of the test for saved times."""
-    monkeypatch.setattr(_peer, "KEPT", tmp_path / "peers.json")
-    monkeypatch.setenv(_peer.PATIENT, "1")
-    (tmp_path / "slow.py").write_text(PEER)
-    return str(tmp_path / "slow.py")
-
-
-def ask(peer: str, seconds: float, *, quick: bool = False) -> dict[str, object]:
-    return _peer.ask(peer, seconds, packages="numpy", limit=900, quick=quick)
-
-
-def test_the_time_of_a_peer_that_needs_minutes_is_saved_and_marked_as_saved(peer: str) -> None:
-    assert "kept" not in ask(peer, 300.0)
-    again = ask(peer, 300.0)
-    assert again["cpu_s"] == 300.0
-    assert _peer.processor() in str(again["kept"])
-    assert _peer.kept_of({"a": {"slow": again, "ours": {}}}) == {"a, slow": again["kept"]}
-    assert "kept" not in ask(peer, 300.0, quick=True)
-
-
-def test_a_quick_peer_is_measured_each_time(peer: str) -> None:
-    ask(peer, 3.0)
-    assert "kept" not in ask(peer, 3.0)
-
-
-def test_a_saved_time_counts_only_on_its_processor_and_for_its_code(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    ask(peer, 300.0)
-    Path(peer).write_text(PEER + "# a comment\n")
-    assert "kept" in ask(peer, 300.0)
-    with monkeypatch.context() as other:
-        other.setattr(_peer, "processor", lambda: "another model")
-        other.delenv(_peer.PATIENT)
-        assert "kept" not in ask(peer, 300.0)
-    with monkeypatch.context() as other:
-        other.setattr(_peer, "version", lambda package: "0.0")
-        other.delenv(_peer.PATIENT)
-        assert "kept" not in ask(peer, 300.0)
-    Path(peer).write_text(PEER.replace("solved", "infeasible"))
-    assert ask(peer, 300.0)["verdict"] == "infeasible"
-
-
-def test_the_time_of_a_peer_that_was_stopped_is_not_saved(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(_peer.PATIENT)
-    ask(peer, 300.0)
-    assert not _peer.KEPT.exists()

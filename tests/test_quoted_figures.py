@@ -14,6 +14,8 @@ ROOT = Path(__file__).parent.parent
 #: Page, the words around a figure, the result, and the way to it in that.
 REST = ("results", "at rest")
 AT_5_KHZ, BYTE = "64 x 64 at 5.2 kHz", ("callback_us_from", "last byte", "p50")
+PER_GB = ("index", "wall_s_per_gb")
+RUNNING = "taxel, local load, two running means, times real time"
 STREAM = "decoded, {}, version 2 / version 1 as one stream"
 QUOTED = [
     ("README.md", r"\(([\d.]+) ms at the median from", "latency", (*REST, AT_5_KHZ, *BYTE), 1e3),
@@ -36,6 +38,15 @@ QUOTED = [
         ("ratios", "taxel, local load, times real time"),
         1.0,
     ),
+    ("ROADMAP.md", r"with two running means (\d+) x", "encode_local_load", ("ratios", RUNNING), 1.0),
+    ("ROADMAP.md", r"([\d.]+) GB a CPU second", "recording_write", ("results", "taxel, none", "rate"), 1e9),
+    ("ROADMAP.md", r"bench capture_udp` \| (\d+) M", "capture_udp", ("worst_case", "sent_events_per_s"), 1e6),
+    ("ROADMAP.md", r"a GB indexed in ([\d.]+) s", "panel", ("seeking", 0, *PER_GB), 1.0),
+    ("ROADMAP.md", r"of version 2 in ([\d.]+) s", "panel", ("seeking", 1, *PER_GB), 1.0),
+    ("ROADMAP.md", r"60 footfalls in ([\d.]+) s", "information", ("results", "footfalls", "wall_s"), 1.0),
+    ("ROADMAP.md", r"([\d.]+) x real time \(a ball\)", "contact", ("ratios", "a ball, times real time"), 1.0),
+    ("docs/information.md", r"take ([\d.]+) or [\d.]+ s", "information", ("results", "footfalls", "cpu_s"), 1.0),
+    ("docs/information.md", r"take [\d.]+ or ([\d.]+) s", "information", ("results", "strides", "cpu_s"), 1.0),
     ("docs/limits.md", r"callback is (\d+) us with version 2", "latency", (*REST, AT_5_KHZ, *BYTE), 1.0),
     ("docs/limits.md", r"and (\d+) us with version 1", "latency", (*REST, f"version 1, {AT_5_KHZ}", *BYTE), 1.0),
     (

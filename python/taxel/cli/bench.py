@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import json
 import os
@@ -26,39 +27,41 @@ from taxel.cli._app import app
 
 __all__ = ["bench", "changed_parts", "doubts_of", "goals_of", "made_of"]
 
-#: Set by --peers: benchmarks then wait for peers that need minutes (benchmarks/_peer.py).
-_PATIENT = "TAXEL_BENCH_PEERS"
 #: How the parts of a result begin that are compiled.
 _COMPILED = "taxel._core."
 #: How the rows begin that were measured with AVX2 alone (benchmarks/_instructions.py).
 _AVX2 = "AVX2: "
 _VERDICTS = ("reached", "not reached", "not measured")
+#: The order in which goals are listed.
+_ORDER = (*_VERDICTS[1:], _VERDICTS[0])
 #: The share of all cores that other programs may use while times are measured.
 _BUSY = 0.1
 
 
 @app.command()
 def bench(
-    name: Annotated[str, typer.Argument(help="The name of a file of benchmarks/ without .py, or all.")] = "all",
+    name: Annotated[
+        str | None,
+        typer.Argument(help="The name of a file of benchmarks/ without .py, or all; lists them if left out."),
+    ] = None,
     folder: Annotated[Path, typer.Option(help="The folder of the benchmarks, in a checkout of taxel.")] = Path(
         "benchmarks"
     ),
     quick: Annotated[bool, typer.Option(help="Run few rounds, as a test; writes no result.")] = False,
-    peers: Annotated[
-        bool, typer.Option("--peers", help="Wait for peers that need minutes, and save their times for this processor.")
-    ] = False,
     goals: Annotated[
         bool,
         typer.Option(
             "--goals",
-            help="List the goals of the saved results, reached or not, what speaks against times, and changed code.",
+            help="List the goals of the saved results, what speaks against times, and changed code; "
+            "exit code 1 where a goal is not reached or not measured.",
         ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Compare the speed of taxel with other libraries, in one run; write the ratios to benchmarks/results/.
 
-    Peers that are not installed are left out, and named.
+    Peers that are not installed are left out, and named; a result that has them is then kept. Without NAME, the
+    benchmarks are listed, with what each took last.
 
     Example: taxel bench wire_decode
     """
@@ -67,13 +70,17 @@ def bench(
         raise ProblemError(
             f"{folder}: holds no benchmark; run this in a checkout of taxel, or name its folder by --folder"
         )
-    if name != "all" and name not in files:
+    if name is None and not goals:
+        typer.echo("\n".join(_listed(folder, stem, file) for stem, file in files.items()))
+        return
+    if name not in (None, "all", *files):
         raise ProblemError(f"no benchmark {name!r}: there are {', '.join(files)} and all")
-    names = list(files) if name == "all" else [name]
+    names = [name] if name in files else list(files)
     # The modules that benchmarks share lie in the same folder; their names begin with an underscore.
     sys.path.insert(0, str(folder.resolve()))
     if goals:
-        _list_goals(folder, files, names)
+        if not _list_goals(folder, files, names):
+            raise typer.Exit(1)
         return
     changed = [] if quick else _changed(folder)
     if changed:
@@ -81,17 +88,22 @@ def bench(
             f"{', '.join(changed[:3])}{' ...' * (len(changed) > 3)}: changed since the last commit, "
             "which a result names; commit first, or give --quick"
         )
-    if peers:
-        os.environ[_PATIENT] = "1"
     for stem in names:
         begun, others, benchmark = time.monotonic(), _Others(), _load(files[stem])
         result = _run(files[stem], quick=quick)
         result["took_s"] = round(time.monotonic() - begun, 1)
+        result["date"] = time.strftime("%Y-%m-%d", time.gmtime())
         result["machine"]["others"] = others.cores()
         if not quick:
             result["made_of"] = made_of(files[stem], benchmark)
             place = folder / "results" / f"{stem}.json"
             place.parent.mkdir(exist_ok=True)
+            lost = sorted(result.get("left out", {}).keys() - _saved(place).get("left out", {}).keys())
+            if lost and place.exists():
+                raise ProblemError(
+                    f"{place}: not written, as it has {', '.join(lost)}, which is left out here; "
+                    "make bench installs peers"
+                )
             text = json.dumps(result, indent=1) + "\n"
             write_whole(place, partial(_put, text), overwrite=True)
             if not as_json:
@@ -99,7 +111,7 @@ def bench(
         if as_json:
             typer.echo(json.dumps(result))
         else:
-            typer.echo(_table(stem, result, goals_of(benchmark, result)))
+            typer.echo(_table(stem, result, benchmark))
 
 
 def made_of(file: Path, benchmark: Any) -> dict[str, str]:
@@ -142,16 +154,15 @@ def goals_of(benchmark: Any, result: Mapping[str, Any]) -> list[Any]:
 
 
 def doubts_of(result: Mapping[str, Any]) -> list[str]:
-    """Return what speaks against the times of a result: other programs, other days, times that vary."""
-    machine, kept = result.get("machine", {}), result.get("kept", {})
+    """Return what speaks against the times of a result: other programs, times that vary."""
+    machine = result.get("machine", {})
     others = machine.get("others")
     doubts = [_others(machine)] * (others is None or others > _BUSY * machine["cores"])
-    doubts += [f"{counted(len(kept), 'time')} of peers of another day"] * bool(kept)
     # With AVX2 alone a row has the same name.
     vary = list(dict.fromkeys(name for name, one in _measured(result) if one.get("stable") is False))
-    vary = vary or ["by its own judgement"] * (result.get("stable") is False)
+    doubts += ["not stable by its own judgement"] * (not vary and result.get("stable") is False)
     more = f" and {len(vary) - 2} more" * (len(vary) > 2)
-    return doubts + [f"times vary by more than 15 %: {'; '.join(vary[:2])}{more}"] * bool(vary)
+    return doubts + [f"quartiles more than 15 % of the median apart: {'; '.join(vary[:2])}{more}"] * bool(vary)
 
 
 def _others(machine: Mapping[str, Any]) -> str:
@@ -168,21 +179,38 @@ def _measured(part: Mapping[str, Any], name: str = "result") -> list[tuple[str, 
     return rows + [row for key, one in inner for row in _measured(one, key)]
 
 
-def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
+def _listed(folder: Path, stem: str, file: Path) -> str:
+    """Return a benchmark's name, what its last run took, and its question."""
+    took = _saved(folder / "results" / f"{stem}.json").get("took_s")
+    about = (ast.get_docstring(ast.parse(file.read_bytes())) or "").partition("\n")[0]
+    first = f"{stem:<28}{'no result' if took is None else f'{took:.0f} s':>9}  "
+    return _wrapped(about, first, " " * len(first))
+
+
+def _saved(place: Path) -> dict[str, Any]:
+    """Return a saved result, empty if there is none."""
+    saved: dict[str, Any] = json.loads(place.read_text(encoding="utf-8")) if place.exists() else {}
+    return saved
+
+
+def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> bool:
+    """Print the goals, those first that are not reached; return whether all are reached."""
     verdicts: list[str] = []
-    stale = 0
+    stale, absent = 0, 0
     for name in names:
-        place = folder / "results" / f"{name}.json"
-        if not place.exists():
+        result = _saved(folder / "results" / f"{name}.json")
+        if not result:
+            absent += 1
             typer.echo(f"{name}: no result\n")
             continue
-        result = json.loads(place.read_text(encoding="utf-8"))
         benchmark = _load(files[name])
         goals, changed = goals_of(benchmark, result), changed_parts(result, made_of(files[name], benchmark))
+        goals.sort(key=lambda goal: _ORDER.index(_verdict(goal)))
         stale += bool(changed)
         verdicts += [_verdict(goal) for goal in goals]
         machine = result.get("machine", {})
-        about = [machine.get("cpu", "unknown processor"), f"commit {result.get('commit', 'unknown')}", _others(machine)]
+        commit = f"commit {result.get('commit', 'unknown')}" + f", {result.get('date')}" * ("date" in result)
+        about = [machine.get("cpu", "unknown processor"), commit, _others(machine)]
         about += [doubt for doubt in doubts_of(result) if doubt not in about]
         reached = sum(goal.reached for goal in goals)
         typer.echo(f"{name}: {reached} of {counted(len(goals), 'goal')} reached")
@@ -192,6 +220,7 @@ def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
     counts = [f"{verdicts.count(one)} {one}" for one in _VERDICTS]
     typer.echo(f"{counted(len(verdicts), 'goal')}: {', '.join(counts)}")
     typer.echo(f"{counted(len(names), 'benchmark')}: {stale} with a result of earlier code")
+    return not absent and set(verdicts) <= {_VERDICTS[0]}
 
 
 def _wrapped(text: str, first: str = "  ", later: str = "  ") -> str:
@@ -205,7 +234,7 @@ def _verdict(goal: Any) -> str:
 
 def _row(goal: Any, result: Mapping[str, Any]) -> str:
     """Return a goal as a row: whether it is reached, the figure, the limit, the name, and the quartiles of rounds."""
-    figure = "" if goal.figure is None else f"{goal.figure:.5g}"
+    figure = "" if goal.figure is None else _figure(goal.what, goal.figure, result, 5)
     first = f"  {_verdict(goal):<13}{figure:>10} {'<=' if goal.at_most else '>='} {goal.limit:<10.5g} "
     spread = result.get("spread", {}).get(goal.what)
     rounds = "" if spread is None else f" ({spread[0]:.3g} to {spread[1]:.3g})"
@@ -275,16 +304,30 @@ def _load(path: Path) -> Any:
     return module
 
 
-def _table(stem: str, result: dict[str, Any], goals: Sequence[Any]) -> str:
-    ratios = result.get("ratios", {})
-    spread = {name: f" ({low:.3g} to {high:.3g})" for name, (low, high) in result.get("spread", {}).items()}
-    rows = [
-        f"  {name}: {f'{one:.3g}' if isinstance(one, float) else one}{spread.get(name, '')}"
-        for name, one in ratios.items()
-    ]
+def _figure(name: str, value: Any, result: Mapping[str, Any], digits: int) -> str:
+    """Return a figure as text; one of a peer that was stopped is a bound."""
+    larger = "> " * (name.removeprefix(_AVX2) in result.get("larger", ()))
+    return larger + (f"{value:.{digits}g}" if isinstance(value, float) else str(value))
+
+
+def _better(name: str, benchmark: Any) -> str:
+    """Return which figures of this name are better, by the words that the benchmark states."""
+    if any(word in name for word in getattr(benchmark, "COUNTS", ())):
+        return "counts"
+    return (
+        "smaller is better" if any(word in name for word in getattr(benchmark, "SMALLER", ())) else "larger is better"
+    )
+
+
+def _table(stem: str, result: Mapping[str, Any], benchmark: Any) -> str:
+    groups: dict[str, list[str]] = {}
+    for name, one in result.get("ratios", {}).items():
+        rounds = result.get("spread", {}).get(name)
+        spread = "" if rounds is None else f" ({rounds[0]:.3g} to {rounds[1]:.3g})"
+        groups.setdefault(_better(name, benchmark), []).append(f"    {name}: {_figure(name, one, result, 3)}{spread}")
+    rows = [row for better, of in groups.items() for row in (f"  {better}:", *of)]
     left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
-    saved = [f"  saved, not measured in this run: {peer}: of {when}" for peer, when in result.get("kept", {}).items()]
-    head = f"{stem}: ratios (ours over the peer's, above 1 is faster) with quartiles of rounds; {result['took_s']:g} s"
-    lacks = [_row(goal, result) for goal in goals if not goal.reached]
+    head = f"{stem}: ratios to peers and other figures, with quartiles of rounds; {result['took_s']:g} s"
+    lacks = [_row(goal, result) for goal in goals_of(benchmark, result) if not goal.reached]
     doubts = [f"  {doubt}" for doubt in doubts_of(result)]
-    return "\n".join([head, *rows, *left_out, *saved, *lacks, *doubts])
+    return "\n".join([head, *rows, *left_out, *lacks, *doubts])
