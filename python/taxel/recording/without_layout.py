@@ -46,8 +46,10 @@ def refuse_without_layout(path: Path) -> None:
     if path.suffix.lower() in (".csv", ".h5", ".hdf5"):
         kind_of(path)  # refuses what is not of the kind that its name says
     if path.suffix.lower() not in ARRAYS:
-        said = _of_table(text.beginning(path))
+        lines = text.beginning(path)
+        said = _of_table(lines)
         if said is None:
+            _refuse_decimal_commas(path, lines)
             return
         holds, lines = said
         says = "says how to read it"
@@ -110,6 +112,17 @@ def _of_table(lines: Sequence[str]) -> tuple[str, list[str]] | None:
     size = _size([columns - (time is not None)])
     holds = f"a table of {counted(columns, 'column')}"
     return holds, [*size, *([_NO_RATE] if time is None else []), *(["[table]", *table] if table else [])]
+
+
+def _refuse_decimal_commas(path: Path, lines: Sequence[str]) -> None:
+    """Refuse a table whose last line would hold numbers if its commas were decimal points."""
+    line, last = next(((k, one) for k, one in reversed(list(enumerate(lines, 1))) if one.strip()), (0, ""))
+    for mark in (";", "\t", " "):
+        cells = _cells(last, mark)
+        if len(cells) > 1 and _are_numbers([cell.replace(",", ".", 1) for cell in cells]):
+            for k, cell in enumerate(cells, 1):
+                if cell not in _MISSING:
+                    text.number(cell, path, line, f"column {k}")
 
 
 def _size(shape: Sequence[int]) -> list[str]:
