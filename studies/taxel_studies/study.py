@@ -6,6 +6,7 @@ import base64
 import io
 import json
 import platform
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -252,7 +253,7 @@ class Study:
         strict : bool
             A file of recordings that cannot be read ends the study before it begins; else it is left out, and named.
         quiet : bool
-            No progress line.
+            No progress line, nor one on stderr while recordings are read.
 
         Returns
         -------
@@ -270,6 +271,8 @@ class Study:
         unread: Mapping[str, str] = {}
         if self.data:
             given["data"] = self._recordings(data)
+            if not quiet:
+                print(f"{self.name}: reading the recordings in {data}; hundreds of them take minutes", file=sys.stderr)
             unread = self.unread(parameters, given["data"])
             refuse(unread, strict=strict)
         folder = report / self.name

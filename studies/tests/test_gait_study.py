@@ -304,7 +304,8 @@ def test_a_file_that_cannot_be_read_is_left_out_and_said(ran, damaged, tmp_path,
     with pytest.raises(SystemExit) as ended:
         main(["study", "gait", "--data", str(damaged), "--size", "toy", "--report", str(tmp_path / "report")])
     assert not ended.value.code
-    out = capsys.readouterr().out
+    out, error = capsys.readouterr()
+    assert error.startswith("gait: reading the recordings in ")
     assert "left out: insole_gaitpdb/GaPt99_01.txt: line" in out
     assert "left out: pressure_formats/pliance.asc: no line of column names" in out
     section = json.loads((tmp_path / "report" / "gait" / "summary.json").read_text())
