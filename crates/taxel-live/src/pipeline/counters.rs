@@ -12,7 +12,7 @@ use crate::bridged::Bridged;
 use crate::capture;
 use crate::clock::{Offset, Pace};
 use crate::latency::Quantiles;
-use crate::recording::Verdict;
+use crate::recording::{Found, Verdict};
 
 /// Counts of what arrived, how it was processed, and what was lost at which stage.
 ///
@@ -262,5 +262,8 @@ pub enum SourceCounts {
         strange: u64,
         /// The system's last error, if reading failed.
         trouble: Option<String>,
+        /// What is wrong with its lines and stamps, as a verdict states it.
+        #[serde(skip)]
+        faults: Found,
     },
 }

@@ -236,6 +236,12 @@ impl Found {
         let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);
         Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us }
     }
+
+    /// Number of lines that could not be read.
+    #[must_use]
+    pub fn strange(&self) -> u64 {
+        self.damage.get(STRANGE).copied().unwrap_or(0)
+    }
 }
 
 impl Counts {
@@ -382,6 +388,7 @@ impl Verdict {
         for (n, cause, what) in [
             (of_board(REPAIRED), REPAIRED, "values repaired from the board's refresh"),
             (of_board(BOARD_RESET), BOARD_RESET, "resets of the board"),
+            (of_board(ANEW), ANEW, "restarts of its clock"),
         ] {
             if n > 0 {
                 verdict.noted.insert(cause.to_owned(), n);
@@ -403,7 +410,7 @@ impl Verdict {
 
     /// Adds what a decoder could not use; returns its line.
     fn damage_of(&mut self, decoder: &BTreeMap<String, u64>) -> Option<String> {
-        let no_damage = [BOARD_DROPPED, BOARD_RESET, REPAIRED];
+        let no_damage = [BOARD_DROPPED, BOARD_RESET, REPAIRED, ANEW];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
             // Of version 2 each is decoded once.
@@ -535,9 +542,9 @@ impl Verdict {
         verdict.text = pieces.join("; ");
         if let Some(after) = decoded.doubtful_after_us {
             verdict.status = verdict.status.max(Status::Damaged);
-            // A recorder of an earlier version did not count jumps.
-            let jumps = decoded.damage.get(JUMPS).copied().unwrap_or(1);
-            verdict.damaged.entry(JUMPS.to_owned()).or_insert(jumps);
+            for (cause, n) in decoded.damage.iter().filter(|(cause, n)| [JUMPS, BACK].contains(&&***cause) && **n > 0) {
+                verdict.damaged.entry(cause.clone()).or_insert(*n);
+            }
             verdict.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain([after]).min());
         }
         verdict
@@ -704,6 +711,10 @@ pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
+/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, and stamps that step back.
+pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
+pub(super) const ANEW: &str = "clock_began_anew";
+pub(super) const BACK: &str = "stamps_out_of_order";
 /// Bytes of version 1 from a board that sends version 2.
 pub(crate) const REFUSED: &str = "bytes_of_version_1_refused";
 /// Damage that is of a file as a whole, and that each of its sources has.
