@@ -625,3 +625,17 @@ def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     assert verdict == "nothing lost but for what resets hide; 2 resets of the board"
     assert verdict.status == "complete after arrival"
     assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"
+
+
+def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -> None:
+    boards = [Board(Registers(wire_version=2), version_2=Version2(board=n)) for n in (5, 6)]
+    sent = [[one for k in range(3) for one in board.frame(np.full(4096, 40 + 9 * k, np.uint16))] for board in boards]
+    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
+    other = sent[1][:7]
+    for number, one in enumerate([*sent[0], *other, other[0][:30] + bytes([other[0][30] ^ 1]) + other[0][31:]]):
+        writer.datagram(START_NS + number * 1_000_000, number, one)
+    del writer
+    recording = taxel.open(tmp_path / "a.mcap")
+    assert recording.verdict.damaged == {"datagrams_of_another_board": 7, "datagrams_damaged": 1}
+    assert "7 datagrams of another board" in recording.verdict
+    assert len(recording.events) == 3 * 4096

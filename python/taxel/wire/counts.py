@@ -46,6 +46,8 @@ class Counts:
     long, foreign, checksum : int
         Version 2: the number of datagrams refused because they are longer than 1400 bytes, are not of version 2 or come
         from another board, or have a wrong checksum.
+    other_board : int
+        Version 2: the number of those among `foreign` that are intact, and of another board than the first.
     missing : int
         Version 2: the number of sequence numbers between the first and the last of each session that were never
         received intact.
@@ -98,6 +100,7 @@ class Counts:
     old: int = 0
     long: int = 0
     foreign: int = 0
+    other_board: int = 0
     checksum: int = 0
     missing: int = 0
     unknown_kind: int = 0

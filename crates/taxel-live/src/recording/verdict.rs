@@ -282,7 +282,8 @@ pub fn damage(
         return (causes, None);
     }
     let of_version_2 = [
-        ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign),
+        ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign - two.other_board),
+        ("datagrams_of_another_board", two.other_board),
         ("datagrams_too_late", two.old),
         ("taxels_outside_the_array", two.outside),
         ("datagrams_of_an_unknown_kind", two.unknown_kind),

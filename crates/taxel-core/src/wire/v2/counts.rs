@@ -37,6 +37,8 @@ pub struct Counts {
     pub long: u64,
     /// Refused datagrams: not of version 2, or of another board.
     pub foreign: u64,
+    /// Datagrams among these that are intact, and of another board than the first.
+    pub other_board: u64,
     /// Refused datagrams: the checksum does not match.
     pub checksum: u64,
     /// Sequence numbers that never arrived intact: between the first and the last of a session, and after a reset from 0 on.
@@ -84,6 +86,7 @@ impl Counts {
             short: self.short - earlier.short,
             long: self.long - earlier.long,
             foreign: self.foreign - earlier.foreign,
+            other_board: self.other_board - earlier.other_board,
             checksum: self.checksum - earlier.checksum,
             missing: self.missing.saturating_add_signed(self.filled - earlier.filled).saturating_sub(earlier.missing),
             filled: 0,

@@ -220,6 +220,7 @@ impl Decoder {
         self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
             self.counts.foreign += 1;
+            self.counts.other_board += 1;
             return Outcome::Refused(Refused::Foreign);
         }
         let (which, reset) = match self.sessions.last() {
