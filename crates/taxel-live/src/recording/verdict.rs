@@ -277,7 +277,7 @@ pub fn damage(
     two: &wire::v2::Counts,
 ) -> (BTreeMap<String, u64>, Option<u64>) {
     let mut causes = damage_of_version_1(counts);
-    causes.extend([(JUMPS.to_owned(), jumps), (REPEATED.to_owned(), again + two.repeated)]);
+    causes.extend([(JUMPS.to_owned(), jumps), (AGAIN.to_owned(), again), (REPEATED.to_owned(), two.repeated)]);
     if two.datagrams == 0 {
         return (causes, None);
     }
@@ -710,6 +710,8 @@ pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
 pub(super) const BOARD_RESET: &str = "resets";
 pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
+/// Datagrams of version 1 that came again: version 1 does not number them, so that their events are there twice.
+const AGAIN: &str = "datagrams_decoded_again";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
 /// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, and stamps that step back.
