@@ -188,6 +188,7 @@ impl Counters {
             dropped_by_queue,
             bytes_dropped_by_queue: now.bytes_dropped_by_queue - before.bytes_dropped_by_queue,
             changes_between_senders: now.changes_between_senders - before.changes_between_senders,
+            changes_of_address: now.changes_of_address - before.changes_of_address,
             waiting: 0,
             ..*now
         };

@@ -390,6 +390,7 @@ impl Verdict {
             (of_board(REPAIRED), REPAIRED, "values repaired from the board's refresh"),
             (of_board(BOARD_RESET), BOARD_RESET, "resets of the board"),
             (of_board(ANEW), ANEW, "restarts of its clock"),
+            (of_board(ADDRESS), ADDRESS, "changes of the sender's address"),
         ] {
             if n > 0 {
                 verdict.noted.insert(cause.to_owned(), n);
@@ -411,7 +412,7 @@ impl Verdict {
 
     /// Adds what a decoder could not use; returns its line.
     fn damage_of(&mut self, decoder: &BTreeMap<String, u64>) -> Option<String> {
-        let no_damage = [BOARD_DROPPED, BOARD_RESET, REPAIRED, ANEW];
+        let no_damage = [BOARD_DROPPED, BOARD_RESET, REPAIRED, ANEW, ADDRESS];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
             // Of version 2 each is decoded once.
@@ -718,6 +719,8 @@ pub(crate) const JUMPS: &str = "jumps_of_time";
 pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
 pub(super) const ANEW: &str = "clock_began_anew";
 pub(super) const BACK: &str = "stamps_out_of_order";
+/// How often the sender had another address than before, as a board that got another one has, or another board.
+pub(crate) const ADDRESS: &str = "changes_of_address";
 /// Bytes of version 1 from a board that sends version 2.
 pub(crate) const REFUSED: &str = "bytes_of_version_1_refused";
 /// Damage that is of a file as a whole, and that each of its sources has.
