@@ -63,6 +63,9 @@ class Counts:
         Version 2: the number of states on the array, and of those among them that were out of date on arrival.
     dropped, resets : int
         Version 2: the number of datagrams that report dropped events, and of resets of the board.
+    events_dropped : int
+        Version 2: the number of events that the board dropped by its own totals (kind 4), from its reset or from the
+        first totals on.
     unknown_value : int
         Version 2: the number of differences from a value that was not received; their events have no intensity.
 
@@ -112,6 +115,7 @@ class Counts:
     states: int = 0
     stale: int = 0
     dropped: int = 0
+    events_dropped: int = 0
     resets: int = 0
     unknown_value: int = 0
 

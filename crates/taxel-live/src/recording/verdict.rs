@@ -291,6 +291,7 @@ pub fn damage(
         ("markers_with_an_unknown_code", two.unknown_marker),
         ("malformed_bodies", two.malformed),
         (BOARD_DROPPED, two.dropped),
+        (EVENTS_DROPPED, two.events_dropped),
         (BOARD_RESET, two.resets),
         (REPAIRED, two.repaired),
         ("differences_from_an_unknown_value", two.unknown_value),
@@ -354,7 +355,10 @@ impl Verdict {
         // after the last number), or more datagrams than messages.
         let several = counts.several_a_message && counts.dropped_by_kernel > 0 && missing > behind;
         let unclear = missing.min(behind) > 0 && (several || missing < behind || of_board(REPEATED) > 0);
-        let board = (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events");
+        let board = [
+            (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events"),
+            (of_board(EVENTS_DROPPED), EVENTS_DROPPED, "events dropped by the board by its own count"),
+        ];
         let way = if unclear {
             (missing, "lost_on_the_way_or_dropped", "datagrams lost or damaged on the way or among those dropped")
         } else {
@@ -362,7 +366,7 @@ impl Verdict {
         };
         let mut verdict = Self::default();
         let mut words = vec![];
-        for (n, cause, what) in std::iter::once(board).chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
+        for (n, cause, what) in board.into_iter().chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
             verdict.lost.insert(cause.to_owned(), n);
             words.push(numbered(n, what));
         }
@@ -412,7 +416,7 @@ impl Verdict {
 
     /// Adds what a decoder could not use; returns its line.
     fn damage_of(&mut self, decoder: &BTreeMap<String, u64>) -> Option<String> {
-        let no_damage = [BOARD_DROPPED, BOARD_RESET, REPAIRED, ANEW, ADDRESS];
+        let no_damage = [BOARD_DROPPED, EVENTS_DROPPED, BOARD_RESET, REPAIRED, ANEW, ADDRESS];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
             // Of version 2 each is decoded once.
@@ -707,6 +711,7 @@ fn numbered(n: u64, plural: &str) -> String {
 
 /// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
 pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
+pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
 /// ... resets, values that differed from the board's own, as their events were lost, and datagrams that came again.
 pub(super) const BOARD_RESET: &str = "resets";
 pub(super) const REPAIRED: &str = "events_repaired";

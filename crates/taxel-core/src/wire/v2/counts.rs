@@ -68,6 +68,8 @@ pub struct Counts {
     pub unknown_marker: u64,
     /// Datagrams that report events dropped by the board.
     pub dropped: u64,
+    /// Events that the board dropped, by its own totals: from its reset or from its first totals on.
+    pub events_dropped: u64,
     /// Number of detected resets.
     pub resets: u64,
     /// Differences from an unknown value; their events have no value.
@@ -101,6 +103,7 @@ impl Counts {
             markers: self.markers - earlier.markers,
             unknown_marker: self.unknown_marker - earlier.unknown_marker,
             dropped: self.dropped - earlier.dropped,
+            events_dropped: self.events_dropped - earlier.events_dropped,
             resets: self.resets - earlier.resets,
             unknown_value: self.unknown_value - earlier.unknown_value,
         }
