@@ -210,6 +210,8 @@ pub struct Condition {
     pub decoded: Option<Found>,
     /// Whether the source is a stream of numbers.
     pub lines: bool,
+    /// The board's time at which the recording begins, us.
+    pub origin_us: i64,
 }
 
 /// What decoding a file found.
@@ -433,9 +435,10 @@ impl Verdict {
     /// The verdict on a source of a file.
     fn of_file(condition: Condition) -> Self {
         let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { repeated, so_far, converted, decoded, lines, .. } = condition;
+        let Condition { repeated, so_far, converted, decoded, lines, origin_us, .. } = condition;
+        let is_converted = converted.is_some();
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
-        let decoded = decoded.unwrap_or_default();
+        let mut decoded = decoded.unwrap_or_default();
         let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
         let mut no_counts = false;
         let (mut verdict, why) = match ending {
@@ -468,6 +471,9 @@ impl Verdict {
             let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
             let datagrams = lost.entry(Topic::Datagrams).or_default();
             *datagrams = skipped_numbers.saturating_sub(before).max(*datagrams);
+        }
+        if verdict.damaged.contains_key(JUMPED_BEFORE) && !is_converted {
+            decoded.doubtful_after_us = Some(origin_us - 1);
         }
         let mut bad = vec![];
         for (n, cause, text) in [
@@ -709,6 +715,8 @@ fn numbered(n: u64, plural: &str) -> String {
     format!("{n} {}", words.join(" "))
 }
 
+/// Of a recording that began while its board was received: the jumps of time before it, since which all times are doubtful.
+pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
 /// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
 pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
 pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
