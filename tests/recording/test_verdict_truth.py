@@ -639,3 +639,10 @@ def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -
     assert recording.verdict.damaged == {"datagrams_of_another_board": 7, "datagrams_damaged": 1}
     assert "7 datagrams of another board" in recording.verdict
     assert len(recording.events) == 3 * 4096
+
+
+def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:
+    lost = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
+    silent = Verdict._of({"counts": {}})
+    assert (silent.status, Verdict._together([("a", silent), ("b", lost)]).status) == ("nothing arrived", "lost")
+    assert Verdict._together([("a", silent), ("b", Verdict("nothing lost"))]).status == "nothing arrived"

@@ -12,7 +12,7 @@ from taxel._core import ProblemError
 
 __all__ = ["STATUSES", "Status", "Verdict"]
 
-Status = Literal["complete", "complete after arrival", "unknown", "damaged", "unfinished", "lost", "nothing arrived"]
+Status = Literal["complete", "complete after arrival", "unknown", "damaged", "unfinished", "nothing arrived", "lost"]
 
 #: All statuses, from the best to the worst.
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -37,7 +37,7 @@ class Verdict(str):
 
     Attributes
     ----------
-    status : {"complete", "complete after arrival", "unknown", "damaged", "unfinished", "lost", "nothing arrived"}
+    status : {"complete", "complete after arrival", "unknown", "damaged", "unfinished", "nothing arrived", "lost"}
         From the best to the worst; of several parts the worst.
     lost : dict of int
         What was lost, by cause; of several parts the sum.

@@ -35,11 +35,11 @@ pub enum Status {
     Damaged,
     /// What came last is missing.
     Unfinished,
-    /// Something was lost, by one of the causes.
-    Lost,
     /// Nothing arrived at all.
     #[serde(rename = "nothing arrived")]
     NothingArrived,
+    /// Something was lost, by one of the causes.
+    Lost,
 }
 
 /// What a recording lost.
