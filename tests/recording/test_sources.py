@@ -287,6 +287,15 @@ def test_the_command_says_what_came_of_each_source(tmp_path: Path) -> None:
     assert "  imu: 900 lines\n" in said
 
 
+def test_the_last_line_of_an_input_may_lack_its_end(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "taxel", "record", str(tmp_path / "a.mcap"), "--port", "0", "--host", LOOPBACK]
+    line += ["--source", "imu=pipe:-", "--seconds", "2"]
+    done = subprocess.run(line, input="ax,ay\n1,2\n3,4.5", capture_output=True, text=True, check=False)
+    assert "  imu: 2 lines\n" in done.stdout
+    frames = taxel.open(tmp_path / "a.mcap").sources["imu"].frames()
+    np.testing.assert_array_equal(frames.values[:, 0], [[1, 2], [3, 4.5]])
+
+
 def mcap(path: Path, clocks: dict[str, tuple[float, int]], seconds: float, rate: float, seed: int) -> None:
     """Write streams whose clocks run by so many ppm and begin at so many us, 1 % of them 5 ms late."""
     random = np.random.default_rng(seed)

@@ -136,7 +136,7 @@ impl Numbers {
                     }
                 };
                 let at_ns = reader.came_ns;
-                while let Some(line) = reader.line() {
+                while let Some(line) = reader.line(ended) {
                     let cut = std::mem::take(&mut first) && numbers.stream.parse(&line).is_none();
                     let recorded = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
                     if let Err(error) = recorded {
