@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import socket
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import until
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
@@ -646,3 +648,18 @@ def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:
     silent = Verdict._of({"counts": {}})
     assert (silent.status, Verdict._together([("a", silent), ("b", lost)]).status) == ("nothing arrived", "lost")
     assert Verdict._together([("a", silent), ("b", Verdict("nothing lost"))]).status == "nothing arrived"
+
+
+def test_datagrams_without_bytes_are_no_recording_of_which_nothing_is_lost(tmp_path: Path) -> None:
+    with (
+        taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "a.mcap") as live,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        for _ in range(10):
+            link.sendto(b"", live.address)
+        until(lambda: live.counters["decoded"] == 10)
+        told = live.stop().verdict
+    (tmp_path / "b.mcap").write_bytes((tmp_path / "a.mcap").read_bytes()[:-300])
+    for verdict in (told, *(taxel.open(tmp_path / f"{name}.mcap").verdict for name in "ab")):
+        assert verdict.damaged["empty_datagrams"] == 10
+        assert "10 empty datagrams" in verdict

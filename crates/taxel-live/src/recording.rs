@@ -35,7 +35,7 @@ pub use output::OutputFile;
 pub use pictures::{Encoding, PictureSource, Pictures};
 pub use stream::{Faults, Samples, Stream, fields};
 pub use topic::Topic;
-pub(crate) use verdict::{ADDRESS, JUMPED_BEFORE, REFUSED};
+pub(crate) use verdict::{ADDRESS, EMPTY, JUMPED_BEFORE, REFUSED};
 pub use verdict::{
     Basis, Condition, Counts, Ending, Found, NOTHING_LOST, Rebuilt, Status, Verdict, damage, damage_of_version_1,
 };

@@ -69,6 +69,8 @@ pub struct DecodingCounts {
     pub wire_jumps: u64,
     /// Number of datagrams of version 1 that came again.
     pub wire_repeated: u64,
+    /// Number of datagrams of version 1 without bytes.
+    pub wire_empty: u64,
     /// Number of decoded events.
     pub events: u64,
 }
@@ -216,6 +218,7 @@ impl DecodingCounts {
             wire_late: self.wire_late - earlier.wire_late,
             wire_jumps: self.wire_jumps - earlier.wire_jumps,
             wire_repeated: self.wire_repeated - earlier.wire_repeated,
+            wire_empty: self.wire_empty - earlier.wire_empty,
             events: self.events - earlier.events,
         }
     }

@@ -234,7 +234,7 @@ impl Found {
     pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
         let (mut causes, missing) =
             damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.two().counts());
-        causes.insert(REFUSED.to_owned(), sender.refused());
+        causes.extend([(REFUSED.to_owned(), sender.refused()), (EMPTY.to_owned(), sender.empty())]);
         let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);
         Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us }
     }
@@ -732,6 +732,8 @@ pub(crate) const JUMPS: &str = "jumps_of_time";
 pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
 pub(super) const ANEW: &str = "clock_began_anew";
 pub(super) const BACK: &str = "stamps_out_of_order";
+/// Datagrams of version 1 without bytes.
+pub(crate) const EMPTY: &str = "empty_datagrams";
 /// How often the sender had another address than before, as a board that got another one has, or another board.
 pub(crate) const ADDRESS: &str = "changes_of_address";
 /// Bytes of version 1 from a board that sends version 2.

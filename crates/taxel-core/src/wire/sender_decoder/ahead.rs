@@ -98,7 +98,11 @@ mod tests {
             let after = regular(0, 50).map(|(stamps, at)| (stamps, at + 10_000 * came_to));
             let (decoder, events) = of(before.chain(after));
             let last = events.t[44];
-            assert_eq!((decoder.ahead().jumps, decoder.ahead().after), (jumps, (jumps > 0).then_some(last)), "{came_to}");
+            assert_eq!(
+                (decoder.ahead().jumps, decoder.ahead().after),
+                (jumps, (jumps > 0).then_some(last)),
+                "{came_to}"
+            );
             assert!(events.t[45] > last, "{came_to}: ahead, wherever the reset was");
         }
     }
