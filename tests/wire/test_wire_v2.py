@@ -327,7 +327,7 @@ def test_the_old_names_of_version_2_work_and_name_the_new_ones():
 
 @pytest.mark.parametrize("first", [0, 5])
 def test_what_the_board_counted_as_dropped_is_lost_though_no_flag_came(first, tmp_path):
-    """The datagrams with the flag were lost on the way, or the board sets none; before its first totals nothing is known."""
+    """Where datagrams with the flag were lost, or the board sets none; before the first totals nothing is known."""
     sent = []
     for sequence in range(20):
         t, dropped = 200 * sequence, 30 if sequence < 10 else 75
@@ -335,7 +335,7 @@ def test_what_the_board_counted_as_dropped_is_lost_though_no_flag_came(first, tm
         totals = struct.pack("<5Q", sequence, sequence, dropped, sequence, 0)
         is_totals = sequence % 5 == 4
         sent.append(datagram(4 if is_totals else 1, totals if is_totals else events, sequence=sequence, base=t))
-    decoder = Decoder(2)
+    decoder = Decoder()
     for one in sent[first:]:
         decoder.push(one)
     dropped = 45 if first else 75
