@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Self, get_args
 
@@ -19,6 +20,9 @@ STATUSES: tuple[Status, ...] = get_args(Status)
 
 #: The whole numbers of a verdict, each a mapping from cause to number.
 _NUMBERS = ("lost", "damaged", "noted")
+
+#: The error in a text that an error stopped a recording.
+_ERROR = re.compile(r"(?<=stopped by an error) \(.*\)(?=: what came last)")
 
 
 class Verdict(str):
@@ -185,9 +189,12 @@ def _stated(held: Any) -> dict[str, Any]:
         raise ProblemError(
             f"verdict: its status is {own['status']}, but its times are doubtful: must be damaged, or worse"
         )
-    # The text on several parts begins with the name of one.
-    if STATUSES.index(own["status"]) < STATUSES.index("lost") and own["text"].startswith("LOST") and not parts:
-        raise ProblemError(f"verdict: its status is {own['status']}, but its text begins LOST: must be lost, or worse")
+    # The text on several parts has their names, and that of an error what the system said.
+    told = Verdict(_ERROR.sub("", own["text"])).status
+    if STATUSES.index(own["status"]) < STATUSES.index(told) and not parts:
+        raise ProblemError(
+            f"verdict: its status is {own['status']}, but its text says {told}: must be {told}, or worse"
+        )
     stated = {str(name): _stated(part) for name, part in parts.items()}
     for name, part in stated.items():
         inner = part["status"]
