@@ -119,9 +119,8 @@ class _Source:
 
         def counts() -> dict[str, Any]:
             t, _, bad = read()
-            received = (self.ending.get("finished", {}).get("counts") or {}).get("received")
             damage = {"pictures": len(t), "pictures_that_could_not_be_read": bad}
-            return {**damage, "received": received, **self.rebuilt()}
+            return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
         names = about.get("columns")
         return Contents(
@@ -193,7 +192,7 @@ class _Source:
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
         remarks = self.remarks()
-        counts = self.ending.get("finished", {}).get("counts") or remarks["counts"] or {}
+        counts = self.counted() or remarks["counts"] or {}
         of_2 = json.loads(decoded[5])
         # What this computer dropped or the file lost is missing among the board's numbers too, and is counted apart.
         skipped = remarks["condition"]["skipped_numbers"]
@@ -211,9 +210,13 @@ class _Source:
 
     def counts_of_stream(self, read: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and lines of a stream, by cause."""
-        counts = self.ending.get("finished", {}).get("counts") or {}
         found = {"samples": len(read[2]), **json.loads(read[4])["damage"]}
-        return {**found, "received": counts.get("received"), **self.rebuilt()}
+        return {**found, "received": self.counted().get("received"), **self.rebuilt()}
+
+    def counted(self) -> dict[str, Any]:
+        """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""
+        counts = self.ending.get("finished", {}).get("counts") or {}
+        return {} if self.header.get("converted") or counts.get("converted") else counts
 
     def verdict(self, found: Callable[[], str] | None = None) -> Verdict:
         """Return what was lost at which stage; `found` decodes a board or a stream, and returns what it found."""
