@@ -272,7 +272,7 @@ def test_datagrams_of_version_1_that_come_again_are_damage_as_their_events_are_t
     del writer
     recording = taxel.open(tmp_path / "a.mcap")
     assert len(recording.events) == 450, "their events are there twice"
-    assert (recording.verdict.damaged, recording.verdict.noted) == ({"datagrams_decoded_again": 5}, {})
+    assert (recording.verdict.damaged["datagrams_decoded_again"], recording.verdict.noted) == (5, {})
     assert "5 datagrams decoded again" in recording.verdict
 
 
@@ -433,6 +433,8 @@ def test_damage_of_a_file_of_two_boards_counts_once(converted: bool, tmp_path: P
     parts = whole.verdict.parts
     assert [one.damaged for one in parts.values()] == 2 * [{"bad_chunks": 1, "bytes_after_end": 4}]
     assert whole.verdict.damaged == {"bad_chunks": 1, "bytes_after_end": 4}
+    both = taxel.merge(taxel.open(path).sources.values(), gap_us=10)
+    assert both.verdict.damaged == {"bad_chunks": 1, "bytes_after_end": 4}
     gone = [len(sent) - len(one.datagrams()) for one in taxel.open(path).sources.values()]
     assert [one.lost for one in parts.values()] == [{"lost_in_file": n} for n in gone]
     assert whole.verdict.lost == {"lost_in_file": sum(gone)}
@@ -571,6 +573,10 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         {"status": "unknown", "text": "nothing lost", "doubtful_after_us": 5},
         {"status": "complete", "text": "nothing lost", "parts": {"left": {"status": "lost", "text": "LOST"}}},
         {"status": "complete", "text": "LOST: 5 datagrams lost or damaged on the way"},
+        {"status": "complete", "text": "not finished: what came last is missing; until then: nothing lost"},
+        {"status": "unknown", "text": "damage in the file: 3 bad chunks skipped"},
+        {"status": "complete", "text": "nothing lost but for what resets hide; 1 reset of the board"},
+        {"status": "lost", "text": "", "parts": {"b": {"status": "complete", "text": "nothing arrived"}}},
         {
             "status": "lost",
             "text": "",
@@ -663,3 +669,18 @@ def test_datagrams_without_bytes_are_no_recording_of_which_nothing_is_lost(tmp_p
     for verdict in (told, *(taxel.open(tmp_path / f"{name}.mcap").verdict for name in "ab")):
         assert verdict.damaged["empty_datagrams"] == 10
         assert "10 empty datagrams" in verdict
+
+
+def test_what_an_error_was_is_no_verdict() -> None:
+    why = {"ending": {"stopped": "LOST/a.mcap (disk 3): no space left on device"}}
+    stopped = Verdict._of({"file": why | {"so_far": {"received": 5, "recorded": 5}}})
+    assert stopped.status == "unfinished"
+    assert Verdict.from_dict(stopped.to_dict()).to_dict() == stopped.to_dict()
+
+
+def test_a_converted_recording_has_no_count_of_what_was_received(tmp_path: Path) -> None:
+    taxel.convert(some_events(300), tmp_path / "a.npz")
+    taxel.convert(tmp_path / "a.npz", tmp_path / "b.mcap")
+    assert taxel.open(tmp_path / "b.mcap").counts["received"] is None
+    record(tmp_path / "c.mcap", some_events(300))
+    assert taxel.open(tmp_path / "c.mcap").counts["received"] > 0
