@@ -103,8 +103,8 @@ class Counts:
     old: int = 0
     long: int = 0
     foreign: int = 0
-    other_board: int = 0
     checksum: int = 0
+    other_board: int = 0
     missing: int = 0
     unknown_kind: int = 0
     unknown_flags: int = 0
@@ -115,8 +115,8 @@ class Counts:
     states: int = 0
     stale: int = 0
     dropped: int = 0
-    events_dropped: int = 0
     resets: int = 0
+    events_dropped: int = 0
     unknown_value: int = 0
 
 
