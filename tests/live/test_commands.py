@@ -28,17 +28,19 @@ from taxel.wire import Registers
 from .boards import LOOPBACK, SMALL, command, listening, play, presses, recording, touch
 
 
-def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ended", [signal.SIGINT, signal.SIGTERM])
+def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(ended: signal.Signals, tmp_path: Path) -> None:
     port, file, events = free_port(), tmp_path / "walk.mcap", presses(3)
     arguments = ("record", file, "--host", LOOPBACK, "--port", port, "--array", "4x4")
     with subprocess.Popen(command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         listening(process)
         play(events, port)
         time.sleep(0.3)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(ended)
         said, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     assert said.splitlines()[-1].startswith("nothing lost after arrival")
+    assert taxel.open(file).verdict.status == "complete after arrival"
     np.testing.assert_array_equal(taxel.open(file).events.to_numpy(), events.to_numpy())
     again = run(*arguments)
     assert again.returncode == 2

@@ -99,6 +99,34 @@ def record(port: int, *arguments: object) -> list[str]:
     return [sys.executable, "-m", "taxel", *map(str, said)]
 
 
+def test_a_trial_after_a_damaged_stamp_says_that_its_times_are_doubtful(tmp_path):
+    sent = []
+    for k in range(60):
+        # The stamp of one datagram, in the first trial, has its top bit flipped.
+        t = 10_000 * (k + 1) + 3_276_800 * (k == 20)
+        one = taxel.Events([t], [3], [4], [k % 2 > 0], array=taxel.Array.thesis(), intensity=[60 + k % 2])
+        sent.append(taxel.wire.encode(one))
+    with (
+        taxel.live.Live(0, host=LOOPBACK, record_later=True) as live,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        for trial, (first, last) in enumerate([(0, 10), (10, 40), (40, 60)]):
+            live.record(tmp_path / f"{trial}.mcap")
+            for k in range(first, last):
+                link.sendto(sent[k], live.address)
+                until(lambda: live.counters["decoded"] == k + 1)  # noqa: B023  called at once
+        live.end_recording()
+    verdicts = [taxel.open(tmp_path / f"{trial}.mcap").verdict for trial in range(3)]
+    assert [one.status for one in verdicts] == ["complete after arrival", "damaged", "damaged"]
+    begins = int(taxel.open(tmp_path / "2.mcap").events.t[0])
+    assert begins > 6_000_000, "a turn too late"
+    assert verdicts[2].damaged == {"jumps_of_time_before_it": 1}
+    after = verdicts[2].doubtful_after_us
+    assert after is not None
+    assert after < begins
+    assert f"times after {after} us are doubtful" in verdicts[2]
+
+
 def test_trials_that_follow_each_other_lose_nothing_and_know_what_was_held(tmp_path: Path) -> None:
     port = free_port()
     arguments = record(port, tmp_path / "step.mcap", "--length", 0.25, "--countdown", 0, "--trials", 4, "--json")

@@ -81,6 +81,7 @@ def test_two_boards_that_send_to_one_port_are_told(tmp_path, wire, boards):
     changes = 2 * len(frames) - 2 if boards == 2 else 0
     assert verdict.damaged.get("changes_between_senders", 0) == changes
     assert (f"{changes} changes between senders" in verdict) == (boards == 2)
+    assert verdict.noted["changes_of_address"] == boards
     assert verdict.status == {1: "complete after arrival" if wire == 1 else "complete", 2: "damaged"}[boards]
     assert taxel.open(path).verdict.to_dict() == verdict.to_dict()
 

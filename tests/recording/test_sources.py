@@ -287,6 +287,15 @@ def test_the_command_says_what_came_of_each_source(tmp_path: Path) -> None:
     assert "  imu: 900 lines\n" in said
 
 
+def test_the_last_line_of_an_input_may_lack_its_end(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "taxel", "record", str(tmp_path / "a.mcap"), "--port", "0", "--host", LOOPBACK]
+    line += ["--source", "imu=pipe:-", "--seconds", "2"]
+    done = subprocess.run(line, input="ax,ay\n1,2\n3,4.5", capture_output=True, text=True, check=False)
+    assert "  imu: 2 lines\n" in done.stdout
+    frames = taxel.open(tmp_path / "a.mcap").sources["imu"].frames()
+    np.testing.assert_array_equal(frames.values[:, 0], [[1, 2], [3, 4.5]])
+
+
 def mcap(path: Path, clocks: dict[str, tuple[float, int]], seconds: float, rate: float, seed: int) -> None:
     """Write streams whose clocks run by so many ppm and begin at so many us, 1 % of them 5 ms late."""
     random = np.random.default_rng(seed)
@@ -503,3 +512,48 @@ def test_a_silent_source_of_a_finished_recording_is_said_to_be_silent_also_by_th
         told = taxel.open(path).sources[name].verdict
         assert (told, told.status) == ("nothing arrived", "nothing arrived")
         assert summary.verdict.parts[name].status == "nothing arrived"
+
+
+@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize(
+    ("stamps_us", "noted", "damaged", "after"),
+    [
+        # The clock begins anew after 3 s: its times go on by arrival.
+        ([20_000 * (k if k < 150 else k - 150) for k in range(200)], {"clock_began_anew": 1}, {}, None),
+        # It is set back by less than a second, so that it may as well be one line out of order.
+        (
+            [20_000 * (k if k < 30 else k - 30) for k in range(60)],
+            {},
+            {"stamps_out_of_order": 1},
+            -1,
+        ),
+        ([20_000 * k + 8_000_000 * (k == 50) for k in range(100)], {}, {"jumps_of_time": 1}, 49 * 20_000),
+        ([20_000 * k for k in range(100)], {}, {}, None),
+    ],
+)
+def test_what_a_streams_stamps_do_is_said_live_and_of_the_file(
+    stamps_us: list[int],
+    noted: dict[str, int],
+    damaged: dict[str, int],
+    after: int | None,
+    finished: bool,
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.mcap"
+    with Live(0, host=LOOPBACK, array=SMALL, record=path, sources={"imu": "given,columns=t_us:ax"}) as live:
+        for k, stamp in enumerate(stamps_us):
+            live.sample("imu", [stamp, k], arrived_ns=1_700_000_000_000_000_000 + k * 20_000_000)
+        live.note("done")
+        at_end = live.stop().verdict.parts["imu"]
+    if not finished:
+        path.write_bytes(path.read_bytes()[:-300])
+    imu = taxel.open(path).sources["imu"]
+    for verdict in (at_end, imu.verdict):
+        assert (verdict.noted, {k: n for k, n in verdict.damaged.items() if k in damaged}) == (noted, damaged)
+        assert ("1 restart of its clock" in verdict) == bool(noted)
+    assert at_end.damaged == damaged
+    assert imu.verdict.doubtful_after_us == after
+    assert (f"times after {after} us are doubtful" in imu.verdict) == (after is not None)
+    if not noted:
+        good = [t for t in stamps_us if after is None or t <= after]
+        np.testing.assert_array_equal(imu.frames().t[: len(good)], good)

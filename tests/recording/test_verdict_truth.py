@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import socket
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import until
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
@@ -259,7 +261,7 @@ def test_of_what_version_1_sent_after_the_last_counts_nothing_is_known_to_be_the
     assert ("bytes_of_version_1_refused" in recording.verdict.damaged) == (then == 1)
 
 
-def test_datagrams_of_version_1_that_come_again_are_noted(tmp_path: Path) -> None:
+def test_datagrams_of_version_1_that_come_again_are_damage_as_their_events_are_there_twice(tmp_path: Path) -> None:
     events = some_events(400, intensity=False)
     events.markers = ()
     sent = [taxel.wire.encode(events[k : k + 10]) for k in range(0, 400, 10)]
@@ -270,8 +272,8 @@ def test_datagrams_of_version_1_that_come_again_are_noted(tmp_path: Path) -> Non
     del writer
     recording = taxel.open(tmp_path / "a.mcap")
     assert len(recording.events) == 450, "their events are there twice"
-    assert recording.verdict.noted == {"datagrams_repeated": 5}
-    assert "5 datagrams repeated" in recording.verdict
+    assert (recording.verdict.damaged["datagrams_decoded_again"], recording.verdict.noted) == (5, {})
+    assert "5 datagrams decoded again" in recording.verdict
 
 
 @pytest.mark.parametrize("reordered", [False, True])
@@ -431,6 +433,8 @@ def test_damage_of_a_file_of_two_boards_counts_once(converted: bool, tmp_path: P
     parts = whole.verdict.parts
     assert [one.damaged for one in parts.values()] == 2 * [{"bad_chunks": 1, "bytes_after_end": 4}]
     assert whole.verdict.damaged == {"bad_chunks": 1, "bytes_after_end": 4}
+    both = taxel.merge(taxel.open(path).sources.values(), gap_us=10)
+    assert both.verdict.damaged == {"bad_chunks": 1, "bytes_after_end": 4}
     gone = [len(sent) - len(one.datagrams()) for one in taxel.open(path).sources.values()]
     assert [one.lost for one in parts.values()] == [{"lost_in_file": n} for n in gone]
     assert whole.verdict.lost == {"lost_in_file": sum(gone)}
@@ -569,6 +573,10 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         {"status": "unknown", "text": "nothing lost", "doubtful_after_us": 5},
         {"status": "complete", "text": "nothing lost", "parts": {"left": {"status": "lost", "text": "LOST"}}},
         {"status": "complete", "text": "LOST: 5 datagrams lost or damaged on the way"},
+        {"status": "complete", "text": "not finished: what came last is missing; until then: nothing lost"},
+        {"status": "unknown", "text": "damage in the file: 3 bad chunks skipped"},
+        {"status": "complete", "text": "nothing lost but for what resets hide; 1 reset of the board"},
+        {"status": "lost", "text": "", "parts": {"b": {"status": "complete", "text": "nothing arrived"}}},
         {
             "status": "lost",
             "text": "",
@@ -625,3 +633,54 @@ def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     assert verdict == "nothing lost but for what resets hide; 2 resets of the board"
     assert verdict.status == "complete after arrival"
     assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"
+
+
+def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -> None:
+    boards = [Board(Registers(wire_version=2), version_2=Version2(board=n)) for n in (5, 6)]
+    sent = [[one for k in range(3) for one in board.frame(np.full(4096, 40 + 9 * k, np.uint16))] for board in boards]
+    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
+    other = sent[1][:7]
+    for number, one in enumerate([*sent[0], *other, other[0][:30] + bytes([other[0][30] ^ 1]) + other[0][31:]]):
+        writer.datagram(START_NS + number * 1_000_000, number, one)
+    del writer
+    recording = taxel.open(tmp_path / "a.mcap")
+    assert recording.verdict.damaged == {"datagrams_of_another_board": 7, "datagrams_damaged": 1}
+    assert "7 datagrams of another board" in recording.verdict
+    assert len(recording.events) == 3 * 4096
+
+
+def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:
+    lost = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
+    silent = Verdict._of({"counts": {}})
+    assert (silent.status, Verdict._together([("a", silent), ("b", lost)]).status) == ("nothing arrived", "lost")
+    assert Verdict._together([("a", silent), ("b", Verdict("nothing lost"))]).status == "nothing arrived"
+
+
+def test_datagrams_without_bytes_are_no_recording_of_which_nothing_is_lost(tmp_path: Path) -> None:
+    with (
+        taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "a.mcap") as live,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        for _ in range(10):
+            link.sendto(b"", live.address)
+        until(lambda: live.counters["decoded"] == 10)
+        told = live.stop().verdict
+    (tmp_path / "b.mcap").write_bytes((tmp_path / "a.mcap").read_bytes()[:-300])
+    for verdict in (told, *(taxel.open(tmp_path / f"{name}.mcap").verdict for name in "ab")):
+        assert verdict.damaged["empty_datagrams"] == 10
+        assert "10 empty datagrams" in verdict
+
+
+def test_what_an_error_was_is_no_verdict() -> None:
+    why = {"ending": {"stopped": "LOST/a.mcap (disk 3): no space left on device"}}
+    stopped = Verdict._of({"file": why | {"so_far": {"received": 5, "recorded": 5}}})
+    assert stopped.status == "unfinished"
+    assert Verdict.from_dict(stopped.to_dict()).to_dict() == stopped.to_dict()
+
+
+def test_a_converted_recording_has_no_count_of_what_was_received(tmp_path: Path) -> None:
+    taxel.convert(some_events(300), tmp_path / "a.npz")
+    taxel.convert(tmp_path / "a.npz", tmp_path / "b.mcap")
+    assert taxel.open(tmp_path / "b.mcap").counts["received"] is None
+    record(tmp_path / "c.mcap", some_events(300))
+    assert taxel.open(tmp_path / "c.mcap").counts["received"] > 0

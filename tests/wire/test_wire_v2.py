@@ -2,6 +2,7 @@
 
 import json
 import random
+import struct
 import threading
 from dataclasses import asdict
 from pathlib import Path
@@ -12,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import taxel
-from taxel import wire
+from taxel import _core, wire
 from taxel.simulate import Board
 from taxel.wire import Columns, Counts, Registers, StreamReader, decode
 
@@ -322,3 +323,28 @@ def test_the_old_names_of_version_2_work_and_name_the_new_ones():
         assert taxel.wire_v2.StreamReader is StreamReader
     with pytest.raises(AttributeError, match="no attribute 'decoders'"):
         _ = taxel.wire_v2.decoders
+
+
+@pytest.mark.parametrize("first", [0, 5])
+def test_what_the_board_counted_as_dropped_is_lost_though_no_flag_came(first, tmp_path):
+    """Where datagrams with the flag were lost, or the board sets none; before the first totals nothing is known."""
+    sent = []
+    for sequence in range(20):
+        t, dropped = 200 * sequence, 30 if sequence < 10 else 75
+        events = words(1, [(t, 3, 4, sequence % 2 > 0, 40 + sequence)], base=t, stride=6)
+        totals = struct.pack("<5Q", sequence, sequence, dropped, sequence, 0)
+        is_totals = sequence % 5 == 4
+        sent.append(datagram(4 if is_totals else 1, totals if is_totals else events, sequence=sequence, base=t))
+    decoder = Decoder()
+    for one in sent[first:]:
+        decoder.push(one)
+    dropped = 45 if first else 75
+    assert decoder.counts.events_dropped == dropped
+    header = {"array": taxel.Array.thesis()._geometry(), "source": "udp 127.0.0.1:5208", "started_ns": 0}
+    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(header), "none", False)
+    for number, one in enumerate(sent[first:]):
+        writer.datagram(1_700_000_000_000_000_000 + number * 200_000, number, one)
+    del writer
+    verdict = taxel.open(tmp_path / "a.mcap").verdict
+    assert verdict.lost == {"events_dropped_by_board": dropped}
+    assert f"LOST: {dropped} events dropped by the board by its own count" in verdict

@@ -40,6 +40,10 @@ use socket::Socket;
 /// Interval at which the thread checks whether it must stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
+/// Of how many messages of a batch the sender is asked. Asking costs 9 % of receiving a message; of batches as full as those
+/// at the highest rates, 140 messages of 1400 bytes, less than 1 %. At other rates it is every message.
+const ASKED: u64 = 12;
+
 /// Largest amount received at a time, bytes.
 const AT_ONCE: usize = 4 * socket::LARGEST;
 
@@ -276,8 +280,7 @@ fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
 fn fill(socket: &mut Socket, batch: &mut Batch, wait: Option<Duration>) -> io::Result<u64> {
     let mut messages = 0;
     while batch.room() >= socket::LARGEST {
-        // The sender of each message would cost a tenth of receiving it.
-        if socket.receive(batch, messages == 0)? {
+        if socket.receive(batch, messages < ASKED)? {
             messages += 1;
         } else if messages > 0 || !wait.map_or(Ok(false), |timeout| socket.wait(timeout))? {
             break;

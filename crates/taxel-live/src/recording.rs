@@ -33,9 +33,9 @@ pub use mcap_reader::{Datagrams, Decoded, Message, Numbers, Place, Reader, Remar
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
 pub use pictures::{Encoding, PictureSource, Pictures};
-pub use stream::{Samples, Stream, fields};
+pub use stream::{Faults, Samples, Stream, fields};
 pub use topic::Topic;
-pub(crate) use verdict::REFUSED;
+pub(crate) use verdict::{ADDRESS, EMPTY, JUMPED_BEFORE, REFUSED};
 pub use verdict::{
     Basis, Condition, Counts, Ending, Found, NOTHING_LOST, Rebuilt, Status, Verdict, damage, damage_of_version_1,
 };

@@ -207,3 +207,17 @@ fn a_datagram_to_nobody_is_sent_and_counted() {
     let sent = send(address, 100, true);
     assert_eq!(sent.datagrams, 100);
 }
+
+#[test]
+fn a_second_sender_is_told_in_the_midst_of_a_batch_and_another_address_too() {
+    let receiver = Receiver::bind(ANY, ReceiverOptions::default()).expect("a port");
+    let boards = [0; 3].map(|_| UdpSocket::bind(ANY).expect("a port"));
+    for which in [0, 0, 1, 0, 0, 2, 2] {
+        boards[which].send_to(&datagram(3), receiver.address()).expect("sent");
+    }
+    let mut batch = Batch::new();
+    assert!(receiver.receive(&mut batch, Duration::from_secs(5)).expect("a sound socket"));
+    assert_eq!(batch.iter().count(), 7, "one batch");
+    let counts = receiver.counts();
+    assert_eq!((counts.changes_between_senders, counts.changes_of_address), (1, 2));
+}

@@ -267,7 +267,8 @@ fn all_that_a_decoder_of_version_2_could_not_use_is_damage() {
         old: 1,
         short: 2,
         long: 3,
-        foreign: 4,
+        foreign: 4 + 12,
+        other_board: 12,
         checksum: 5,
         unknown_kind: 6,
         unknown_flags: 7,
@@ -282,6 +283,7 @@ fn all_that_a_decoder_of_version_2_could_not_use_is_damage() {
     let expected = [
         ("datagrams_damaged", 2 + 3 + 4 + 5),
         ("datagrams_of_an_unknown_kind", 6),
+        ("datagrams_of_another_board", 12),
         ("datagrams_too_late", 1),
         ("datagrams_with_unknown_flags", 7),
         ("differences_from_an_unknown_value", 11),

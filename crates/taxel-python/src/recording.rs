@@ -35,14 +35,13 @@ type DecodedOut<'py> = (
     String,
 );
 
-/// Arrival ns, number and own time us of each sample, all values, lines that could not be read, how often the clock began anew.
+/// Arrival ns, number and own time us of each sample, all values, what could not be read and what is wrong with the stamps as JSON.
 type SamplesOut<'py> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<u64>>,
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<f64>>,
-    u64,
-    u64,
+    String,
 );
 
 /// Arrival ns, number, where each begins, all bytes.
@@ -79,7 +78,7 @@ impl RecordingReader {
     fn samples<'py>(&self, py: Python<'py>) -> PyResult<SamplesOut<'py>> {
         let all = enter(py, |stop| self.reader.samples(stop))?;
         let (arrived, number) = (array(py, all.arrived_ns), array(py, all.number));
-        Ok((arrived, number, array(py, all.t), array(py, all.values), all.bad, all.resets))
+        Ok((arrived, number, array(py, all.t), array(py, all.values), json!(all.found).to_string()))
     }
 
     /// All pictures of a source: time us of each, all values, messages that are no picture of its array.

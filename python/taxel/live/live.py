@@ -234,11 +234,12 @@ class Live:
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
         `wire_late` (events of version 2 that arrived after time had passed theirs), `wire_jumps` (of the times of
         version 1 ahead of this computer's clock), `wire_repeated` (datagrams of version 1 that came again),
-        `arrived_ns` (when the latest datagram arrived, ns since 1970, or None), `heartbeat_us` (the longest interval
-        between heartbeats of a board of version 2, or None), `arrival` (state: "nothing", "arriving", "quiet" or
-        "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended), `bridged` (None, or of a board of
-        another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
-        ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
+        `wire_empty` (those without bytes), `arrived_ns` (when the latest datagram arrived, ns since 1970, or None),
+        `heartbeat_us` (the longest interval between heartbeats of a board of version 2, or None), `arrival` (state:
+        "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended),
+        `bridged` (None, or of a board of another computer: parcels, missing, dropped, dropped_by_kernel, repeated,
+        refused, restarts, silences, heard, ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`,
+        `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range
         that it had in training; None if that is not known), `detections_dropped`, `sources` (the counts of

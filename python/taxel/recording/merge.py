@@ -121,12 +121,14 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         lost.append("the calibration (it is of one of the sensors)")
     fields["zeroings"] = _zeroings(parts, shifts, lefts, lost, beside=beside)
     fields["held"] = _beside_held(parts, array, lefts) if beside else _held(parts, tables, shifts, lost)
-    # Parts of one file, or of one merged recording, have the verdict of the whole, which counts once.
-    verdicts: dict[Any, tuple[str, Verdict]] = {}
+    # Parts of one file, or of one merged recording, have the verdict of the whole, which counts once; sources of one
+    # file share its damage.
+    verdicts: dict[Any, dict[Any, tuple[str, Verdict]]] = {}
     for p, shift in zip(parts, shifts, strict=True):
         said = verdict_of(p)
-        whole = id(said) if p.kind == "merged" else (p.path, p.name, p.label, said)
-        verdicts.setdefault(whole, (p.name, said._later(shift)))
+        file, whole = (id(said), None) if p.kind == "merged" else (p.path, (p.name, p.label, said))
+        verdicts.setdefault(file, {}).setdefault(whole, (p.name, said._later(shift)))
+    of_files = [(next(iter(own.values()))[0], Verdict._of_sources(own.values())) for own in verdicts.values()]
     together = after(
         "merge",
         parts[0].but(lost=tuple(dict.fromkeys(line for part in parts for line in part.lost))),
@@ -141,7 +143,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         frames=frames,
         notes=_notes(parts, tables, shifts),
         detections=_detections(parts, shifts),
-        verdict=None if all(p.verdict is None for p in parts) else Verdict._together(verdicts.values()),
+        verdict=None if all(p.verdict is None for p in parts) else Verdict._together(of_files),
         remarks=named([(part.name, part.remarks) for part in parts]),
         truncated=any(part.truncated for part in parts),
         **fields,

@@ -80,7 +80,7 @@ class _Source:
         decoded = Once(lambda: self.reader.decode(pairing))
         arrived = lambda: self.remarks()["datagrams"] > 0  # noqa: E731  the same for two fields
         return Contents(
-            **self.common | {"verdict": once(lambda: self.verdict(decoded))},
+            **self.common | {"verdict": once(lambda: self.verdict(lambda: decoded()[7]))},
             **self.remarked(),
             events=once(lambda: Events._from_parts(decoded()[0], self.array)),
             clock=once(lambda: _clock(decoded()), arrived),
@@ -119,9 +119,8 @@ class _Source:
 
         def counts() -> dict[str, Any]:
             t, _, bad = read()
-            received = (self.ending.get("finished", {}).get("counts") or {}).get("received")
             damage = {"pictures": len(t), "pictures_that_could_not_be_read": bad}
-            return {**damage, "received": received, **self.rebuilt()}
+            return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
         names = about.get("columns")
         return Contents(
@@ -139,7 +138,7 @@ class _Source:
         read = Once(self.reader.samples)
 
         def samples() -> Samples:
-            arrived, number, t, values, _, _ = read()
+            arrived, number, t, values, _ = read()
             rows = values.reshape(len(t), self.array.columns)
             if stream.get("time") is not None:
                 own = t / float(stream["unit_us"])
@@ -147,13 +146,13 @@ class _Source:
             return Samples(self.header, arrived, number, t, np.ascontiguousarray(rows))
 
         def frames() -> Frames:
-            _, _, t, values, _, _ = read()
+            _, _, t, values, _ = read()
             order = np.argsort(t, kind="stable")
             rows = values.reshape(len(t), 1, self.array.columns)[order]
             return Frames(rows.astype(np.float32), ascending(t[order]), unit="as sent", array=self.array)
 
         return Contents(
-            **self.common,
+            **self.common | {"verdict": once(lambda: self.verdict(lambda: read()[4]))},
             frames=once(frames),
             clock=once(lambda: Clock(read()[2], read()[0])),
             counts=once(lambda: self.counts_of_stream(read()), lambda: True),
@@ -193,7 +192,7 @@ class _Source:
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
         remarks = self.remarks()
-        counts = self.ending.get("finished", {}).get("counts") or remarks["counts"] or {}
+        counts = self.counted() or remarks["counts"] or {}
         of_2 = json.loads(decoded[5])
         # What this computer dropped or the file lost is missing among the board's numbers too, and is counted apart.
         skipped = remarks["condition"]["skipped_numbers"]
@@ -202,7 +201,7 @@ class _Source:
             "datagrams": remarks["datagrams"],
             "bytes": remarks["datagram_bytes"],
             "missing_numbers": skipped,
-            "lost_in_file": self.verdict(lambda: decoded).lost.get("lost_in_file", 0),
+            "lost_in_file": self.verdict(lambda: decoded[7]).lost.get("lost_in_file", 0),
             **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
             "decoder": json.loads(decoded[1]),
             **({"decoder_version_2": of_2} if of_2["datagrams"] else {}),
@@ -211,25 +210,29 @@ class _Source:
 
     def counts_of_stream(self, read: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and lines of a stream, by cause."""
-        _, _, t, _, bad, resets = read
-        counts = self.ending.get("finished", {}).get("counts") or {}
-        damage = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
-        return {**damage, "received": counts.get("received"), **self.rebuilt()}
+        found = {"samples": len(read[2]), **json.loads(read[4])["damage"]}
+        return {**found, "received": self.counted().get("received"), **self.rebuilt()}
 
-    def verdict(self, decoded: Callable[[], tuple[Any, ...]] | None = None) -> Verdict:
-        """Return what was lost at which stage; `decoded` decodes a board."""
+    def counted(self) -> dict[str, Any]:
+        """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""
+        counts = self.ending.get("finished", {}).get("counts") or {}
+        return {} if self.header.get("converted") or counts.get("converted") else counts
+
+    def verdict(self, found: Callable[[], str] | None = None) -> Verdict:
+        """Return what was lost at which stage; `found` decodes a board or a stream, and returns what it found."""
         condition = self.remarks()["condition"]
-        if decoded is not None and condition["messages"] and self.must_decode():
-            condition = condition | {"decoded": json.loads(decoded()[7])}
+        if found is not None and condition["messages"] and self.must_decode():
+            condition = condition | {"decoded": json.loads(found())}
         return Verdict._of({"file": condition})
 
     def must_decode(self) -> bool:
-        """Return whether the counts in the file do not tell what decoding finds: damage at the end, jumps of time."""
+        """Return whether the counts in the file do not tell what decoding finds: damage at the end, doubtful times."""
         if "finished" not in self.ending:
             return True
         counts = self.ending["finished"]["counts"]
         converted = self.header.get("converted") or counts.get("converted")
-        return not converted and counts["decoder"].get("jumps_of_time", 0) > 0
+        doubtful = any(counts["decoder"].get(cause, 0) for cause in ("jumps_of_time", "stamps_out_of_order"))
+        return not converted and doubtful
 
 
 def _clock(decoded: tuple[Any, ...]) -> Clock:

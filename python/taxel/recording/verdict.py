@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Self, get_args
 
@@ -12,13 +13,16 @@ from taxel._core import ProblemError
 
 __all__ = ["STATUSES", "Status", "Verdict"]
 
-Status = Literal["complete", "complete after arrival", "unknown", "damaged", "unfinished", "lost", "nothing arrived"]
+Status = Literal["complete", "complete after arrival", "unknown", "damaged", "unfinished", "nothing arrived", "lost"]
 
 #: All statuses, from the best to the worst.
 STATUSES: tuple[Status, ...] = get_args(Status)
 
 #: The whole numbers of a verdict, each a mapping from cause to number.
 _NUMBERS = ("lost", "damaged", "noted")
+
+#: The error in a text that an error stopped a recording.
+_ERROR = re.compile(r"(?<=stopped by an error) \(.*\)(?=: what came last)")
 
 
 class Verdict(str):
@@ -37,7 +41,7 @@ class Verdict(str):
 
     Attributes
     ----------
-    status : {"complete", "complete after arrival", "unknown", "damaged", "unfinished", "lost", "nothing arrived"}
+    status : {"complete", "complete after arrival", "unknown", "damaged", "unfinished", "nothing arrived", "lost"}
         From the best to the worst; of several parts the worst.
     lost : dict of int
         What was lost, by cause; of several parts the sum.
@@ -185,9 +189,12 @@ def _stated(held: Any) -> dict[str, Any]:
         raise ProblemError(
             f"verdict: its status is {own['status']}, but its times are doubtful: must be damaged, or worse"
         )
-    # The text on several parts begins with the name of one.
-    if STATUSES.index(own["status"]) < STATUSES.index("lost") and own["text"].startswith("LOST") and not parts:
-        raise ProblemError(f"verdict: its status is {own['status']}, but its text begins LOST: must be lost, or worse")
+    # The text on several parts has their names, and that of an error what the system said.
+    told = Verdict(_ERROR.sub("", own["text"])).status
+    if STATUSES.index(own["status"]) < STATUSES.index(told) and not parts:
+        raise ProblemError(
+            f"verdict: its status is {own['status']}, but its text says {told}: must be {told}, or worse"
+        )
     stated = {str(name): _stated(part) for name, part in parts.items()}
     for name, part in stated.items():
         inner = part["status"]

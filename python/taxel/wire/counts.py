@@ -46,6 +46,8 @@ class Counts:
     long, foreign, checksum : int
         Version 2: the number of datagrams refused because they are longer than 1400 bytes, are not of version 2 or come
         from another board, or have a wrong checksum.
+    other_board : int
+        Version 2: the number of those among `foreign` that are intact, and of another board than the first.
     missing : int
         Version 2: the number of sequence numbers between the first and the last of each session that were never
         received intact.
@@ -61,6 +63,9 @@ class Counts:
         Version 2: the number of states on the array, and of those among them that were out of date on arrival.
     dropped, resets : int
         Version 2: the number of datagrams that report dropped events, and of resets of the board.
+    events_dropped : int
+        Version 2: the number of events that the board dropped by its own totals (kind 4), from its reset or from the
+        first totals on.
     unknown_value : int
         Version 2: the number of differences from a value that was not received; their events have no intensity.
 
@@ -99,6 +104,7 @@ class Counts:
     long: int = 0
     foreign: int = 0
     checksum: int = 0
+    other_board: int = 0
     missing: int = 0
     unknown_kind: int = 0
     unknown_flags: int = 0
@@ -110,6 +116,7 @@ class Counts:
     stale: int = 0
     dropped: int = 0
     resets: int = 0
+    events_dropped: int = 0
     unknown_value: int = 0
 
 

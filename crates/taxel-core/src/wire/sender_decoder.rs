@@ -54,6 +54,7 @@ pub struct SenderDecoder {
     ahead: Ahead,
     recent: Recent,
     repeated: u64,
+    empty: u64,
 }
 
 impl SenderDecoder {
@@ -75,6 +76,7 @@ impl SenderDecoder {
             ahead: Ahead::default(),
             recent: Recent::default(),
             repeated: 0,
+            empty: 0,
         }
     }
 
@@ -132,6 +134,12 @@ impl SenderDecoder {
         self.repeated
     }
 
+    /// Number of datagrams without bytes, from a sender that uses version 1.
+    #[must_use]
+    pub fn empty(&self) -> u64 {
+        self.empty
+    }
+
     /// Notes that a recording begins, as [`v2::Decoder::begin_recording`] does.
     pub fn begin_recording(&mut self) {
         self.two.begin_recording();
@@ -167,6 +175,7 @@ impl SenderDecoder {
             if self.version == 2 {
                 self.change(1, out);
             }
+            self.empty += u64::from(datagram.is_empty());
             self.repeated += u64::from(self.recent.repeats(datagram, arrived, &self.array, self.one.has_values()));
             let rows = out.len();
             let markers = out.markers.len();

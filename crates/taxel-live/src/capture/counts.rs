@@ -18,8 +18,11 @@ pub struct Counts {
     /// Number of payload bytes in those datagrams.
     pub bytes_dropped_by_queue: u64,
     /// Number of times that the sender was again the one before the last, as two senders at one port are in turn; looked at
-    /// in the first message of each batch.
+    /// in the first messages of each batch.
     pub changes_between_senders: u64,
+    /// Number of times that the sender had an address that was not one of the last two: the board's own changed, or another board
+    /// went on.
+    pub changes_of_address: u64,
     /// Datagrams that wait to be read.
     pub waiting: u64,
     /// Size of the kernel's own queue, bytes, as the kernel counts them (including its overhead).
@@ -33,6 +36,7 @@ pub struct Counts {
 pub(super) struct Totals {
     pub(super) dropped_by_kernel: u64,
     pub(super) changes_between_senders: u64,
+    pub(super) changes_of_address: u64,
 }
 
 impl Counts {
@@ -44,6 +48,7 @@ impl Counts {
         self.bytes += bytes as u64;
         self.dropped_by_kernel = totals.dropped_by_kernel;
         self.changes_between_senders = totals.changes_between_senders;
+        self.changes_of_address = totals.changes_of_address;
         first
     }
 }

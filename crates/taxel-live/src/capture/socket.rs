@@ -177,6 +177,7 @@ impl Socket {
         let [last, before] = self.senders;
         if sender != last {
             self.totals.changes_between_senders += u64::from(sender == before);
+            self.totals.changes_of_address += u64::from(sender != before && last != Address::default());
             self.senders = [sender, last];
         }
     }

@@ -12,7 +12,7 @@ use crate::bridged::Bridged;
 use crate::capture;
 use crate::clock::{Offset, Pace};
 use crate::latency::Quantiles;
-use crate::recording::Verdict;
+use crate::recording::{Found, Verdict};
 
 /// Counts of what arrived, how it was processed, and what was lost at which stage.
 ///
@@ -69,6 +69,8 @@ pub struct DecodingCounts {
     pub wire_jumps: u64,
     /// Number of datagrams of version 1 that came again.
     pub wire_repeated: u64,
+    /// Number of datagrams of version 1 without bytes.
+    pub wire_empty: u64,
     /// Number of decoded events.
     pub events: u64,
 }
@@ -188,6 +190,7 @@ impl Counters {
             dropped_by_queue,
             bytes_dropped_by_queue: now.bytes_dropped_by_queue - before.bytes_dropped_by_queue,
             changes_between_senders: now.changes_between_senders - before.changes_between_senders,
+            changes_of_address: now.changes_of_address - before.changes_of_address,
             waiting: 0,
             ..*now
         };
@@ -215,6 +218,7 @@ impl DecodingCounts {
             wire_late: self.wire_late - earlier.wire_late,
             wire_jumps: self.wire_jumps - earlier.wire_jumps,
             wire_repeated: self.wire_repeated - earlier.wire_repeated,
+            wire_empty: self.wire_empty - earlier.wire_empty,
             events: self.events - earlier.events,
         }
     }
@@ -262,5 +266,8 @@ pub enum SourceCounts {
         strange: u64,
         /// The system's last error, if reading failed.
         trouble: Option<String>,
+        /// What is wrong with its lines and stamps, as a verdict states it.
+        #[serde(skip)]
+        faults: Found,
     },
 }

@@ -221,6 +221,7 @@ impl DecodeStage {
         counters.decoding.wire_late = self.late;
         counters.decoding.wire_jumps = self.decoder.ahead().jumps;
         counters.decoding.wire_repeated = self.decoder.repeated();
+        counters.decoding.wire_empty = self.decoder.empty();
         counters.decoding.events += self.events.len() as u64;
         counters.board.arrived_ns = self.arrivals.latest_ns;
         counters.board.heartbeat_us = self.arrivals.heartbeat_us;

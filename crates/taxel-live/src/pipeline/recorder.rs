@@ -434,6 +434,10 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
     let (mut decoder, missing) = recording::damage(wire, *wire_jumps, *wire_repeated, wire_v2);
     decoder.insert(recording::REFUSED.to_owned(), now.decoding.wire_refused);
     decoder.insert("changes_between_senders".to_owned(), now.capture.changes_between_senders);
+    decoder.insert(recording::EMPTY.to_owned(), now.decoding.wire_empty);
+    decoder.insert(recording::ADDRESS.to_owned(), now.capture.changes_of_address);
+    let jumped = since.map_or(0, |begun| begun.decoding.wire_jumps);
+    decoder.insert(recording::JUMPED_BEFORE.to_owned(), jumped);
     // Version 1 does not number datagrams: a recording with any of it cannot state that none is missing.
     let knows = now.decoding.wire_v2.intact > 0 && now.decoding.wire.bytes == 0;
     recording::Counts {

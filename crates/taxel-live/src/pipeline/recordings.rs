@@ -125,7 +125,7 @@ pub(super) fn verdict(name: &str, place: &Origin, counters: &Counters, nothing: 
     let others = counters.sources.iter().map(|(name, counts)| {
         let verdict = match counts {
             SourceCounts::Board(counts) => losses(counts, None).verdict(),
-            SourceCounts::Numbers { lines, strange, .. } => Verdict::of_lines(&losses_of_lines(*lines, *strange)),
+            SourceCounts::Numbers { lines, faults, .. } => Verdict::of_lines(&losses_of_lines(*lines, faults)),
         };
         (name.clone(), verdict)
     });

@@ -220,7 +220,7 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
     let mut numbers = None;
     while Instant::now() < until {
         let ended = reader.fill().map_err(|error| reader.broken(error))?;
-        while let Some(line) = reader.line() {
+        while let Some(line) = reader.line(ended) {
             if std::mem::take(&mut skip) {
                 continue;
             }
@@ -301,11 +301,13 @@ impl LineReader {
         Ok(false)
     }
 
-    /// The next whole line; of a line that is too long, the part that has arrived.
-    pub(super) fn line(&mut self) -> Option<String> {
-        let end =
-            self.bytes.iter().position(|&byte| byte == b'\n').or((self.bytes.len() > LONGEST).then_some(LONGEST))?;
-        let line: Vec<u8> = self.bytes.drain(..=end.min(self.bytes.len() - 1)).collect();
+    /// The next whole line; of a line that is too long, the part that has arrived. The last one may lack its end where no more
+    /// can arrive (`ended`).
+    pub(super) fn line(&mut self, ended: bool) -> Option<String> {
+        let whole = self.bytes.iter().position(|&byte| byte == b'\n');
+        let long = (self.bytes.len() > LONGEST).then_some(LONGEST);
+        let rest = if ended { self.bytes.len().checked_sub(1) } else { None };
+        let line: Vec<u8> = self.bytes.drain(..=whole.or(long).or(rest)?).collect();
         Some(String::from_utf8_lossy(&line).trim_end_matches(['\r', '\n']).to_owned())
     }
 

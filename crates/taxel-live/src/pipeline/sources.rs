@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::JoinHandle;
 
@@ -17,7 +17,7 @@ use super::recorder::{Host, Part};
 use super::shared::Shared;
 use super::source::{LineReader, Place, Source, SourceKind};
 use crate::locked::lock;
-use crate::recording::{self, Stream, Track, fields};
+use crate::recording::{self, Faults, Found, Stream, Track, fields};
 use crate::{Error, Result};
 
 /// A running stream of numbers.
@@ -27,32 +27,26 @@ pub(super) struct Numbers {
     always: bool,
     track: Mutex<NumbersTrack>,
     stream: Stream,
-    lines: AtomicU64,
-    strange: AtomicU64,
     trouble: Mutex<Option<String>>,
     ends: AtomicBool,
 }
 
 /// The part of a recording into which lines are written, if any.
-#[derive(Default)]
 struct NumbersTrack {
     track: Option<Track>,
-    /// Number of lines, and of lines that could not be parsed, before this part.
-    before: (u64, u64),
+    /// Number of all lines, and of those before this part.
+    lines: u64,
+    before: u64,
+    /// What is wrong with the lines of this part, and of all.
+    faults: Faults,
+    all: Faults,
 }
 
 impl Numbers {
     pub(super) fn new(part: Part, stream: Stream, always: bool) -> Self {
-        Self {
-            part,
-            always,
-            track: Mutex::default(),
-            stream,
-            lines: AtomicU64::new(0),
-            strange: AtomicU64::new(0),
-            trouble: Mutex::default(),
-            ends: AtomicBool::new(false),
-        }
+        let faults = Faults::new(&stream);
+        let track = NumbersTrack { track: None, lines: 0, before: 0, all: faults.clone(), faults };
+        Self { part, always, track: Mutex::new(track), stream, trouble: Mutex::default(), ends: AtomicBool::new(false) }
     }
 
     /// Records a line of numbers.
@@ -62,16 +56,20 @@ impl Numbers {
             let (name, n) = (&self.part.name, values.len());
             return Err(problem!("source {name}: {n} values; its columns are {columns}").into());
         }
-        self.record(|track, number| track.sample(arrived_ns, number, values))
+        let faults = |faults: &mut Faults| faults.line(&self.stream, values, arrived_ns);
+        self.record(faults, |track, number| track.sample(arrived_ns, number, values))
     }
 
-    /// Counts a line, and records it if a recording runs. Each line belongs to one recording.
-    fn record(&self, write: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
+    /// Counts a line with its faults, and records it if a recording runs. Each line belongs to one recording.
+    fn record(&self, count: impl Fn(&mut Faults), write: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
         let mut current = lock(&self.track);
         if self.always && current.track.is_none() {
             current.track = Some(self.part.open()?);
         }
-        let number = self.lines.fetch_add(1, Ordering::Relaxed);
+        let number = current.lines;
+        current.lines += 1;
+        count(&mut current.faults);
+        count(&mut current.all);
         current.track.as_ref().map_or(Ok(()), |track| write(track, number))
     }
 
@@ -81,10 +79,7 @@ impl Numbers {
             Some(values) => self.sample(arrived_ns, &values),
             // A repeated line of column names contains no numbers.
             None if fields(line).eq(self.stream.columns.iter().map(String::as_str)) || line.trim().is_empty() => Ok(()),
-            None => self.record(|track, number| {
-                self.strange.fetch_add(1, Ordering::Relaxed);
-                track.strange_line(arrived_ns, number, line)
-            }),
+            None => self.record(Faults::strange, |track, number| track.strange_line(arrived_ns, number, line)),
         }
     }
 
@@ -92,20 +87,27 @@ impl Numbers {
     /// returns them.
     pub(super) fn record_into(&self, track: Option<Track>) -> SourceCounts {
         let mut current = lock(&self.track);
-        let now = (self.lines.load(Ordering::Relaxed), self.strange.load(Ordering::Relaxed));
-        let NumbersTrack { track: ended, before } =
-            std::mem::replace(&mut *current, NumbersTrack { track, before: now });
+        let ended = std::mem::replace(&mut current.track, track);
+        let faults = std::mem::replace(&mut current.faults, Faults::new(&self.stream)).found();
+        let lines = current.lines - current.before;
+        current.before = current.lines;
         drop(current);
-        let (lines, strange) = (now.0 - before.0, now.1 - before.1);
         if let Some(track) = ended {
-            track.end(&self.part.name, losses_of_lines(lines, strange));
+            track.end(&self.part.name, losses_of_lines(lines, &faults));
         }
-        SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone() }
+        self.counts_of(lines, faults)
     }
 
     pub(super) fn counts(&self) -> SourceCounts {
-        let (lines, strange) = (self.lines.load(Ordering::Relaxed), self.strange.load(Ordering::Relaxed));
-        SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone() }
+        let current = lock(&self.track);
+        let (lines, faults) = (current.lines, current.all.found());
+        drop(current);
+        self.counts_of(lines, faults)
+    }
+
+    fn counts_of(&self, lines: u64, faults: Found) -> SourceCounts {
+        let strange = faults.strange();
+        SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone(), faults }
     }
 
     /// Records no more lines: ends its part of the recording with its counts.
@@ -134,7 +136,7 @@ impl Numbers {
                     }
                 };
                 let at_ns = reader.came_ns;
-                while let Some(line) = reader.line() {
+                while let Some(line) = reader.line(ended) {
                     let cut = std::mem::take(&mut first) && numbers.stream.parse(&line).is_none();
                     let recorded = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
                     if let Err(error) = recorded {
@@ -156,8 +158,8 @@ impl Numbers {
 }
 
 /// The losses of a stream of numbers, as recordings state them.
-pub(super) fn losses_of_lines(lines: u64, strange: u64) -> recording::Counts {
-    let decoder = BTreeMap::from([("lines_that_could_not_be_read".to_owned(), strange)]);
+pub(super) fn losses_of_lines(lines: u64, faults: &Found) -> recording::Counts {
+    let decoder = faults.damage.clone();
     recording::Counts { received: lines, recorded: lines, decoder, ..recording::Counts::default() }
 }
 

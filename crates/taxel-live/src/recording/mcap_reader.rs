@@ -274,6 +274,7 @@ impl Reader {
             converted: self.header().converted.clone().map(Box::new),
             decoded: None,
             lines: data == Topic::Samples,
+            origin_us: self.header().origin_us,
         }
     }
 

@@ -1,16 +1,14 @@
 //! Sources that are not boards: lines of numbers, for example from an IMU, with or without time stamps of their own.
 
+mod clock;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
 use super::limits;
-
-/// Range of a counter: whole numbers are assumed to have 32 bits.
-const TURN: f64 = 4_294_967_296.0;
-
-/// A clock that steps back by more than this has restarted, us.
-const STEP_BACK_US: f64 = 1e6;
+use super::verdict::{Found, STRANGE};
+use clock::StreamClock;
 
 /// The columns of a source's lines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -115,10 +113,8 @@ pub struct Samples {
     pub t: Vec<i64>,
     /// The values without the clock column, line by line.
     pub values: Vec<f64>,
-    /// Number of lines that could not be parsed.
-    pub bad: u64,
-    /// Number of restarts of the clock.
-    pub resets: u64,
+    /// What could not be read, and what is wrong with the stamps, as a verdict states it.
+    pub found: Found,
 }
 
 /// Decodes a stream's messages.
@@ -126,27 +122,18 @@ pub struct Samples {
 pub(super) struct Sampling<'a> {
     stream: &'a Stream,
     samples: Samples,
-    /// Whether all stamps so far are whole numbers, so that they may be those of a counter.
-    whole: bool,
-    /// Added to stamps, us.
-    added: f64,
-    /// The last time, with this addition, us, and its arrival time, ns.
-    last: Option<(f64, i64)>,
+    faults: Faults,
 }
 
 impl<'a> Sampling<'a> {
     pub(super) fn new(stream: &'a Stream) -> Self {
-        Self { stream, samples: Samples::default(), whole: true, added: 0.0, last: None }
+        Self { stream, samples: Samples::default(), faults: Faults::new(stream) }
     }
 
     pub(super) fn push(&mut self, at_ns: i64, number: u64, data: &[u8]) {
-        let Some((stamp, values)) = self.parse(data) else {
-            self.samples.bad += 1;
+        let Some((t, values)) = self.parse(at_ns, data) else {
+            self.faults.strange();
             return;
-        };
-        let t = match stamp {
-            None => at_ns.div_euclid(1000),
-            Some(stamp) => self.unwrapped(stamp, at_ns),
         };
         self.samples.arrived_ns.push(at_ns);
         self.samples.number.push(number);
@@ -154,65 +141,97 @@ impl<'a> Sampling<'a> {
         self.samples.values.extend(values);
     }
 
-    /// The stamp and the values of a message; a value that JSON cannot represent becomes NaN.
-    fn parse(&self, data: &[u8]) -> Option<(Option<f64>, Vec<f64>)> {
+    /// The time and the values of a message; a value that JSON cannot represent becomes NaN.
+    fn parse(&mut self, at_ns: i64, data: &[u8]) -> Option<(i64, Vec<f64>)> {
         let message: Value = serde_json::from_slice(data).ok()?;
         let named = message.get("values")?.as_object()?;
         let values = self.stream.values().map(|name| Some(named.get(name)?.as_f64().unwrap_or(f64::NAN)));
+        let values = values.collect::<Option<_>>()?;
         let stamp = match &self.stream.time {
             None => None,
             Some(time) => Some(named.get(time)?.as_f64()?),
         };
-        Some((stamp, values.collect::<Option<_>>()?))
-    }
-
-    /// Converts a stamp to a time, us.
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
-    fn unwrapped(&mut self, stamp: f64, at_ns: i64) -> i64 {
-        self.whole &= stamp.fract() == 0.0 && (0.0..TURN).contains(&stamp);
-        let own = stamp * self.stream.unit_us;
-        if let Some((last, last_ns)) = self.last {
-            let passed = (at_ns - last_ns) as f64 * 1e-3;
-            let lacks = passed - (own + self.added - last);
-            let turn = TURN * self.stream.unit_us;
-            let turns = (lacks / turn).round();
-            // Arrival times determine the elapsed time within a second, or within a hundredth of a pause if that is
-            // longer.
-            let near = STEP_BACK_US.max(passed.abs() * 1e-2);
-            if self.whole && turns >= 1.0 && (lacks - turns * turn).abs() <= near {
-                self.added += turns * turn;
-            } else if own + self.added < last - STEP_BACK_US && lacks > near {
-                self.added += lacks;
-                self.samples.resets += 1;
-            }
-        }
-        let t = own + self.added;
-        self.last = Some((t, at_ns));
-        t.round() as i64
+        Some((self.faults.time(stamp, at_ns)?, values))
     }
 
     pub(super) fn finish(self) -> Samples {
-        self.samples
+        Samples { found: self.faults.found(), ..self.samples }
+    }
+}
+
+/// Counts what could not be read of a stream, and what is wrong with its stamps: while it is recorded as in its file.
+#[derive(Debug, Clone)]
+pub struct Faults {
+    strange: u64,
+    clock: StreamClock,
+}
+
+impl Faults {
+    /// None so far.
+    #[must_use]
+    pub fn new(stream: &Stream) -> Self {
+        Self { strange: 0, clock: StreamClock::new(stream.unit_us) }
+    }
+
+    /// Counts a line that could not be read.
+    pub fn strange(&mut self) {
+        self.strange += 1;
+    }
+
+    /// The time, us, of a line with this stamp or none that arrived at `at_ns`; none if the stamp is no time.
+    pub fn time(&mut self, stamp: Option<f64>, at_ns: i64) -> Option<i64> {
+        match stamp {
+            None => Some(at_ns.div_euclid(1000)),
+            Some(stamp) => self.clock.time(stamp, at_ns),
+        }
+    }
+
+    /// Counts a line of values, with the clock's stamp among them.
+    pub fn line(&mut self, stream: &Stream, values: &[f64], at_ns: i64) {
+        let clock = stream.columns.iter().position(|name| Some(name) == stream.time.as_ref());
+        if self.time(clock.map(|column| values[column]), at_ns).is_none() {
+            self.strange();
+        }
+    }
+
+    /// What was found so far, as a verdict states it.
+    #[must_use]
+    pub fn found(&self) -> Found {
+        let mut found = self.clock.found();
+        found.damage.insert(STRANGE.to_owned(), self.strange);
+        found
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::verdict::{ANEW, BACK, JUMPS};
     use super::*;
 
     fn stream(columns: &[&str]) -> Stream {
         Stream::of_columns(columns.iter().map(ToString::to_string).collect())
     }
 
-    fn times(stream: &Stream, stamps: &[(f64, i64)]) -> (Vec<i64>, u64) {
+    fn times(stream: &Stream, stamps: &[(f64, i64)]) -> (Vec<i64>, Counted) {
         let mut sampling = Sampling::new(stream);
         for (k, &(stamp, at_ns)) in stamps.iter().enumerate() {
             let message = stream.message(&[stamp, k as f64]).to_string();
             sampling.push(at_ns, k as u64, message.as_bytes());
         }
         let samples = sampling.finish();
-        assert_eq!(samples.bad, 0);
-        (samples.t, samples.resets)
+        let Found { mut damage, doubtful_after_us, .. } = samples.found;
+        assert_eq!(damage.remove(STRANGE), Some(0));
+        let mut n = |cause: &str| damage.remove(cause).unwrap();
+        (samples.t, Counted { anew: n(ANEW), back: n(BACK), jumps: n(JUMPS), after: doubtful_after_us })
+    }
+
+    /// What a stream's clock was found to have done.
+    #[derive(Debug, Default, PartialEq)]
+    struct Counted {
+        anew: u64,
+        back: u64,
+        jumps: u64,
+        after: Option<i64>,
     }
 
     #[test]
@@ -248,7 +267,7 @@ mod tests {
             truth.push(t);
             stamps.push(((t % turn) as f64, 1_700_000_000_000_000_000 + t * 1000 + (k * 7919 % 20_000) * 1000));
         }
-        assert_eq!(times(&stream, &stamps), (truth, 0));
+        assert_eq!(times(&stream, &stamps), (truth, Counted::default()));
     }
 
     #[test]
@@ -256,18 +275,63 @@ mod tests {
         let stream = stream(&["t_ms", "a"]);
         let at = |ms: i64| 1_700_000_000_000_000_000 + ms * 1_000_000;
         let stamps = [(60_000.0, at(0)), (60_010.0, at(10)), (5.0, at(2_010)), (15.0, at(2_020))];
-        let (t, resets) = times(&stream, &stamps);
+        let (t, counted) = times(&stream, &stamps);
         assert_eq!(t, [60_000_000, 60_010_000, 62_010_000, 62_020_000]);
-        assert_eq!(resets, 1);
+        assert_eq!(counted, Counted { anew: 1, ..Counted::default() });
+    }
+
+    #[test]
+    fn one_damaged_stamp_moves_no_other_and_is_no_restart() {
+        let stream = stream(&["t_us", "a"]);
+        let truth: Vec<i64> = (0..100).map(|k| 10_000_000 + k * 20_000).collect();
+        for (place, wrong) in [(50, 18_000_000), (50, 1 << 31), (50, 3), (1, 90_000_000), (98, 0)] {
+            let mut stamps: Vec<(f64, i64)> = truth.iter().map(|&t| (t as f64, t * 1000)).collect();
+            stamps[place].0 = f64::from(wrong);
+            let (mut t, counted) = times(&stream, &stamps);
+            let before = truth[place - 1];
+            assert_eq!(counted, Counted { jumps: 1, after: Some(before), ..Counted::default() }, "{wrong} at {place}");
+            t[place] = truth[place];
+            assert_eq!(t, truth, "{wrong} at {place}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_stays_ahead_of_arrival_has_jumped_and_a_line_delayed_or_a_host_set_back_has_not() {
+        let stream = stream(&["t_ms", "a"]);
+        let stamps = |ahead: f64, late_ns: i64, host_ns: i64| -> Vec<_> {
+            let late = |k: i64| if (50..80).contains(&k) { late_ns - (k - 50) * 20_000_000 } else { 0 };
+            let at = |k: i64| 1_700_000_000_000_000_000 + k * 20_000_000 + late(k) + if k < 50 { 0 } else { host_ns };
+            (0..100).map(|k| (20.0 * k as f64 + if k < 50 { 0.0 } else { ahead }, at(k))).collect()
+        };
+        let jumped = Counted { jumps: 1, after: Some(980_000), ..Counted::default() };
+        assert_eq!(times(&stream, &stamps(1500.0, 0, 0)).1, jumped);
+        assert_eq!(times(&stream, &stamps(0.0, 0, 0)).1, Counted::default());
+        assert_eq!(times(&stream, &stamps(0.0, 600_000_000, 0)).1, Counted::default());
+        assert_eq!(times(&stream, &stamps(0.0, 0, -60_000_000_000)).1, Counted::default());
+    }
+
+    #[test]
+    fn a_stamp_that_is_no_time_counts_as_a_line_that_could_not_be_read() {
+        let stream = stream(&["t_us", "a"]);
+        let mut sampling = Sampling::new(&stream);
+        let mut live = Faults::new(&stream);
+        for (k, stamp) in [1.0, f64::NAN, 1e300, 2.0].into_iter().enumerate() {
+            sampling.push(k as i64, k as u64, stream.message(&[stamp, 1.0]).to_string().as_bytes());
+            live.line(&stream, &[stamp, 1.0], k as i64);
+        }
+        let samples = sampling.finish();
+        assert_eq!((&samples.t[..], samples.found.damage[STRANGE]), (&[1, 2][..], 2));
+        assert_eq!(live.found(), samples.found);
     }
 
     #[test]
     fn seconds_with_a_fraction_have_no_turns_and_a_small_step_back_stays() {
         let stream = stream(&["t_s", "a"]);
         let at = |ms: i64| 1_700_000_000_000_000_000 + ms * 1_000_000;
-        let (t, resets) = times(&stream, &[(1.5, at(0)), (1.75, at(250)), (1.625, at(260)), (3601.5, at(3_600_000))]);
+        let (t, counted) = times(&stream, &[(1.5, at(0)), (1.75, at(250)), (1.625, at(260)), (3601.5, at(3_600_000))]);
         assert_eq!(t, [1_500_000, 1_750_000, 1_625_000, 3_601_500_000]);
-        assert_eq!(resets, 0);
+        // What came before the step back, after that time, cannot be told from what came after it.
+        assert_eq!(counted, Counted { back: 1, after: Some(1_624_999), ..Counted::default() });
     }
 
     #[test]

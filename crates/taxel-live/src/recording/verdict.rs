@@ -35,11 +35,11 @@ pub enum Status {
     Damaged,
     /// What came last is missing.
     Unfinished,
-    /// Something was lost, by one of the causes.
-    Lost,
     /// Nothing arrived at all.
     #[serde(rename = "nothing arrived")]
     NothingArrived,
+    /// Something was lost, by one of the causes.
+    Lost,
 }
 
 /// What a recording lost.
@@ -210,6 +210,8 @@ pub struct Condition {
     pub decoded: Option<Found>,
     /// Whether the source is a stream of numbers.
     pub lines: bool,
+    /// The board's time at which the recording begins, us.
+    pub origin_us: i64,
 }
 
 /// What decoding a file found.
@@ -232,9 +234,15 @@ impl Found {
     pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
         let (mut causes, missing) =
             damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.two().counts());
-        causes.insert(REFUSED.to_owned(), sender.refused());
+        causes.extend([(REFUSED.to_owned(), sender.refused()), (EMPTY.to_owned(), sender.empty())]);
         let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);
         Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us }
+    }
+
+    /// Number of lines that could not be read.
+    #[must_use]
+    pub fn strange(&self) -> u64 {
+        self.damage.get(STRANGE).copied().unwrap_or(0)
     }
 }
 
@@ -271,12 +279,13 @@ pub fn damage(
     two: &wire::v2::Counts,
 ) -> (BTreeMap<String, u64>, Option<u64>) {
     let mut causes = damage_of_version_1(counts);
-    causes.extend([(JUMPS.to_owned(), jumps), (REPEATED.to_owned(), again + two.repeated)]);
+    causes.extend([(JUMPS.to_owned(), jumps), (AGAIN.to_owned(), again), (REPEATED.to_owned(), two.repeated)]);
     if two.datagrams == 0 {
         return (causes, None);
     }
     let of_version_2 = [
-        ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign),
+        ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign - two.other_board),
+        ("datagrams_of_another_board", two.other_board),
         ("datagrams_too_late", two.old),
         ("taxels_outside_the_array", two.outside),
         ("datagrams_of_an_unknown_kind", two.unknown_kind),
@@ -284,6 +293,7 @@ pub fn damage(
         ("markers_with_an_unknown_code", two.unknown_marker),
         ("malformed_bodies", two.malformed),
         (BOARD_DROPPED, two.dropped),
+        (EVENTS_DROPPED, two.events_dropped),
         (BOARD_RESET, two.resets),
         (REPAIRED, two.repaired),
         ("differences_from_an_unknown_value", two.unknown_value),
@@ -347,7 +357,10 @@ impl Verdict {
         // after the last number), or more datagrams than messages.
         let several = counts.several_a_message && counts.dropped_by_kernel > 0 && missing > behind;
         let unclear = missing.min(behind) > 0 && (several || missing < behind || of_board(REPEATED) > 0);
-        let board = (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events");
+        let board = [
+            (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events"),
+            (of_board(EVENTS_DROPPED), EVENTS_DROPPED, "events dropped by the board by its own count"),
+        ];
         let way = if unclear {
             (missing, "lost_on_the_way_or_dropped", "datagrams lost or damaged on the way or among those dropped")
         } else {
@@ -355,7 +368,7 @@ impl Verdict {
         };
         let mut verdict = Self::default();
         let mut words = vec![];
-        for (n, cause, what) in std::iter::once(board).chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
+        for (n, cause, what) in board.into_iter().chain(dropped).chain([way]).filter(|(n, ..)| *n > 0) {
             verdict.lost.insert(cause.to_owned(), n);
             words.push(numbered(n, what));
         }
@@ -382,6 +395,8 @@ impl Verdict {
         for (n, cause, what) in [
             (of_board(REPAIRED), REPAIRED, "values repaired from the board's refresh"),
             (of_board(BOARD_RESET), BOARD_RESET, "resets of the board"),
+            (of_board(ANEW), ANEW, "restarts of its clock"),
+            (of_board(ADDRESS), ADDRESS, "changes of the sender's address"),
         ] {
             if n > 0 {
                 verdict.noted.insert(cause.to_owned(), n);
@@ -403,7 +418,7 @@ impl Verdict {
 
     /// Adds what a decoder could not use; returns its line.
     fn damage_of(&mut self, decoder: &BTreeMap<String, u64>) -> Option<String> {
-        let no_damage = [BOARD_DROPPED, BOARD_RESET, REPAIRED];
+        let no_damage = [BOARD_DROPPED, EVENTS_DROPPED, BOARD_RESET, REPAIRED, ANEW, ADDRESS];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
             // Of version 2 each is decoded once.
@@ -420,9 +435,10 @@ impl Verdict {
     /// The verdict on a source of a file.
     fn of_file(condition: Condition) -> Self {
         let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { repeated, so_far, converted, decoded, lines, .. } = condition;
+        let Condition { repeated, so_far, converted, decoded, lines, origin_us, .. } = condition;
+        let is_converted = converted.is_some();
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
-        let decoded = decoded.unwrap_or_default();
+        let mut decoded = decoded.unwrap_or_default();
         let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
         let mut no_counts = false;
         let (mut verdict, why) = match ending {
@@ -455,6 +471,9 @@ impl Verdict {
             let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
             let datagrams = lost.entry(Topic::Datagrams).or_default();
             *datagrams = skipped_numbers.saturating_sub(before).max(*datagrams);
+        }
+        if verdict.damaged.contains_key(JUMPED_BEFORE) && !is_converted {
+            decoded.doubtful_after_us = Some(origin_us - 1);
         }
         let mut bad = vec![];
         for (n, cause, text) in [
@@ -535,9 +554,9 @@ impl Verdict {
         verdict.text = pieces.join("; ");
         if let Some(after) = decoded.doubtful_after_us {
             verdict.status = verdict.status.max(Status::Damaged);
-            // A recorder of an earlier version did not count jumps.
-            let jumps = decoded.damage.get(JUMPS).copied().unwrap_or(1);
-            verdict.damaged.entry(JUMPS.to_owned()).or_insert(jumps);
+            for (cause, n) in decoded.damage.iter().filter(|(cause, n)| [JUMPS, BACK].contains(&&***cause) && **n > 0) {
+                verdict.damaged.entry(cause.clone()).or_insert(*n);
+            }
             verdict.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain([after]).min());
         }
         verdict
@@ -696,14 +715,27 @@ fn numbered(n: u64, plural: &str) -> String {
     format!("{n} {}", words.join(" "))
 }
 
+/// Of a recording that began while its board was received: the jumps of time before it, since which all times are doubtful.
+pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
 /// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
 pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
+pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
 /// ... resets, values that differed from the board's own, as their events were lost, and datagrams that came again.
 pub(super) const BOARD_RESET: &str = "resets";
 pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
+/// Datagrams of version 1 that came again: version 1 does not number them, so that their events are there twice.
+const AGAIN: &str = "datagrams_decoded_again";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
+/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, and stamps that step back.
+pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
+pub(super) const ANEW: &str = "clock_began_anew";
+pub(super) const BACK: &str = "stamps_out_of_order";
+/// Datagrams of version 1 without bytes.
+pub(crate) const EMPTY: &str = "empty_datagrams";
+/// How often the sender had another address than before, as a board that got another one has, or another board.
+pub(crate) const ADDRESS: &str = "changes_of_address";
 /// Bytes of version 1 from a board that sends version 2.
 pub(crate) const REFUSED: &str = "bytes_of_version_1_refused";
 /// Damage that is of a file as a whole, and that each of its sources has.

@@ -1,11 +1,12 @@
 //! Detects where the times of version 1 jump ahead of the host's clock, as they do after a damaged stamp: the stamps that
-//! follow seem to lie a turn of the 16-bit counter later, and all times since are 6.5536 s too late.
+//! follow seem to lie a turn of the 16-bit counter later, and all times since are 6.5536 s too late. So they do after a reset of
+//! the board, by what was left of the turn.
 
 use crate::events::FARTHEST_BACK_US;
 
-/// Reading: a board's time that gains so much on the host's clock has jumped, us: somewhat less than half a turn of the
-/// counter, as a damaged stamp and the next one may gain half a turn each.
-const JUMP_US: i64 = 3_000_000;
+/// Reading: a board's time that gains so much on the host's clock has jumped, us: more than datagrams are late by when the first
+/// ones come, and less than half a turn of the counter, as a damaged stamp and the next one may gain half a turn each.
+const JUMP_US: i64 = 1_000_000;
 
 /// Reading: a board's clock drifts less than 1 in this against the host's.
 const DRIFT: i64 = 1000;
@@ -86,6 +87,23 @@ mod tests {
                 assert_eq!(after, at, "{flipped} at {place}");
                 assert!(events.t[299] - events.t[0] > 7_000_000, "a turn too late");
             }
+        }
+    }
+
+    #[test]
+    fn a_reset_that_moves_times_by_a_second_or_more_makes_them_doubtful() {
+        // The stamp, in units of 10 ms, that the board came to before it began anew: what is left of 655 moves all later times.
+        for (came_to, jumps) in [(20, 1), (200, 1), (400, 1), (550, 1), (570, 0), (650, 0), (700, 1), (1200, 1)] {
+            let before = regular(came_to - 15, 15);
+            let after = regular(0, 50).map(|(stamps, at)| (stamps, at + 10_000 * came_to));
+            let (decoder, events) = of(before.chain(after));
+            let last = events.t[44];
+            assert_eq!(
+                (decoder.ahead().jumps, decoder.ahead().after),
+                (jumps, (jumps > 0).then_some(last)),
+                "{came_to}"
+            );
+            assert!(events.t[45] > last, "{came_to}: ahead, wherever the reset was");
         }
     }
 

@@ -37,6 +37,8 @@ pub struct Counts {
     pub long: u64,
     /// Refused datagrams: not of version 2, or of another board.
     pub foreign: u64,
+    /// Datagrams among these that are intact, and of another board than the first.
+    pub other_board: u64,
     /// Refused datagrams: the checksum does not match.
     pub checksum: u64,
     /// Sequence numbers that never arrived intact: between the first and the last of a session, and after a reset from 0 on.
@@ -66,6 +68,8 @@ pub struct Counts {
     pub unknown_marker: u64,
     /// Datagrams that report events dropped by the board.
     pub dropped: u64,
+    /// Events that the board dropped, by its own totals: from its reset or from its first totals on.
+    pub events_dropped: u64,
     /// Number of detected resets.
     pub resets: u64,
     /// Differences from an unknown value; their events have no value.
@@ -84,6 +88,7 @@ impl Counts {
             short: self.short - earlier.short,
             long: self.long - earlier.long,
             foreign: self.foreign - earlier.foreign,
+            other_board: self.other_board - earlier.other_board,
             checksum: self.checksum - earlier.checksum,
             missing: self.missing.saturating_add_signed(self.filled - earlier.filled).saturating_sub(earlier.missing),
             filled: 0,
@@ -98,6 +103,7 @@ impl Counts {
             markers: self.markers - earlier.markers,
             unknown_marker: self.unknown_marker - earlier.unknown_marker,
             dropped: self.dropped - earlier.dropped,
+            events_dropped: self.events_dropped - earlier.events_dropped,
             resets: self.resets - earlier.resets,
             unknown_value: self.unknown_value - earlier.unknown_value,
         }

@@ -70,6 +70,8 @@ pub struct Decoder {
     status: Option<Status>,
     /// Sequence number of the datagram with the latest status, in the latest session.
     status_number: i64,
+    /// Events that the board had dropped in its last totals, 0 at its reset; none if it is not known.
+    dropped_before: Option<u64>,
     /// The number after that of the last repeated datagram, and how many were repeated in turn since an intact one.
     again: (i64, u32),
     counts: Counts,
@@ -93,6 +95,7 @@ impl Decoder {
             held,
             status: None,
             status_number: i64::MIN,
+            dropped_before: None,
             again: (0, 0),
             counts: Counts::default(),
         }
@@ -125,6 +128,8 @@ impl Decoder {
     /// Notes that a recording begins: what is missing so far is not missing in it, nor found again where it comes late.
     pub fn begin_recording(&mut self) {
         self.sessions.iter_mut().for_each(|session| session.from = session.highest + 1);
+        // What the board dropped since its last totals may have been before.
+        self.dropped_before = None;
     }
 
     /// The totals in the board's last status datagram.
@@ -220,6 +225,7 @@ impl Decoder {
         self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
             self.counts.foreign += 1;
+            self.counts.other_board += 1;
             return Outcome::Refused(Refused::Foreign);
         }
         let (which, reset) = match self.sessions.last() {
@@ -336,6 +342,7 @@ impl Decoder {
         }
         self.counts.resets += u64::from(!began);
         self.status_number = i64::MIN;
+        self.dropped_before = whole.then_some(0);
         if self.sessions.len() == SESSIONS {
             let session = self.sessions.remove(0);
             self.missed_before += session.missing();
