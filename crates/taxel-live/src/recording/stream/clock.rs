@@ -15,7 +15,7 @@ const FARTHEST_US: f64 = 4.6e18;
 
 /// Turns stamps into times, us, unwrapped over turns of a 32-bit counter and continued over restarts.
 #[derive(Debug, Clone)]
-pub(in crate::recording) struct StreamClock {
+pub struct StreamClock {
     unit_us: f64,
     state: State,
     /// The state before a restart or a jump that the next stamp may show to have been one damaged stamp, and whether it
@@ -83,14 +83,14 @@ impl State {
 
 impl StreamClock {
     /// The clock of stamps in this unit, us.
-    pub(in crate::recording) fn new(unit_us: f64) -> Self {
+    pub fn new(unit_us: f64) -> Self {
         let state = State { whole: true, added: 0.0, last: None };
         Self { unit_us, state, before: None, resets: 0, back: 0, jumps: 0, after: None }
     }
 
     /// Converts a stamp to a time, us; none if it is no time.
     #[allow(clippy::cast_possible_truncation)]
-    pub(in crate::recording) fn time(&mut self, stamp: f64, at_ns: i64) -> Option<i64> {
+    pub fn time(&mut self, stamp: f64, at_ns: i64) -> Option<i64> {
         let own = stamp * self.unit_us;
         if own.is_nan() || own.abs() > FARTHEST_US {
             return None;
@@ -144,7 +144,7 @@ impl StreamClock {
     }
 
     /// What is wrong with the stamps so far.
-    pub(in crate::recording) fn found(&self) -> Found {
+    pub fn found(&self) -> Found {
         let damage = [(ANEW, self.resets), (BACK, self.back), (JUMPS, self.jumps)];
         let damage: BTreeMap<String, u64> = damage.into_iter().map(|(cause, n)| (cause.to_owned(), n)).collect();
         Found { damage, doubtful_after_us: self.after, ..Found::default() }
