@@ -111,7 +111,7 @@ OF_MODULES = [
     ("ethernet_frame", "16'(size) + 16'd28", "16'(size) + 16'd20"),
     ("ethernet_frame", "at >= size", "at > size"),
     ("event_fifo", "push && waiting == (PLACES + 1)'(DEPTH - 1)", "push && waiting == (PLACES + 1)'(DEPTH - 2)"),
-    ("event_fifo", "none && !stored && !fetched_valid && !landed_valid", "none && !stored"),
+    ("event_fifo", "none && !stored && landing", "none && !stored"),
     ("link", "to == 2'd3 || last", "to == 2'd3"),
     ("link", "second ? data[15:8] : data[7:0]", "data[7:0]"),
     ("line_select", "unknown || lines > known", "unknown"),
