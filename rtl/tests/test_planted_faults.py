@@ -44,7 +44,7 @@ TOTALS = [
     ("taxel_change_detector.sv", "assign sent = changed && !full;", "assign sent = push;"),
     ("taxel_top.sv", "tvalid && tready && tlast", "tvalid && tlast"),
     ("taxel_status_sender.sv", "{bits, rest} <= {rest, rest[0]};", "{bits, rest} <= totals;"),
-    ("taxel_status_sender.sv", "'0 : digits, bits", "digits : digits, bits"),
+    ("taxel_status_sender.sv", "digits    <= '0;", ""),
 ]
 
 
@@ -69,7 +69,7 @@ VERSION_2 = [
 #: Those of afferents.
 SPIKES = [
     ("taxel_afferents.sv", "THRESHOLD'(size) > held_4", "THRESHOLD'(size) >= held_4"),
-    ("taxel_afferents.sv", "if (fresh_1) held_2.begun <= 1'b0;", ""),
+    ("taxel_afferents.sv", "if (fresh_2) held_3.begun <= 1'b0;", ""),
     ("taxel_afferents.sv", "if (!read.format.spikes) begun <= '0;", "if (1'b0) begun <= '0;"),
     ("taxel_afferents.sv", "read.step == 3'(STEPS - 1)", "1'b1"),
     ("taxel_afferents.sv", "sampled && (returned || !held_5.begun)", "sampled"),
@@ -95,7 +95,7 @@ SPIKES = [
 #: Those that the tests of single modules see: module, what stands there, what stands there instead.
 OF_MODULES = [
     ("afferents", "size[21:6]", "size[22:7]"),
-    ("afferents", "if (fresh_1) held_2.begun <= 1'b0;", ""),
+    ("afferents", "if (fresh_2) held_3.begun <= 1'b0;", ""),
     ("change_detector", "moved_of > 16'(of_weighed", "moved_of >= 16'(of_weighed"),
     ("change_detector", "else if (changed) lost_before <= 1'b1;", ""),
     ("change_detector", "row_fetched  <= row_copied;", "row_fetched  <= place;"),
