@@ -138,6 +138,7 @@ OF_MODULES = [
     ("time_stamper", "if (frame_start) of_frame <= now;", "of_frame <= now;"),
     ("top", "tvalid && tready && tlast", "tvalid && tlast"),
     ("top", ".frame_sync(active.frame_sync)", ".frame_sync(1'b0)"),
+    ("uart_rx", "CLOCKS + CLOCKS / 2 - 1)", "CLOCKS + CLOCKS / 2)"),
     ("uart_rx", "valid <= line;", "valid <= 1'b1;"),
     ("uart_rx", "CLOCKS + CLOCKS / 2 - 1", "CLOCKS - 1"),
     ("udp_sender", "payload[{filled, place}] <= tdata", "payload[{1'b0, place}] <= tdata"),
