@@ -41,7 +41,9 @@ module taxel_afferents #(
 
   afferent_t afferents[2**ADDRESS_BITS];
   afferent_t held_1, held_2, held_3, held_4, held_5;  // by clock
-  afferent_t stored;
+  afferent_t stored, written;
+  logic writes;
+  logic [ADDRESS_BITS-1:0] written_at;
   logic [PRESSURE-1:0] looked_up, pressure_3, pressure_4, pressure_5, size;
   logic [THRESHOLD-1:0] rest_4, rest_5, raised, lowered;
   logic [29:0] jump;
@@ -50,7 +52,7 @@ module taxel_afferents #(
 
   // Lines that were read in this mode.
   logic [2**LINE_BITS-1:0] begun;
-  logic fresh, fresh_0, fresh_1;
+  logic fresh, fresh_0, fresh_1, fresh_2;
 
   always_ff @(posedge clk) begin
     if (begins) begin
@@ -60,6 +62,7 @@ module taxel_afferents #(
     end
     fresh_0 <= fresh;
     fresh_1 <= fresh_0;
+    fresh_2 <= fresh_1;
   end
 
   taxel_power_law compression (.clk, .ticks, .pressure(looked_up));
@@ -67,8 +70,8 @@ module taxel_afferents #(
   always_ff @(posedge clk) begin
     held_1    <= afferents[address];
     held_2    <= held_1;
-    if (fresh_1) held_2.begun <= 1'b0;
     held_3    <= held_2;
+    if (fresh_2) held_3.begun <= 1'b0;
     pressure_3 <= looked_up;
     // The integral, and what the threshold may move by.
     held_4    <= held_3;
@@ -87,7 +90,11 @@ module taxel_afferents #(
     fires      <= held_4.begun && THRESHOLD'(size) > held_4.threshold;
     more       <= !less;
     intensity  <= size >= PRESSURE'(1 << 22) ? 16'hFFFF : size[21:6];
-    if (sampled && (returned || !held_5.begun)) afferents[stored_at] <= stored;
+    // What is written is known late in a clock, and the blocks lie far apart.
+    writes     <= sampled && (returned || !held_5.begun);
+    written    <= stored;
+    written_at <= stored_at;
+    if (writes) afferents[written_at] <= written;
   end
 
   always_comb begin

@@ -267,7 +267,6 @@ module taxel_change_detector #(
     return 8'(line) == lines ? 7'd0 : line + 7'd1;
   endfunction
 
-  assign line_due   = 8'(line_next) > of_fetched.ended.lines ? 7'd0 : line_next;
   assign ends       = frame_ends && !full;
   assign states_now = copies;
   assign totals_now = totals_pending && !totals_busy;
@@ -278,6 +277,7 @@ module taxel_change_detector #(
       line_pending   <= line_pending || (REPEATS && ended.ended.line_due);
       totals_pending <= totals_pending || ended.ended.totals_due;
     end
+    line_due <= 8'(line_next) > of_valued.ended.lines ? 7'd0 : line_next;
     if (fetched.valid && fetched.kind == ENTRY_FRAME && line_pending && of_fetched.ended.format.spikes) begin
       // Afferents have no values: the line's turn passes.
       line_pending <= 1'b0;

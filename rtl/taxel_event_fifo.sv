@@ -1,9 +1,9 @@
 // The queue of events: a ring in block memory, with a register before it, as whether an event comes is known late in a clock and
-// the blocks lie far apart, and three behind it: the blocks' own, whose output comes late, one beside each block, and one where
-// an event is used, which may lie as far away as the blocks from each other.
+// the blocks lie far apart, and three behind it: what the blocks read in every clock, the register that each block has behind
+// that, and one where an event is used, which may lie as far away as the blocks from each other.
 //
 // It gives one every other clock at most: a register takes the next event the clock after it gave one on, so that no register
-// but the last waits for `pop`, which is known late in a clock.
+// but the last waits for `pop`, which is known late in a clock. A place of the ring is free when its word has landed.
 //
 // Throughput: an event a clock in, one every other clock out.
 // Latency: five clocks from `push` to `ready`, where nothing waits.
@@ -34,19 +34,19 @@ module taxel_event_fifo #(
   logic [BITS-1:0] held;     // before it
   logic stored;              // into the ring, in this clock
   logic [SLICES-1:0][WIDTH-1:0] fetched, landed;
-  logic fetched_valid, landed_valid, fetch, land, move;
-  logic none;  // in the ring
+  logic fetched_valid, land, move;
+  logic landing;  // the blocks' registers are free: they take what was read
+  logic none;     // in the ring
 
-  assign empty = none && !stored && !fetched_valid && !landed_valid && !ready;
-  assign fetch = !none && !fetched_valid;
-  assign land  = fetched_valid && !landed_valid;
-  assign move  = landed_valid && !ready;
+  assign empty = none && !stored && landing && !ready;
+  assign land  = fetched_valid && landing;
+  assign move  = !landing && !ready;
 
   for (genvar k = 0; k < SLICES; k++) begin : g_slice
     logic [WIDTH-1:0] ring[DEPTH];
     always_ff @(posedge clk) begin
       if (stored) ring[write] <= WIDTH'(held >> (k * WIDTH));
-      if (fetch) fetched[k] <= ring[read];
+      fetched[k] <= ring[read];
     end
   end
 
@@ -54,19 +54,19 @@ module taxel_event_fifo #(
     held   <= entered;
     stored <= push;
     if (stored) write <= write == PLACES'(DEPTH - 1) ? '0 : write + PLACES'(1);
-    if (fetch) read <= read == PLACES'(DEPTH - 1) ? '0 : read + PLACES'(1);
-    // What the count will be is not waited for: whether a word is fetched is known late in a clock.
-    if (push != fetch) begin
+    if (land) read <= read == PLACES'(DEPTH - 1) ? '0 : read + PLACES'(1);
+    // What the count will be is not waited for: whether a word is pushed is known late in a clock.
+    if (push != land) begin
       waiting <= push ? waiting + (PLACES + 1)'(1) : waiting - (PLACES + 1)'(1);
       full    <= push && waiting == (PLACES + 1)'(DEPTH - 1);
     end
-    // A word that is pushed now is in the ring after the next clock; after a fetch no other follows in the next.
-    none <= waiting == '0;
-    if (fetch) fetched_valid <= 1'b1;
-    else if (land) fetched_valid <= 1'b0;
-    if (land) landed <= fetched;
-    if (land) landed_valid <= 1'b1;
-    else if (move) landed_valid <= 1'b0;
+    // A word that is pushed now is in the ring after the next clock. In the clock after a word has landed no
+    // other does, and the next place is read.
+    none          <= waiting == (PLACES + 1)'(land);
+    fetched_valid <= !none;
+    if (landing) landed <= fetched;
+    if (land) landing <= 1'b0;
+    else if (move) landing <= 1'b1;
     if (move) oldest <= BITS'(landed);
     if (move) ready <= 1'b1;
     else if (pop) ready <= 1'b0;
@@ -78,7 +78,7 @@ module taxel_event_fifo #(
       full          <= 1'b0;
       none          <= 1'b1;
       fetched_valid <= 1'b0;
-      landed_valid  <= 1'b0;
+      landing       <= 1'b1;
       ready         <= 1'b0;
     end
   end

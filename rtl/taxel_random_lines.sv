@@ -24,6 +24,7 @@ module taxel_random_lines (
     return w;
   endfunction
 
+  (* ram_style = "distributed" *)  // a block answers late, and gates take the answer
   logic [6:0] places[128];
   logic [127:0] swapped;  // where the order differs from the line's own number
   logic [15:0] word;

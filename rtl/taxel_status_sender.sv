@@ -158,6 +158,7 @@ module taxel_status_sender #(
       IDLE: begin
         at        <= '0;
         counting  <= 1'b0;
+        digits    <= '0;
         bits_left <= 6'(COUNT_BITS);
         if (!greeted) begin
           greeted   <= 1'b1;
@@ -188,7 +189,7 @@ module taxel_status_sender #(
       end
       DIGITS: begin
         zeros     <= 1'b1;
-        digits    <= doubled(bits_left == 6'(COUNT_BITS) ? '0 : digits, bits[COUNT_BITS-1]);
+        digits    <= doubled(digits, bits[COUNT_BITS-1]);
         bits      <= bits << 1;
         bits_left <= bits_left - 6'd1;
         if (bits_left == 6'd1) state <= LOOK;
@@ -198,7 +199,7 @@ module taxel_status_sender #(
         letter      <= symbol.character;
         letter_last <= symbol.last;
         state       <= SENDING;
-        if (counting && symbol.last && further) begin
+        if (counting && of_counts.last && further) begin
           // The line's next count.
           at           <= '0;
           bits_left    <= 6'(COUNT_BITS);

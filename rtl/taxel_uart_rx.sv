@@ -1,7 +1,7 @@
 // Bytes from the serial line: 8 bits, no parity, one stop bit, CLOCKS clocks a bit. The line is of no clock.
 //
 // Throughput: a byte in ten bits.
-// Latency: a byte stands in the middle of its stop bit, and three clocks later.
+// Latency: a byte stands 1 to 2 clocks after the middle of its stop bit (half a clock less where CLOCKS is odd).
 // Loses a byte without a stop bit: it is not counted, what is left of its command is (`taxel_command_receiver`).
 module taxel_uart_rx #(
     parameter int CLOCKS = 868

@@ -44,16 +44,16 @@ module fifo_proof (
       // Nothing is invented and nothing lost.
       assert (empty == (level == 0));
       assert (!ready || level != 0);
-      assert (level <= 4'(DEPTH + 3));
-      // It refuses only where it is full, or was until two clocks before, and what it holds comes out.
-      assert (!full || level >= 4'(DEPTH + 2) || (level == 4'(DEPTH + 1) && !ready));
+      assert (level <= 4'(DEPTH + 2));
+      // It refuses only where its ring is full, and what it holds comes out.
+      assert (!full || level >= 4'(DEPTH));
       assert (idle <= 3'd4);
       // Order and value.
       if (marked && !gone) assert (ahead < level);
       if (marked && !gone && ahead == 0 && ready) assert (oldest == marked_word);
       cover (full && pop);
       cover (gone && level == 0);
-      cover (marked && ahead == 4'(DEPTH + 2));
+      cover (marked && ahead == 4'(DEPTH + 1));
     end
   end
 

@@ -209,8 +209,8 @@ def test_what_finds_no_room_is_dropped_counted_and_sent_later():
     events = [decoder.push(datagram) for datagram in pair.logic.datagrams()]
     places = [place for part in events for place in zip(part.x.tolist(), part.y.tolist(), strict=True)]
     assert len(places) == len(set(places)) == 64
-    # The queue, its three registers and the packer's own are full before the rest of the frame is lost.
-    kept = 16 + 3 + 1
+    # The queue, its two registers behind the ring and the packer's own are full before the rest of the frame is lost.
+    kept = 16 + 2 + 1
     order = [(x, 4 * channel + step) for x in range(8) for step in range(4) for channel in range(2)]
     assert places[:kept] == order[:kept]
     assert last_faults(pair.logic.serial())["queue"] >= 64 - kept

@@ -44,7 +44,7 @@ TOTALS = [
     ("taxel_change_detector.sv", "assign sent = changed && !full;", "assign sent = push;"),
     ("taxel_top.sv", "tvalid && tready && tlast", "tvalid && tlast"),
     ("taxel_status_sender.sv", "{bits, rest} <= {rest, rest[0]};", "{bits, rest} <= totals;"),
-    ("taxel_status_sender.sv", "'0 : digits, bits", "digits : digits, bits"),
+    ("taxel_status_sender.sv", "digits    <= '0;", ""),
 ]
 
 
@@ -69,7 +69,7 @@ VERSION_2 = [
 #: Those of afferents.
 SPIKES = [
     ("taxel_afferents.sv", "THRESHOLD'(size) > held_4", "THRESHOLD'(size) >= held_4"),
-    ("taxel_afferents.sv", "if (fresh_1) held_2.begun <= 1'b0;", ""),
+    ("taxel_afferents.sv", "if (fresh_2) held_3.begun <= 1'b0;", ""),
     ("taxel_afferents.sv", "if (!read.format.spikes) begun <= '0;", "if (1'b0) begun <= '0;"),
     ("taxel_afferents.sv", "read.step == 3'(STEPS - 1)", "1'b1"),
     ("taxel_afferents.sv", "sampled && (returned || !held_5.begun)", "sampled"),
@@ -95,7 +95,7 @@ SPIKES = [
 #: Those that the tests of single modules see: module, what stands there, what stands there instead.
 OF_MODULES = [
     ("afferents", "size[21:6]", "size[22:7]"),
-    ("afferents", "if (fresh_1) held_2.begun <= 1'b0;", ""),
+    ("afferents", "if (fresh_2) held_3.begun <= 1'b0;", ""),
     ("change_detector", "moved_of > 16'(of_weighed", "moved_of >= 16'(of_weighed"),
     ("change_detector", "else if (changed) lost_before <= 1'b1;", ""),
     ("change_detector", "row_fetched  <= row_copied;", "row_fetched  <= place;"),
@@ -111,7 +111,7 @@ OF_MODULES = [
     ("ethernet_frame", "16'(size) + 16'd28", "16'(size) + 16'd20"),
     ("ethernet_frame", "at >= size", "at > size"),
     ("event_fifo", "push && waiting == (PLACES + 1)'(DEPTH - 1)", "push && waiting == (PLACES + 1)'(DEPTH - 2)"),
-    ("event_fifo", "none && !stored && !fetched_valid && !landed_valid", "none && !stored"),
+    ("event_fifo", "none && !stored && landing", "none && !stored"),
     ("link", "to == 2'd3 || last", "to == 2'd3"),
     ("link", "second ? data[15:8] : data[7:0]", "data[7:0]"),
     ("line_select", "unknown || lines > known", "unknown"),
@@ -138,6 +138,7 @@ OF_MODULES = [
     ("time_stamper", "if (frame_start) of_frame <= now;", "of_frame <= now;"),
     ("top", "tvalid && tready && tlast", "tvalid && tlast"),
     ("top", ".frame_sync(active.frame_sync)", ".frame_sync(1'b0)"),
+    ("uart_rx", "CLOCKS + CLOCKS / 2 - 1)", "CLOCKS + CLOCKS / 2)"),
     ("uart_rx", "valid <= line;", "valid <= 1'b1;"),
     ("uart_rx", "CLOCKS + CLOCKS / 2 - 1", "CLOCKS - 1"),
     ("udp_sender", "payload[{filled, place}] <= tdata", "payload[{1'b0, place}] <= tdata"),

@@ -61,6 +61,6 @@ def test_quick_totals_count_what_found_no_room():
     assert (frames, datagrams, faults) == (3, 0, 0)
     decoder = Decoder()
     logic.run(10_000)
-    assert events == 16 + 3 + 1
+    assert events == 16 + 2 + 1
     assert dropped == 64 - events + 2 * (64 - events)
     assert sum(len(decoder.push(datagram)) for datagram in logic.datagrams()[:1]) == events

