@@ -60,6 +60,8 @@ pub struct LabelRow {
     pub trial: String,
     /// Time of the recording's own note that it replaces, us.
     pub replaces_us: Option<i64>,
+    /// Its time by the host's clock, ns since 1970, where its table has one and nobody has moved it since.
+    pub host_ns: Option<i64>,
 }
 
 /// Taxels (column, row) that do not work as they should.

@@ -54,7 +54,7 @@ pub(super) async fn carry_out(
             let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
             let replaces_us = request.has("replaces_us").then(|| request.time("replaces_us")).transpose()?;
             let (label, t_us) = (label_text(&request)?, request.time("t_us")?);
-            let row = LabelRow { label, t_us, source, trial, replaces_us };
+            let row = LabelRow { label, t_us, source, trial, replaces_us, host_ns: None };
             change_label(&hub, shown, LabelChange::Mark(row)).await?;
         }
         "rename" => {

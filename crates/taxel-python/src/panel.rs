@@ -142,16 +142,25 @@ impl RequestHandler for PythonHandler {
     }
 
     fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>> {
-        let rows: Vec<(String, i64, String, String, Option<i64>)> =
+        let rows: Vec<LabelParts> =
             self.call(|handler| handler.call_method1("read_labels", (table, recording))?.extract())?;
-        let row = |(label, t_us, source, trial, replaces_us)| LabelRow { label, t_us, source, trial, replaces_us };
+        let row = |(label, t_us, source, trial, replaces_us, host_ns)| LabelRow {
+            label,
+            t_us,
+            source,
+            trial,
+            replaces_us,
+            host_ns,
+        };
         Ok(rows.into_iter().map(row).collect())
     }
 
     fn write_labels(&self, table: &Path, labels: &[LabelRow]) -> Reply<()> {
-        let row =
-            |row: &LabelRow| (row.label.clone(), row.t_us, row.source.clone(), row.trial.clone(), row.replaces_us);
-        let rows: Vec<_> = labels.iter().map(row).collect();
+        let row = |row: &LabelRow| {
+            let LabelRow { label, t_us, source, trial, replaces_us, host_ns } = row.clone();
+            (label, t_us, source, trial, replaces_us, host_ns)
+        };
+        let rows: Vec<LabelParts> = labels.iter().map(row).collect();
         self.call(|handler| handler.call_method1("write_labels", (table, rows)).map(drop))
     }
 
@@ -194,6 +203,9 @@ type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReado
 /// The rest of a source: where it is known from, that of each cell (NaN where unknown), ticks by the unit, whether values
 /// fall from it, and the cells that flicker.
 type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, bool, Vec<usize>);
+/// A label as Python has it: text, time (us), source, trial, time of the note that it replaces (us), and by the host (ns).
+type LabelParts = (String, i64, String, String, Option<i64>, Option<i64>);
+
 
 /// Pictures as Python has read them: the array of all sources, the sources; unit, time from one picture to the next if they
 /// are numbered (us), notes (time, text, source) and detections (label, time, known) as JSON, the verdict, the trial and all

@@ -55,8 +55,9 @@ _REST_US = 50_000
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
 
-#: A label, its time (us), source and trial ("": all), and the time of the note that it replaces; "" removes that note.
-_LabelRow = tuple[str, int, str, str, int | None]
+#: A label, its time (us), source and trial ("": all), the time of the note that it replaces, and that by the host (ns);
+#: "" removes that note.
+_LabelRow = tuple[str, int, str, str, int | None, int | None]
 
 
 def presets_path() -> Path:
@@ -324,6 +325,7 @@ class RequestHandler:
                 row.source,
                 "" if row.recording == name else row.recording,
                 None if row.replaces is None else round(row.replaces * unit_us),
+                row.at_ns or None,
             )
             for row in (*labels.rows, *labels.removed)
         ]
@@ -332,11 +334,15 @@ class RequestHandler:
         """Write a table of labels."""
         with _reasons(), self._file_lock:
             unit_us = self._opening.unit_us(table)
+
+            def in_file(t: int) -> int:
+                return round(t / unit_us)
+
             write_labels(
                 table,
                 [
-                    (label, round(t / unit_us), source, trial, None if replaces is None else round(replaces / unit_us))
-                    for label, t, source, trial, replaces in rows
+                    (label, in_file(t), *names, None if replaces is None else in_file(replaces), host_ns)
+                    for label, t, *names, replaces, host_ns in rows
                 ],
             )
 
