@@ -125,8 +125,7 @@ export class Labels {
 
   /** Marks at the cursor, or at the picture. */
   markHere() {
-    const timeline = this.timeline();
-    this.mark(timeline?.cursor_us ?? timeline?.t_us ?? null);
+    this.player.meant(this.timeline()?.cursor_us).then((t_us) => this.mark(t_us));
   }
 
   /** @param {number | null} t_us */
@@ -170,7 +169,7 @@ export class Labels {
 
   /** @param {number} by 1: the next label after the picture's time, -1: the one before */
   go(by) {
-    const now = this.player.t_us ?? 0;
+    const now = this.player.goal ?? 0;
     const others = this.labels.filter(({ t_us }) => (by > 0 ? t_us > now : t_us < now));
     const next = by > 0 ? others[0] : others[others.length - 1];
     if (!next) return;
