@@ -77,6 +77,15 @@ pub struct UnhealthyTaxels {
     pub untold: u64,
 }
 
+/// What a readout found in a recording.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Detected {
+    /// The readout's labels, in its order.
+    pub labels: Vec<String>,
+    /// Label, time, and when it was known, us.
+    pub detections: Vec<(String, i64, i64)>,
+}
+
 /// How much of a file is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Opening {
@@ -161,11 +170,14 @@ pub trait RequestHandler: Send + Sync {
     /// Returns what does the same in a shell.
     fn train_command(&self, recording: &Path, out: &Path) -> Reply<String>;
 
+    /// Returns how far the training that runs is, in words; empty where it has not said so.
+    fn training_progress(&self) -> Reply<String>;
+
     /// Ends the training that runs.
     fn end_training(&self) -> Reply<()>;
 
-    /// Detections of a readout in a recording, or in a trial of one with several: label, time, and when it was known, us.
-    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Vec<(String, i64, i64)>>;
+    /// Detections of a readout in a recording, or in a trial of one with several.
+    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Detected>;
 
     /// Reads the live source out with this readout from now on.
     fn read_out(&self, readout: &Path) -> Reply<()>;
