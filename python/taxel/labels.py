@@ -268,9 +268,11 @@ def write_labels(
     Parameters
     ----------
     path : path
-    labels : iterable of (label, us), and behind them the source, the trial, the time of the note that it replaces (us)
+    labels : iterable of (label, us), and behind them the source, the trial, the time of the note that it replaces (us),
+        and its time by the host's clock (ns since 1970)
         The table has a column `source`, and one `recording` with the trials of a file that holds several, if any label
-        has one that is not "", and `replaces_us` if any replaces a note of the recording.
+        has one that is not "", `replaces_us` if any replaces a note of the recording, and `host_ns` if any has a time
+        by the host's clock.
 
     Raises
     ------
@@ -285,12 +287,12 @@ def write_labels(
     'label,t_us\ncontact,400\nlift,900\n'
     """
     rows: list[tuple[Any, ...]] = sorted(labels, key=lambda row: row[1])
-    more = {"source": 2, "recording": 3, "replaces_us": 4}
+    more = {"source": 2, "recording": 3, "replaces_us": 4, "host_ns": 5}
     kept = {name: k for name, k in more.items() if any(row[k:] and row[k] not in ("", None) for row in rows)}
     with whole_file(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow([*_WANTED, *kept])
-        table.writerows([[*row[:2], *((*row, "", "", "")[k] for k in kept.values())] for row in rows])
+        table.writerows([[*row[:2], *((*row, "", "", "", "")[k] for k in kept.values())] for row in rows])
 
 
 def _row(place: str, cells: Mapping[str, str]) -> Note:

@@ -150,7 +150,9 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         page.ask("open", name="played.mcap")
         assert page.ask("read_out", readout="none.json")["type"] == "refused"
         assert page.ask("read_out", readout="touch.json")["type"] == "done"
-        found = next(m for m in page.said if m["type"] == "detections")["detections"]
+        answer = next(m for m in page.said if m["type"] == "detections")
+        assert answer["labels"] == ["contact", "lift"]
+        found = answer["detections"]
         assert [one["label"] for one in found] == ["contact", "lift"] * 6
         assert page.ask("train")["reason"].count("names no event")
         page.ask("live")

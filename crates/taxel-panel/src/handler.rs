@@ -60,6 +60,8 @@ pub struct LabelRow {
     pub trial: String,
     /// Time of the recording's own note that it replaces, us.
     pub replaces_us: Option<i64>,
+    /// Its time by the host's clock, ns since 1970, where its table has one and nobody has moved it since.
+    pub host_ns: Option<i64>,
 }
 
 /// Taxels (column, row) that do not work as they should.
@@ -73,6 +75,15 @@ pub struct UnhealthyTaxels {
     pub noisy: Vec<(u16, u16)>,
     /// Number of taxels that were not touched enough to say.
     pub untold: u64,
+}
+
+/// What a readout found in a recording.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Detected {
+    /// The readout's labels, in its order.
+    pub labels: Vec<String>,
+    /// Label, time, and when it was known, us.
+    pub detections: Vec<(String, i64, i64)>,
 }
 
 /// How much of a file is read.
@@ -159,11 +170,14 @@ pub trait RequestHandler: Send + Sync {
     /// Returns what does the same in a shell.
     fn train_command(&self, recording: &Path, out: &Path) -> Reply<String>;
 
+    /// Returns how far the training that runs is, in words; empty where it has not said so.
+    fn training_progress(&self) -> Reply<String>;
+
     /// Ends the training that runs.
     fn end_training(&self) -> Reply<()>;
 
-    /// Detections of a readout in a recording, or in a trial of one with several: label, time, and when it was known, us.
-    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Vec<(String, i64, i64)>>;
+    /// Detections of a readout in a recording, or in a trial of one with several.
+    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Detected>;
 
     /// Reads the live source out with this readout from now on.
     fn read_out(&self, readout: &Path) -> Reply<()>;

@@ -125,10 +125,10 @@ impl Indexed {
             }
             Self::Pictures(index) => {
                 let file = &index.file;
-                let places = index.places().map(|(place, rest, falls)| {
+                let places = index.places().map(|(place, rest, falls, on)| {
                     json!({
                         "name": place.name, "left": place.left, "rows": place.rows, "columns": place.columns,
-                        "rest": rest.name(), "falls": falls,
+                        "rest": rest.name(), "falls": falls, "on": on,
                     })
                 });
                 let more = json!({

@@ -72,7 +72,10 @@ impl LabelChange {
         match self {
             Self::Mark(row) => {
                 labels.retain(|label| !(label.row.is_removal() && label.row.replaces_note_of(&row)));
-                labels.push(Label { id: next_id, row });
+                // A label that is there already is not made again.
+                if !labels.iter().any(|label| LabelRow { host_ns: None, ..label.row.clone() } == row) {
+                    labels.push(Label { id: next_id, row });
+                }
             }
             Self::Rename { id, label } => {
                 let place = place_of(labels, id)?;
@@ -81,6 +84,7 @@ impl LabelChange {
             Self::Move { id, t_us } => {
                 let place = place_of(labels, id)?;
                 labels[place].row.t_us = t_us;
+                labels[place].row.host_ns = None;
             }
             Self::Delete { id } => {
                 let place = place_of(labels, id)?;

@@ -38,8 +38,8 @@ mod weights;
 
 pub use array_state::RestSource;
 pub use handler::{
-    BoardLines, Cut, LabelRow, Opening, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler, UnhealthyTaxels,
-    UserPreset, UserPresets,
+    BoardLines, Cut, Detected, LabelRow, Opening, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler,
+    UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
 pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource};

@@ -10,7 +10,7 @@ use taxel_live::locked::lock;
 use taxel_live::ports::ports;
 
 use super::clients::Broadcast;
-use super::handler::{Cut, LabelRow, UnhealthyTaxels};
+use super::handler::{Cut, Detected, LabelRow, UnhealthyTaxels};
 use super::hub::Hub;
 use super::indexed::Indexed;
 use super::labels::{LabelChange, file_of};
@@ -54,7 +54,7 @@ pub(super) async fn carry_out(
             let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
             let replaces_us = request.has("replaces_us").then(|| request.time("replaces_us")).transpose()?;
             let (label, t_us) = (label_text(&request)?, request.time("t_us")?);
-            let row = LabelRow { label, t_us, source, trial, replaces_us };
+            let row = LabelRow { label, t_us, source, trial, replaces_us, host_ns: None };
             change_label(&hub, shown, LabelChange::Mark(row)).await?;
         }
         "rename" => {
@@ -69,6 +69,10 @@ pub(super) async fn carry_out(
         "health" => return health(&hub, shown).await.map(Some),
         "cut" => return cut(&hub, shown, &request).await.map(Some),
         "train" => return train(&hub, shown).await.map(Some),
+        "training" => {
+            let text = hub.ask(|handler| handler.training_progress()).await?;
+            return Ok(Some(json!({ "type": "training", "text": text })));
+        }
         "train_stop" => hub.ask(|handler| handler.end_training()).await?,
         "read_out" => return read_out(&hub, shown, &request).await,
         "recordings" => return Ok(Some(hub.recordings_message().await)),
@@ -267,10 +271,13 @@ async fn read_out(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> An
         return Ok(None);
     };
     let recording = hub.folder.file(&name)?;
-    let found = hub.ask(move |handler| handler.detect(&recording, trial.as_deref(), &path)).await?;
+    let Detected { labels, detections } =
+        hub.ask(move |handler| handler.detect(&recording, trial.as_deref(), &path)).await?;
     let one = |(label, t, known)| json!({ "label": label, "t_us": t, "known_us": known });
-    let found: Vec<_> = found.into_iter().map(one).collect();
-    Ok(Some(json!({ "type": "detections", "source": name, "readout": readout, "detections": found })))
+    let found: Vec<_> = detections.into_iter().map(one).collect();
+    Ok(Some(json!({
+        "type": "detections", "source": name, "readout": readout, "labels": labels, "detections": found,
+    })))
 }
 
 // ---------------------------------------------------------------------------------------------- health, cutting

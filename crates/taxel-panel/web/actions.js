@@ -32,7 +32,7 @@ const RASTER_INSET = 44;
  */
 export function bindActions({ server, player, settings, recorder, labels, view, maps, window }, timeline) {
   const help = part("help", HTMLDialogElement);
-  const here = () => timeline()?.cursor_us ?? player.t_us;
+  const cutHere = (/** @type {0 | 1} */ end) => player.meant(timeline()?.cursor_us).then((t_us) => view.setCut(end, t_us));
   const step = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
   const moveBy = (/** @type {number} */ us) => {
     if (player.goal !== null) player.seek(player.goal + us);
@@ -54,7 +54,7 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
     if (!taxel) return notify("point at a taxel first: click a map, or use its arrow keys", true);
     server.request({ type: "zero", taxels: [taxel] }).then(() => notify(`zeroed row ${taxel[1]}, column ${taxel[0]}`), failed);
   };
-  view.cutHere = (/** @type {0 | 1} */ end) => view.setCut(end, here());
+  view.cutHere = cutHere;
   bindKeys(
     {
       record: () => recorder.toggle(),
@@ -75,8 +75,8 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
       nextLabel: () => labels.go(1),
       labelBefore: () => labels.go(-1),
       deleteLabel: () => labels.removeChosen(),
-      cutFrom: () => view.setCut(0, here()),
-      cutTo: () => view.setCut(1, here()),
+      cutFrom: () => cutHere(0),
+      cutTo: () => cutHere(1),
       open: () => part("files", HTMLSelectElement).focus(),
       crosshair: () => part("pressure-frame", HTMLElement).focus(),
       rest: () => view.rest("now"),

@@ -25,7 +25,7 @@ export class Detections {
     this.shown = [];
     /** Those of the live source, newest first. @type {Detection[]} */
     this.live = [];
-    /** Labels in the order in which they first occurred: the order gives shape and colour. @type {string[]} */
+    /** The labels of the readout: their order gives shape and colour. @type {string[]} */
     this.labels = [];
     this.listed = -1;
   }
@@ -36,9 +36,10 @@ export class Detections {
     this.live.length = Math.min(this.live.length, MOST_STORED);
   }
 
-  /** @param {Detection[]} detections newest first @param {string} none the text where there are none */
-  show(detections, none) {
+  /** @param {Detection[]} detections newest first @param {string} none the text where there are none @param {string[]} labels in the order of their readout */
+  show(detections, none, labels) {
     this.shown = detections;
+    this.labels = labels;
     write(part("detection-count", HTMLElement), detections.length ? whole(detections.length) : "");
     const empty = part("detections-none", HTMLElement);
     empty.hidden = detections.length > 0;
@@ -48,8 +49,7 @@ export class Detections {
 
   /** @param {string} label @returns {string} its class */
   shape(label) {
-    if (!this.labels.includes(label)) this.labels.push(label);
-    return `shape shape-${this.labels.indexOf(label) % SHAPES}`;
+    return `shape shape-${Math.max(0, this.labels.indexOf(label)) % SHAPES}`;
   }
 
   /** Writes the list, if it has changed. */

@@ -1,7 +1,7 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
 import { make, part, write } from "./dom.js";
-import { notify } from "./notice.js";
+import { notify, silence } from "./notice.js";
 import { counted, readTime, seconds, timeUnit, writtenTime } from "./words.js";
 
 /** @typedef {import("./protocol.js").Label} Label */
@@ -21,6 +21,9 @@ const LEVELS = 3;
 const HANDLE = { mouse: 11, touch: 16 };
 /** Width of a letter of a flag's name, CSS pixels, about. */
 const LETTER = 7;
+
+/** @param {number} t_us @returns {string} as the list has it: to the microsecond, without zeros behind the millisecond */
+const listedTime = (t_us) => writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0{1,3}$/, "$1");
 
 /** The lane of flags above the raster, and the tab with all of them. */
 export class Labels {
@@ -125,8 +128,7 @@ export class Labels {
 
   /** Marks at the cursor, or at the picture. */
   markHere() {
-    const timeline = this.timeline();
-    this.mark(timeline?.cursor_us ?? timeline?.t_us ?? null);
+    this.player.meant(this.timeline()?.cursor_us).then((t_us) => this.mark(t_us));
   }
 
   /** @param {number | null} t_us */
@@ -170,7 +172,7 @@ export class Labels {
 
   /** @param {number} by 1: the next label after the picture's time, -1: the one before */
   go(by) {
-    const now = this.player.t_us ?? 0;
+    const now = this.player.goal ?? 0;
     const others = this.labels.filter(({ t_us }) => (by > 0 ? t_us > now : t_us < now));
     const next = by > 0 ? others[0] : others[others.length - 1];
     if (!next) return;
@@ -190,7 +192,7 @@ export class Labels {
     const table = this.file ? this.files.get(this.file) : undefined;
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
     this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";
-    const place = table ? `Saved in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
+    const place = table ? `${table.labels.length ? "Saved" : "To be saved"} in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
     write(part("label-place", HTMLElement), place);
     part("train-line", HTMLElement).hidden = !labels.length;
     const list = part("label-list", HTMLElement);
@@ -210,35 +212,54 @@ export class Labels {
   /** @param {Label} label @returns {HTMLElement} */
   row({ label_id, label, t_us, source }) {
     const name = make("input", { type: "text", value: label, "aria-label": `name of the label at ${seconds(t_us)}`, maxlength: 200, list: "label-names" });
-    const time = make("input", { type: "text", inputmode: "decimal", value: writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0{1,3}$/, "$1"), "aria-label": `time of ${label}, ${timeUnit()}` });
+    const time = make("input", { type: "text", inputmode: "decimal", value: listedTime(t_us), "aria-label": `time of ${label}, ${timeUnit()}` });
     const go = make("button", { type: "button", class: "small", "aria-label": `go to ${label}, ${seconds(t_us)}` }, "Go");
     const away = make("button", { type: "button", class: "small", "aria-label": `delete ${label}, ${seconds(t_us)}` }, "×");
-    name.onchange = () => this.server.request({ type: "rename", label_id, label: name.value.trim() }).catch((error) => this.refused(name, label, error));
+    // Of a label whose time was just typed the row is an older one.
+    const held = () => this.labels.find((one) => one.label_id === label_id) ?? { label, t_us };
+    const [heldName, heldTime] = [() => held().label, () => listedTime(held().t_us)];
+    name.onchange = () => this.change(name, { type: "rename", label_id, label: name.value.trim() }, heldName);
     time.onchange = () => {
       const wanted = readTime(time.value);
-      if (Number.isFinite(wanted)) this.server.request({ type: "move", label_id, t_us: wanted }).catch((error) => this.refused(time, writtenTime(t_us), error));
-      else this.refused(time, writtenTime(t_us), new Error(`${time.value} is no number of ${timeUnit()}`));
+      if (Number.isFinite(wanted)) this.change(time, { type: "move", label_id, t_us: wanted }, heldTime);
+      else this.refused(time, heldTime, new Error(`${time.value} is no number of ${timeUnit()}`));
     };
     go.onclick = () => {
       this.chosen = label_id;
-      // The row of a label whose time was just typed is an older one.
-      this.player.seek(this.labels.find((one) => one.label_id === label_id)?.t_us ?? t_us);
+      this.player.seek(held().t_us);
       this.show();
     };
     away.onclick = () => this.remove(label_id);
-    const row = make("li", {}, name, time, make("span", { class: "unit" }, [timeUnit() === "seconds" ? "s" : "", source].filter(Boolean).join(", ")), go, away);
+    const row = make("li", {}, name, time, make("span", { class: "unit" }, timeUnit() === "seconds" ? "s" : ""), go, away, ...(source ? [make("span", { class: "source" }, source)] : []));
     row.dataset.id = String(label_id);
     return row;
   }
 
-  /** @param {HTMLInputElement} input @param {string} old @param {Error} error */
-  refused(input, old, error) {
+  /** Asks for what was typed. @param {HTMLInputElement} input @param {{ type: string, label_id: number } & Record<string, unknown>} message @param {() => string} held */
+  async change(input, message, held) {
+    try {
+      await this.server.request(message);
+      if (input.hasAttribute("aria-invalid")) silence();
+      this.holds(input, held());
+    } catch (error) {
+      this.refused(input, held, error);
+    }
+  }
+
+  /** @param {HTMLInputElement} input @param {string} value what the label holds */
+  holds(input, value) {
+    input.value = value;
+    input.removeAttribute("aria-invalid");
+    input.onkeydown = null;
+  }
+
+  /** @param {HTMLInputElement} input @param {() => string} held what the label holds @param {unknown} error */
+  refused(input, held, error) {
     this.failed(error);
     input.setAttribute("aria-invalid", "true");
     input.onkeydown = (event) => {
       if (event.key !== "Escape") return;
-      input.value = old;
-      input.removeAttribute("aria-invalid");
+      this.holds(input, held());
       event.stopPropagation();
     };
   }

@@ -251,7 +251,7 @@ function receive(message) {
     case "detection":
       detections.add(message);
       marksDue = true;
-      if (player.transport.source === null) showDetections(detections.live);
+      if (player.transport.source === null) showDetections(detections.live, hello?.readout ?? []);
       return;
     case "spikes":
       return write(part("spikes-info", HTMLElement), spikesInfo(message));
@@ -265,8 +265,10 @@ function receive(message) {
       return listRecordings();
     case "trained":
       return training.take(message);
+    case "training":
+      return training.progress(message.text);
     case "detections":
-      if (message.source === player.transport.source) showDetections(recorded(message.detections));
+      if (message.source === player.transport.source) showDetections(recorded(message.detections), message.labels);
       return;
     case "opened":
       return open(message);
@@ -324,11 +326,12 @@ function greet(message) {
   labels.offer(message.readout ?? []);
   showAssumed();
   recorder.able = message.live;
+  recorder.write();
   part("record", HTMLButtonElement).hidden = !message.live;
   part("record-start", HTMLButtonElement).disabled = !message.live;
   part("live-counters", HTMLElement).hidden = !message.live;
   if (first && !message.live) showTab("labels");
-  showDetections(detections.shown);
+  showDetections(detections.shown, opened ? detections.labels : (message.readout ?? []));
   document.title = message.live ? "taxel · live" : "taxel · view";
   if (maps.taxel) watch(maps.taxel);
   server.send({ type: "recordings" });
@@ -347,8 +350,10 @@ async function ask(name, trial) {
   try {
     await server.request({ type: "open", name, ...(trial === undefined ? {} : { trial }) });
   } catch (error) {
-    refused = error instanceof Error ? error.message : String(error);
-    failed(error);
+    const why = error instanceof Error ? error.message : String(error);
+    refused = why.includes(name) ? why : `${name}: ${why}`;
+    // Where nothing is shown it stands above the maps.
+    if (player.transport.source !== null || hello?.live) notify(refused, true);
   }
   if (opening === name) opening = null;
   writeState();
@@ -395,7 +400,7 @@ function open(message) {
   part("files", HTMLSelectElement).value = message.name;
   labels.choose(message.name, message.pictures?.trial);
   view.choose(message.name);
-  showDetections(recorded(message.detections));
+  showDetections(recorded(message.detections), [...new Set(message.detections.map(({ label }) => label))].sort());
   notes.choose(message.notes);
   server.send({ type: "overview" });
   showRegisters();
@@ -421,17 +426,17 @@ function move(transport) {
     player.reach = counters?.reach_us ?? null;
     labels.choose(recorder.status?.state === "recording" ? recorder.status.file : null);
     view.choose(null);
-    showDetections(detections.live);
+    showDetections(detections.live, hello?.readout ?? []);
     showRegisters();
     server.send({ type: "overview" });
   }
   writeState();
 }
 
-/** @param {import("./detections.js").Detection[]} shown newest first */
-function showDetections(shown) {
+/** @param {import("./detections.js").Detection[]} shown newest first @param {string[]} labels in the order of their readout */
+function showDetections(shown, labels) {
   const none = opened ? "None in this recording: train on labels, or choose a readout." : hello?.readout ? "None yet." : "No readout runs: start taxel live with one, or choose one here.";
-  detections.show(shown, none);
+  detections.show(shown, none, labels);
   marksDue = true;
 }
 

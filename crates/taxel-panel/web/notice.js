@@ -18,7 +18,7 @@ export function notify(text, bad = false, offer) {
   button.hidden = !offer;
   write(button, offer?.text ?? "");
   button.onclick = () => {
-    part("notice", HTMLElement).hidden = true;
+    silence();
     offer?.action();
   };
   const place = part("notice", HTMLElement);
@@ -28,10 +28,13 @@ export function notify(text, bad = false, offer) {
   clearTimeout(timer);
   // Lines to be copied stay until they are closed.
   if (text.includes("\n")) return;
-  timer = setTimeout(() => {
-    place.hidden = true;
-    write(part("notice-text", HTMLElement), "");
-  }, SHOWN_MS);
+  timer = setTimeout(silence, SHOWN_MS);
+}
+
+/** Takes the notice away. */
+export function silence() {
+  part("notice", HTMLElement).hidden = true;
+  write(part("notice-text", HTMLElement), "");
 }
 
 /** @param {unknown} error shown to the user whose request failed */
@@ -39,6 +42,4 @@ export function failed(error) {
   notify(error instanceof Error ? error.message : String(error), true);
 }
 
-part("notice-close", HTMLButtonElement).onclick = () => {
-  part("notice", HTMLElement).hidden = true;
-};
+part("notice-close", HTMLButtonElement).onclick = silence;

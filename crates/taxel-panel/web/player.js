@@ -25,6 +25,9 @@ export class Player {
     this.seeking = false;
     /** @type {Promise<void>} of the seeks under way */
     this.sought = Promise.resolve();
+    /** How many steps and seeks are under way, and when the last one will be where. @type {Promise<number | null>} */
+    this.arrival = Promise.resolve(null);
+    this.moves = 0;
     /** @type {number | null} */
     this.wanted = null;
     /** @type {number | null} */
@@ -89,11 +92,12 @@ export class Player {
 
   /** @param {number} frames */
   step(frames) {
-    this.ask({ type: "step", frames });
+    // A seek that still waits for its turn came first.
+    this.go(this.sought.then(() => this.ask({ type: "step", frames })).then(() => this.t_us));
   }
 
   follow() {
-    this.ask({ type: "live" });
+    this.go(this.ask({ type: "live" }).then(() => this.t_us));
   }
 
   /** @param {number} by to the next (1) or the one before (-1) of the speeds */
@@ -114,11 +118,28 @@ export class Player {
     const [from, to] = this.reach ?? [t_us, t_us];
     this.asked = this.wanted = Math.round(Math.max(from, Math.min(to, t_us)));
     if (!this.seeking) this.sought = this.seekNext();
+    const { asked } = this;
+    this.go(this.sought.then(() => asked), Promise.resolve(asked));
   }
 
-  /** @returns {Promise<void>} fulfilled when the view is where it was asked to be */
-  settled() {
-    return this.sought;
+  /**
+   * Notes a move that was asked for.
+   * @param {Promise<number | null>} done when it has been made, and where to
+   * @param {Promise<number | null>} [arrival] the same, where it is known before
+   */
+  go(done, arrival = done) {
+    this.moves++;
+    this.arrival = arrival;
+    done.finally(() => this.moves--);
+  }
+
+  /**
+   * The time that a person means: that of the pointer, else of the picture, after all moves that were asked for before.
+   * @param {number | null} [pointed_us]
+   * @returns {Promise<number | null>} us
+   */
+  async meant(pointed_us = null) {
+    return pointed_us ?? (this.moves ? this.arrival : this.t_us);
   }
 
   async seekNext() {

@@ -30,7 +30,7 @@ export const MISSING_AREA = 0xffffffff;
  *   last: { file: string, verdict: string } | null, error: string | null }} Recorder
  * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileInfo
  * @typedef {{ type: "recordings", folder: string, files: FileInfo[], readouts: string[] }} Recordings
- * @typedef {{ name: string, left: number, rows: number, columns: number, rest: "given" | "quiet" | "none", falls: boolean }} PictureSource
+ * @typedef {{ name: string, left: number, rows: number, columns: number, rest: "given" | "quiet" | "none", falls: boolean, on: string }} PictureSource
  * @typedef {{ count: number, unit: string, step: number, zero: number, floor: number, newtons: number | null, picture_us: number | null,
  *   sources: PictureSource[], flickering: Taxel[], trial: string | null, trials: string[], left_s: number | null }} Pictures
  * @typedef {{ t_us: number | null, text: string, source: string }} RecordedNote
@@ -50,7 +50,8 @@ export const MISSING_AREA = 0xffffffff;
  * @typedef {{ taxel: Taxel, t_us: number, rest: number, before: number | null }} Zeroing
  * @typedef {{ type: "zeroed", taxels: Zeroing[] }} Zeroed
  * @typedef {{ type: "trained", name: string, readout: string, text: string }} Trained
- * @typedef {{ type: "detections", source: string, readout: string, detections: { label: string, t_us: number, known_us: number }[] }} DetectionsMessage
+ * @typedef {{ type: "training", text: string }} TrainingMessage
+ * @typedef {{ type: "detections", source: string, readout: string, labels: string[], detections: { label: string, t_us: number, known_us: number }[] }} DetectionsMessage
  * @typedef {{ type: "board_line", at_ns: number, text: string }} BoardLine
  * @typedef {{ type: "cut", name: string, lost: string[] }} Cut
  * @typedef {{ place: string, kind: string, product: string | null, maker: string | null, serial: string | null }} Port
@@ -59,7 +60,7 @@ export const MISSING_AREA = 0xffffffff;
  * @typedef {{ type: "refused", id?: number, what: string | null, reason: string, field: string | null }} Refused
  * @typedef {{ type: "warning", text: string }} Warning
  * @typedef {Hello | RegistersMessage | Presets | Counters | Detection | Spikes | Recorder | Recordings | Opened | Overview | Transport | Labels |
- *   Health | Zeroed | Trained | DetectionsMessage | BoardLine | Cut | Places | Loading | Done | Refused | Warning} Message
+ *   Health | Zeroed | Trained | TrainingMessage | DetectionsMessage | BoardLine | Cut | Places | Loading | Done | Refused | Warning} Message
  */
 
 /**

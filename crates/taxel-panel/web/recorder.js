@@ -142,8 +142,8 @@ export class Recorder {
     const more = part("record-more", HTMLElement);
     const bar = part("record-bar", HTMLProgressElement);
     if (!status || status.state === "idle") {
-      write(big, "Ready");
-      write(more, "");
+      write(big, this.able ? "Ready" : "No board");
+      write(more, this.able ? "" : "is listened to: taxel live --panel records one");
       bar.hidden = true;
       return;
     }

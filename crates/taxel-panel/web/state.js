@@ -39,6 +39,13 @@ function fall(opened) {
   return `The values${which} fall from their rest, so that no pressure is shown. If less means more pressure, write the line “falls = true” into ${opened.name.replace(/\.[^.]+$/, "")}.layout.toml beside the recording, and start taxel view again.`;
 }
 
+/** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
+function lain(opened) {
+  const sources = opened?.pictures?.sources ?? [];
+  const lay = sources.filter(({ on }) => on).map(({ name, on }) => (sources.length > 1 ? `${name}, ${on}` : on));
+  return lay.length ? `In the quiet stretch that the rest is taken from, something lay on ${lay.join("; ")}.` : "";
+}
+
 /** @param {Opened | null} opened @param {Hello | null} hello @returns {string} how many pictures there are, and rows and columns of each sensor */
 function shape(opened, hello) {
   const array = opened?.array ?? hello?.array;
@@ -77,7 +84,7 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const nothing = connected && source === null && !hello?.live;
   const banner = part("silence", HTMLElement);
-  write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && fall(opened)].filter(Boolean).join(" "));
+  write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && fall(opened), connected && lain(opened)].filter(Boolean).join(" "));
   banner.hidden = !banner.textContent;
   const place = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
   const text = [place, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");

@@ -7,6 +7,9 @@ import { failed, notify } from "./notice.js";
 /** @typedef {import("./protocol.js").Trained} Trained */
 /** @typedef {import("./server.js").Server} Server */
 
+/** How often a training that runs is asked how far it is, ms. */
+const ASKED_MS = 3000;
+
 /** The button that trains, what the training prints, and the choice of the readout. */
 export class Training {
   /** @param {Server} server */
@@ -25,6 +28,7 @@ export class Training {
   async begin() {
     this.since = performance.now();
     this.text("");
+    const asking = setInterval(() => this.server.send({ type: "training" }), ASKED_MS);
     this.write();
     try {
       await this.server.request({ type: "train" });
@@ -32,6 +36,7 @@ export class Training {
       this.text(error instanceof Error ? error.message : String(error));
       part("train-text", HTMLElement).classList.add("bad");
     }
+    clearInterval(asking);
     this.since = null;
     this.write();
   }
@@ -46,6 +51,14 @@ export class Training {
     place.hidden = !text;
     place.classList.remove("bad");
     write(place, text);
+    // The page has no options of the command line, which an advice may name.
+    const options = [...new Set(text.match(/--[a-z][a-z-]*/g))];
+    write(part("train-how", HTMLElement), options.length ? `Options (${options.join(", ")}) are given in a shell, at the end of this command:` : "The same in a shell:");
+  }
+
+  /** Shows how far the training that runs is. @param {string} text as the command says it */
+  progress(text) {
+    if (this.since !== null && text) this.text(text);
   }
 
   /** @param {Trained} trained */

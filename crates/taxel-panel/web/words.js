@@ -20,7 +20,7 @@ export const writtenTime = (us, places = 3) =>
 
 /** @param {string} written @returns {number} us; not a number for other text */
 export const readTime = (written) => {
-  const number = Number(written.replace(",", "."));
+  const number = written.trim() ? Number(written.replace(",", ".")) : NaN;
   return numbering.picture_us ? Math.round(number) * numbering.picture_us : Math.round(number * 1e6) + numbering.begin_us;
 };
 

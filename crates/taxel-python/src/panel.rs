@@ -15,7 +15,7 @@ use taxel_live::address::of_host;
 use taxel_live::recording::{Note, Remarks};
 use taxel_panel::assets::asset;
 use taxel_panel::{
-    Activity, BoardLines, Cut, LabelRow, Opening, Panel as Server, PanelOptions, PictureFile, PictureIndex,
+    Activity, BoardLines, Cut, Detected, LabelRow, Opening, Panel as Server, PanelOptions, PictureFile, PictureIndex,
     PicturePlace, PictureRest, PictureSource, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler, RestSource,
     UnhealthyTaxels, UserPreset, UserPresets,
 };
@@ -129,12 +129,18 @@ impl RequestHandler for PythonHandler {
         self.call(|handler| handler.call_method1("train_command", (recording, out))?.extract())
     }
 
+    fn training_progress(&self) -> Reply<String> {
+        self.call(|handler| handler.call_method0("training_progress")?.extract())
+    }
+
     fn end_training(&self) -> Reply<()> {
         self.call(|handler| handler.call_method0("end_training").map(drop))
     }
 
-    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Vec<(String, i64, i64)>> {
-        self.call(|handler| handler.call_method1("detect", (recording, trial, readout))?.extract())
+    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Detected> {
+        let (labels, detections) =
+            self.call(|handler| handler.call_method1("detect", (recording, trial, readout))?.extract())?;
+        Ok(Detected { labels, detections })
     }
 
     fn read_out(&self, readout: &Path) -> Reply<()> {
@@ -142,16 +148,25 @@ impl RequestHandler for PythonHandler {
     }
 
     fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>> {
-        let rows: Vec<(String, i64, String, String, Option<i64>)> =
+        let rows: Vec<LabelParts> =
             self.call(|handler| handler.call_method1("read_labels", (table, recording))?.extract())?;
-        let row = |(label, t_us, source, trial, replaces_us)| LabelRow { label, t_us, source, trial, replaces_us };
+        let row = |(label, t_us, source, trial, replaces_us, host_ns)| LabelRow {
+            label,
+            t_us,
+            source,
+            trial,
+            replaces_us,
+            host_ns,
+        };
         Ok(rows.into_iter().map(row).collect())
     }
 
     fn write_labels(&self, table: &Path, labels: &[LabelRow]) -> Reply<()> {
-        let row =
-            |row: &LabelRow| (row.label.clone(), row.t_us, row.source.clone(), row.trial.clone(), row.replaces_us);
-        let rows: Vec<_> = labels.iter().map(row).collect();
+        let row = |row: &LabelRow| {
+            let LabelRow { label, t_us, source, trial, replaces_us, host_ns } = row.clone();
+            (label, t_us, source, trial, replaces_us, host_ns)
+        };
+        let rows: Vec<LabelParts> = labels.iter().map(row).collect();
         self.call(|handler| handler.call_method1("write_labels", (table, rows)).map(drop))
     }
 
@@ -188,12 +203,15 @@ impl RequestHandler for PythonHandler {
     }
 }
 
+/// A label as Python has it: text, time (us), source, trial, time of the note that it replaces (us), and by the host (ns).
+type LabelParts = (String, i64, String, String, Option<i64>, Option<i64>);
+
 /// A source of pictures: name, first column, rows, columns, times (us), values, rest.
 type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>, RestIn<'py>);
 
 /// The rest of a source: where it is known from, that of each cell (NaN where unknown), ticks by the unit, whether values
-/// fall from it, and the cells that flicker.
-type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, bool, Vec<usize>);
+/// fall from it, the cells that flicker, and where something lay then (for people).
+type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, bool, Vec<usize>, String);
 
 /// Pictures as Python has read them: the array of all sources, the sources; unit, time from one picture to the next if they
 /// are numbered (us), notes (time, text, source) and detections (label, time, known) as JSON, the verdict, the trial and all
@@ -220,7 +238,7 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
     };
     let file = PictureFile { unit, picture_us, remarks, note_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
-    for (name, left, rows, columns, t, values, (rest, rests, ticks_by_unit, falls, flickering)) in &sources {
+    for (name, left, rows, columns, t, values, (rest, rests, ticks_by_unit, falls, flickering, on)) in &sources {
         let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", rests)?);
         let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
         let cells = usize::from(*rows) * usize::from(*columns);
@@ -236,6 +254,7 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
             ticks_by_unit: *ticks_by_unit,
             falls: *falls,
             flickering: flickering.clone(),
+            on: on.clone(),
         };
         let place = PicturePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
         placed.push(PictureSource { place, t: t.to_vec(), values, rest });

@@ -55,8 +55,9 @@ _REST_US = 50_000
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
 
-#: A label, its time (us), source and trial ("": all), and the time of the note that it replaces; "" removes that note.
-_LabelRow = tuple[str, int, str, str, int | None]
+#: A label, its time (us), source and trial ("": all), the time of the note that it replaces, and that by the host (ns);
+#: "" removes that note.
+_LabelRow = tuple[str, int, str, str, int | None, int | None]
 
 
 def presets_path() -> Path:
@@ -129,6 +130,8 @@ class RequestHandler:
     ) -> None:
         self._listen, self._delta_intensity, self._read_out, self._cable = listen, delta_intensity, read_out, cable
         self._training: subprocess.Popen[str] | None = None
+        #: What the training has said on stderr, line by line.
+        self._training_lines: list[str] = []
         self._training_lock = threading.Lock()
         self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
         self._files, self._opening = ShownFiles(opening), opening
@@ -266,7 +269,7 @@ class RequestHandler:
                 [*command, "--overwrite"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
             )
         try:
-            printed, errors = self._training.communicate()
+            printed, errors = self._heard(self._training)
             code = self._training.returncode
         finally:
             self._training = None
@@ -277,6 +280,23 @@ class RequestHandler:
             raise ProblemError(lines[-1].removeprefix("taxel: ") if lines else f"the training ended with code {code}")
         warned = [line.removeprefix("taxel: ") for line in errors.splitlines() if line.startswith("taxel: warning: ")]
         return "\n".join([printed.strip(), *warned])
+
+    def _heard(self, training: subprocess.Popen[str]) -> tuple[str, str]:
+        """Wait until a training has ended; return what it printed, and what it said on stderr."""
+        assert training.stdout is not None
+        assert training.stderr is not None
+        self._training_lines = []
+        listener = threading.Thread(target=self._training_lines.extend, args=(training.stderr,))
+        listener.start()
+        printed = training.stdout.read()
+        listener.join()
+        training.wait()
+        return printed, "".join(self._training_lines)
+
+    def training_progress(self) -> str:
+        """Return how far the training that runs is, as ``taxel train`` says it; empty if it has not said so yet."""
+        said = [line for line in self._training_lines if ", after " in line] if self._training is not None else []
+        return said[-1].removeprefix("taxel: ").strip() if said else ""
 
     def train_command(self, recording: Path, out: Path) -> str:
         """Return the command that trains the same in a shell, in the folder where taxel was started."""
@@ -295,8 +315,8 @@ class RequestHandler:
         if training is not None:
             training.terminate()
 
-    def detect(self, recording: Path, trial: str | None, readout: Path) -> list[tuple[str, int, int]]:
-        """Return the detections of a readout in a recording or its trial: label, time and when it was known, us."""
+    def detect(self, recording: Path, trial: str | None, readout: Path) -> tuple[list[str], list[tuple[str, int, int]]]:
+        """Return a readout's labels, and its detections in a recording or its trial: label, time, when known."""
         with _reasons():
             loaded = load(readout)
             opened, _ = self._files.opened(recording, trial)
@@ -305,7 +325,7 @@ class RequestHandler:
                 registers = one.registers
                 frame_us = None if registers is None else registers.frame_us
                 found += run(loaded, one, frame_us=frame_us, tare=_rest(one))
-        return sorted(((one.label, one.t, one.known) for one in found), key=lambda one: one[2])
+        return list(loaded.labels), sorted(((one.label, one.t, one.known) for one in found), key=lambda one: one[2])
 
     def read_out(self, readout: Path) -> None:
         """Read the board out with another readout."""
@@ -324,6 +344,7 @@ class RequestHandler:
                 row.source,
                 "" if row.recording == name else row.recording,
                 None if row.replaces is None else round(row.replaces * unit_us),
+                row.at_ns or None,
             )
             for row in (*labels.rows, *labels.removed)
         ]
@@ -332,11 +353,15 @@ class RequestHandler:
         """Write a table of labels."""
         with _reasons(), self._file_lock:
             unit_us = self._opening.unit_us(table)
+
+            def in_file(t: int) -> int:
+                return round(t / unit_us)
+
             write_labels(
                 table,
                 [
-                    (label, round(t / unit_us), source, trial, None if replaces is None else round(replaces / unit_us))
-                    for label, t, source, trial, replaces in rows
+                    (label, in_file(t), *names, None if replaces is None else in_file(replaces), host_ns)
+                    for label, t, *names, replaces, host_ns in rows
                 ],
             )
 

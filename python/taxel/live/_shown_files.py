@@ -229,11 +229,11 @@ def _in_its_unit(recording: Recording) -> Frames:
     return recording.frames() if recording.calibration is None else recording.calibrated()
 
 
-def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, bool, list[int]]:
-    """Return the rest's source, that of each taxel, ticks by the unit, whether values fall, and what flickers."""
+def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, bool, list[int], str]:
+    """Return the rest's source, that of each taxel, ticks by the unit, whether values fall, what flickers, what lay."""
     rest = of_pictures(frames)
     source, flickers = {"unit": "given"}.get(rest.source, rest.source), np.flatnonzero(flickering(frames)).tolist()
-    return source, rest.values, ticks_by_unit(frames), rest.falls, flickers
+    return source, rest.values, ticks_by_unit(frames), rest.falls, flickers, rest.on
 
 
 def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:

@@ -61,6 +61,8 @@ pub struct PictureRest {
     pub falls: bool,
     /// The cells that flicker: no value of theirs counts as above rest.
     pub flickering: Vec<usize>,
+    /// Where something lay in the quiet stretch, for people; empty where nothing did.
+    pub on: String,
 }
 
 /// The pictures of a source as they are given.
@@ -129,6 +131,7 @@ struct Source {
     rest_source: RestSource,
     falls: bool,
     flickering: Vec<usize>,
+    on: String,
     /// The rest of its cells, each from the picture of this number on; there is one at least.
     rests: Vec<(usize, Vec<u16>)>,
 }
@@ -136,12 +139,12 @@ struct Source {
 impl Source {
     fn new(from: PictureSource<'_>, steps: Steps) -> Self {
         let (ticks, mut rests) = (steps.ticks(from.values), from.rests(steps));
-        let PictureRest { source: rest_source, falls, flickering, .. } = from.rest;
+        let PictureRest { source: rest_source, falls, flickering, on, .. } = from.rest;
         for (_, rest) in &mut rests {
             // No value is above the greatest; a taxel without a rest would get that of its first value.
             flickering.iter().for_each(|&cell| rest[cell] = UNKNOWN - 1);
         }
-        Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, rests }
+        Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, on, rests }
     }
 
     /// The rest of its cells at a picture; before the first one, that of the first.
@@ -288,9 +291,9 @@ impl PictureIndex {
         index
     }
 
-    /// The places of its sources, where the rest of each comes from, and whether its values fall from it.
-    pub fn places(&self) -> impl Iterator<Item = (&PicturePlace, RestSource, bool)> {
-        self.sources.iter().map(|source| (&source.place, source.rest_source, source.falls))
+    /// The places of its sources, where the rest of each comes from, whether its values fall from it, and where something lay then.
+    pub fn places(&self) -> impl Iterator<Item = (&PicturePlace, RestSource, bool, &str)> {
+        self.sources.iter().map(|source| (&source.place, source.rest_source, source.falls, source.on.as_str()))
     }
 
     /// Column and row of the taxels that flicker, which never count as above rest.
@@ -593,6 +596,7 @@ mod tests {
             ticks_by_unit: 1.0,
             falls: false,
             flickering: vec![],
+            on: String::new(),
         };
         let source = |place, (t, values): &'_ (Vec<i64>, Vec<f32>)| (place, t.clone(), values.clone());
         let all = [source(place("left", 0), left), source(place("right", 4), right)];

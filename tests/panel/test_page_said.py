@@ -1,0 +1,170 @@
+"""What the page says of a training, of detections and of what cannot be shown, in a real browser."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.panel.browser import running
+from tests.panel.pages import opened, press, recording, shown, shows, until
+
+import taxel
+from taxel import Array, Frames
+from taxel.live import Panel
+from taxel.live._requests import RequestHandler
+from taxel.live._shown_files import Opening
+from taxel.recording.rest import of_pictures
+
+__all__ = ["recording"]
+
+pytestmark = pytest.mark.timeout(600)
+
+
+@contextmanager
+def answered(chromium: Any, file: Path, answers: dict[str, list[dict[str, Any]]]) -> Iterator[Any]:
+    """Show a recording; for requests of the kinds in `answers` these messages come instead of the server's."""
+    with Panel(file) as panel:
+        page = chromium.new_context().new_page()
+
+        def between(socket: Any) -> None:
+            server = socket.connect_to_server()
+
+            def pass_on(text: Any) -> None:
+                message = json.loads(text)
+                for answer in answers.get(message["type"], []):
+                    socket.send(
+                        json.dumps({**answer, **({"id": message.get("id")} if answer["type"] == "done" else {})})
+                    )
+                if message["type"] not in answers:
+                    server.send(text)
+
+            socket.on_message(pass_on)
+            server.on_message(socket.send)
+
+        page.route_web_socket("**/socket", between)
+        page.goto(panel.url)
+        shows(page, "state-word", "^Replay$")
+        yield page
+        page.context.close()
+
+
+def labelled(recording: Path) -> None:
+    """Give the recording labels, so that it can be trained on."""
+    recording.with_suffix("").with_suffix(".notes.csv").write_text("label,t_us\ncontact,2000000\nlift,3000000\n")
+
+
+def test_a_training_that_runs_says_how_far_it_is(chromium: Any, recording: Path) -> None:
+    labelled(recording)
+    said = "fold 2 of 5, after 30 s; about 148 s in all"
+    with answered(chromium, recording, {"train": [], "training": [{"type": "training", "text": said}]}) as page:
+        page.locator("#train").click()
+        shows(page, "train-text", f"^{said}$")
+        shows(page, "train", "^Stop the training")
+
+
+def test_options_that_the_advice_names_are_given_in_a_shell(chromium: Any, recording: Path) -> None:
+    labelled(recording)
+    text = "held out: contact, neuron: 3 of 5\nmore labels help most, else --search (about 60 s) or --recipe gait_plate"
+    trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": text}
+    detections = {"train": [trained, {"type": "done"}], "read_out": [{"type": "done"}]}
+    with answered(chromium, recording, detections) as page:
+        shows(page, "train-shell", r"^The same in a shell: taxel train")
+        page.locator("#train").click()
+        shows(page, "train-text", "--search")
+        shows(
+            page, "train-shell", r"^Options \(--search, --recipe\) are given in a shell, at the end of .*: taxel train"
+        )
+        assert "one without a label counts as false in training" in page.locator("#panel-labels").inner_text()
+
+
+def test_what_a_training_says_can_be_read_while_it_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    command, end = tmp_path / "python", tmp_path / "end"
+    command.write_text(
+        f"""#!{sys.executable}
+import pathlib, sys, time
+for line in ("starting, after 2 s", "fold 2 of 5, after 12 s; about 30 s in all", "warning: 3 labels are alone"):
+    print("taxel: " + line, file=sys.stderr, flush=True)
+while not pathlib.Path({str(end)!r}).exists():
+    time.sleep(0.02)
+print("held out: all found")
+"""
+    )
+    command.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(command))
+    handler = RequestHandler(lambda *_: None, lambda _: None, lambda _: None, None, Opening())
+    assert handler.training_progress() == ""
+    printed: list[str] = []
+    training = threading.Thread(target=lambda: printed.append(handler.train(tmp_path / "a.npz", tmp_path / "a.json")))
+    training.start()
+    until(lambda: handler.training_progress() == "fold 2 of 5, after 12 s; about 30 s in all", "its estimate")
+    end.touch()
+    training.join()
+    assert printed == ["held out: all found\nwarning: 3 labels are alone"]
+    assert handler.training_progress() == ""
+
+
+@pytest.mark.parametrize("order", [["contact", "lift"], ["lift", "contact"]])
+def test_shapes_of_detections_follow_the_order_of_the_readout(order: list[str], chromium: Any, recording: Path) -> None:
+    readout = recording.with_name("walk.readout.json")
+    readout.write_text("{}")
+    found = [{"label": order[k % 2], "t_us": 10**6 * (k + 1), "known_us": 10**6 * (k + 1)} for k in range(4)]
+    message = {"type": "detections", "source": recording.name, "readout": readout.name, "labels": ["contact", "lift"]}
+    listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
+    answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
+    with answered(chromium, recording, answers) as page:
+        page.locator("#readout").select_option(readout.name)
+        shows(page, "detection-count", "^4$")
+        rows = page.locator("#detection-list li")
+        until(lambda: rows.count() == 4, "they are listed")
+        shapes = {row.locator(".what").inner_text(): row.locator(".shape").get_attribute("class") for row in rows.all()}
+        assert shapes == {"contact": "shape shape-0", "lift": "shape shape-1"}
+    readout.unlink()
+
+
+def test_without_a_board_the_tab_record_says_so(chromium: Any, recording: Path) -> None:
+    with shown(chromium, recording) as page:
+        press(page, "2")
+        shows(page, "record-state", "^No board$")
+        shows(page, "record-more", "^is listened to")
+
+
+def test_why_a_file_was_not_opened_is_said_once_with_its_name_and_fits_a_phone(chromium: Any, tmp_path: Path) -> None:
+    name = f"{'long' * 20}.csv"
+    (tmp_path / name).write_text("t_us,a,b\n0,1,2\n10000,x,1\n")
+    with (
+        running("view", name, "--no-open", folder=tmp_path) as server,
+        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"), width=390, height=844) as page,
+    ):
+        shows(page, "silence", rf"{name}.*line 3")
+        assert page.locator("#notice").is_hidden()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_the_views_never_scroll_sideways(chromium: Any, recording: Path) -> None:
+    with shown(chromium, recording, width=1400, height=900) as page:
+        assert page.locator("#views").evaluate("e => getComputedStyle(e).overflowX") == "hidden"
+
+
+def test_what_lay_there_while_the_rest_was_taken_is_said_above_the_maps(chromium: Any, tmp_path: Path) -> None:
+    random = np.random.default_rng(4)
+    values = 900 + random.normal(0, 2, (600, 8, 8))
+    values[:300, 2:5, 4:7] += 200
+    values[400:460, 1:4, 1:4] += 500
+    frames = Frames(np.round(values), np.arange(600) * 10_000, unit="counts", array=Array(8, 8))
+    where = of_pictures(frames).on
+    assert where.startswith("rows 2 to 4, columns 4 to 6")
+    taxel.convert(frames, tmp_path / "mat.npz")
+    with shown(chromium, tmp_path / "mat.npz") as page:
+        shows(
+            page,
+            "silence",
+            "^In the quiet stretch that the rest is taken from, something lay on rows 2 to 4, columns 4",
+        )
+        assert where in page.locator("#silence").inner_text()
