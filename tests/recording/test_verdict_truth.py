@@ -197,12 +197,10 @@ def test_loss_in_a_board_s_own_last_second_is_seen_in_a_file_without_its_end(tmp
     assert (verdict.status, verdict.lost) == ("lost", {"lost_on_the_way": 1})
 
 
-@pytest.mark.parametrize("keeps", [lambda n: True, lambda n: n % 3 != 1, lambda n: n < 12, lambda n: n > 27])
-def test_what_another_program_left_out_of_a_finished_file_is_lost(keeps: Callable[[int], bool], tmp_path: Path) -> None:
-    """A summary that fits what is there says nothing of what was there."""
-    record(tmp_path / "a.mcap", some_events())
-    with (tmp_path / "a.mcap").open("rb") as source, (tmp_path / "b.mcap").open("wb") as file:
-        reader, writer, channels, left_out = make_reader(source), Writer(file), {}, 0
+def written_anew(of: Path, path: Path, times: Callable[[int], int], number: Callable[[int], int]) -> list[int]:
+    """Write a recording by the official library; return how many datagrams are there 0 times, once and twice."""
+    with of.open("rb") as source, path.open("wb") as file:
+        reader, writer, channels, there = make_reader(source), Writer(file), {}, [0, 0, 0]
         writer.start("taxel")
         metadata = [(one.name, one.metadata) for one in reader.iter_metadata()]
         for one in metadata[:1]:
@@ -213,17 +211,47 @@ def test_what_another_program_left_out_of_a_finished_file_is_lost(keeps: Callabl
                 channels[channel.topic] = writer.register_channel(
                     channel.topic, channel.message_encoding, known or 0, channel.metadata
                 )
-            if channel.topic == "/datagrams" and not keeps(message.sequence):
-                left_out += 1
-                continue
-            times = message.log_time, message.data, message.publish_time, message.sequence
-            writer.add_message(channels[channel.topic], *times)
+            copies = 1
+            if channel.topic == "/datagrams":
+                copies = times(message.sequence)
+                there[copies] += 1
+            said = message.log_time, message.data, message.publish_time, number(message.sequence)
+            for _ in range(copies):
+                writer.add_message(channels[channel.topic], *said)
         for one in metadata[1:]:
             writer.add_metadata(*one)
         writer.finish()
+    return there
+
+
+@pytest.mark.parametrize("keeps", [lambda n: True, lambda n: n % 3 != 1, lambda n: n < 12, lambda n: n > 27])
+def test_what_another_program_left_out_of_a_finished_file_is_lost(keeps: Callable[[int], bool], tmp_path: Path) -> None:
+    """A summary that fits what is there says nothing of what was there."""
+    record(tmp_path / "a.mcap", some_events())
+    left_out, *_ = written_anew(tmp_path / "a.mcap", tmp_path / "b.mcap", lambda n: int(keeps(n)), lambda n: n)
     verdict = taxel.open(tmp_path / "b.mcap").verdict
     assert verdict.lost == ({"lost_in_file": left_out} if left_out else {})
     assert verdict.status == ("lost" if left_out else "complete after arrival")
+
+
+@pytest.mark.parametrize(
+    ("times", "number"),
+    [
+        (lambda n: 1 + (n == 5), lambda n: n),
+        (lambda _: 2, lambda n: n),
+        (lambda n: 2 * (n != 5), lambda n: n),
+        (lambda _: 1, lambda _: 0),
+        (lambda n: int(n % 3 != 1), lambda _: 0),
+    ],
+)
+def test_datagrams_that_are_there_twice_or_without_their_numbers_are_not_lost(
+    times: Callable[[int], int], number: Callable[[int], int], tmp_path: Path
+) -> None:
+    record(tmp_path / "a.mcap", some_events())
+    left_out, _, twice = written_anew(tmp_path / "a.mcap", tmp_path / "b.mcap", times, number)
+    verdict = taxel.open(tmp_path / "b.mcap").verdict
+    assert verdict.lost == ({"lost_in_file": left_out} if left_out else {})
+    assert verdict.damaged.get("repeated_in_file", 0) == twice
 
 
 @pytest.mark.parametrize("lost", [0, 2])

@@ -352,6 +352,8 @@ async function ask(name, trial) {
   } catch (error) {
     const why = error instanceof Error ? error.message : String(error);
     refused = why.includes(name) ? why : `${name}: ${why}`;
+    // What is open stays open, so that the same file can be chosen again once it is mended.
+    if (opening === name) part("files", HTMLSelectElement).value = opened?.name ?? "";
     // Where nothing is shown it stands above the maps.
     if (player.transport.source !== null || hello?.live) notify(refused, true);
   }
@@ -385,6 +387,7 @@ function open(message) {
   showUnits();
   resize(message.array);
   timeWindow.forget();
+  if (!again) maps.forget();
   if (timeline && !again) {
     timeline.following = false;
     timeWindow.showAll();
@@ -415,6 +418,7 @@ function move(transport) {
   if (transport.source === null && (opened || changed)) {
     opened = null;
     showUnits();
+    maps.forget();
     strip.overview = null;
     timeline = null;
     training.choose(null);

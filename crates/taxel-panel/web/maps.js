@@ -25,6 +25,12 @@ class Scale {
     this.since = -Infinity;
   }
 
+  /** Another sensor or recording is shown. */
+  forget() {
+    this.top = this.least;
+    this.since = -Infinity;
+  }
+
   /** @param {number} largest @param {number} now_ms @returns {number} */
   held(largest, now_ms) {
     if (largest >= this.top || now_ms - this.since > HOLD_MS) {
@@ -128,6 +134,12 @@ export class Maps {
       map.frame.addEventListener("dblclick", () => this.point(null));
       map.frame.addEventListener("keydown", (event) => this.key(event));
     }
+  }
+
+  /** Begins the scales of colours anew, for another recording. */
+  forget() {
+    this.pressureScale.forget();
+    this.changeScale.forget();
   }
 
   /** @param {import("./protocol.js").ArrayInfo} array @param {PictureSource[]} sources that stand side by side in it */

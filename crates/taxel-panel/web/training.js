@@ -21,6 +21,8 @@ export class Training {
     this.source = null;
     this.button = part("train", HTMLButtonElement);
     this.button.onclick = () => (this.since === null ? this.begin() : this.end());
+    /** The readout that reads what is shown; "" without one. */
+    this.reads = "";
     this.readout = part("readout", HTMLSelectElement);
     this.readout.onchange = () => this.read(this.readout.value);
   }
@@ -69,10 +71,17 @@ export class Training {
 
   /** Lets a readout read what is shown. @param {string} readout */
   async read(readout) {
+    const { source } = this;
     this.readout.value = readout;
-    if (!readout) return this.server.request(this.source === null ? { type: "live" } : { type: "open", name: this.source }).catch(failed);
-    notify(`${readout} reads ${this.source ?? "the board: leave it at rest for the tare"}`);
-    return this.server.request({ type: "read_out", readout }).catch(failed);
+    if (readout) notify(`${readout} reads ${source ?? "the board: leave it at rest for the tare"}`);
+    const without = source === null ? { type: "live" } : { type: "open", name: source };
+    try {
+      await this.server.request(readout ? { type: "read_out", readout } : without);
+      if (source === this.source) this.reads = readout;
+    } catch (error) {
+      if (source === this.source && this.readout.value === readout) this.readout.value = this.reads;
+      failed(error);
+    }
   }
 
   /** @param {Recordings} message */
@@ -89,7 +98,7 @@ export class Training {
     write(part("train-command", HTMLElement), command);
     if (source === this.source) return;
     this.source = source;
-    this.readout.value = "";
+    this.reads = this.readout.value = "";
     if (this.since === null) this.text("");
     this.show();
   }

@@ -238,12 +238,10 @@ impl Reader {
         let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
         // Another program may have written the file anew without some messages, and a summary that fits: the recorder's own
         // count says how many there were.
-        let total = |topic: Topic| {
-            let stated = totals.and_then(|totals| totals.get(&topic.channel_name(self.source, name)).copied());
-            match &self.ending {
-                Some(Ending::Finished { counts }) if topic == data => stated.max(Some(counts.recorded)),
-                _ => stated,
-            }
+        let total = |topic: Topic| totals.and_then(|totals| totals.get(&topic.channel_name(self.source, name)).copied());
+        let recorded = |topic: Topic| match &self.ending {
+            Some(Ending::Finished { counts }) if topic == data => Some(counts.recorded),
+            _ => None,
         };
         let mut unread = unread.clone();
         if let Some((0, indexed)) = self.blocks.skipped.first() {
@@ -252,14 +250,17 @@ impl Reader {
         let (mut lost, mut repeated) = (BTreeMap::new(), 0);
         for topic in Topic::ALL.into_iter().filter(|topic| topic.lost_in_file().is_some()) {
             let (read, total) = (read(topic), total(topic));
-            // Arrival numbers tell which datagrams are there twice.
+            // Arrival numbers tell which datagrams are there twice, unless who wrote the file gave all of them one number.
             let again = match topic {
-                Topic::Datagrams => remarks.numbers.repeated(),
-                _ => total.map_or(0, |total| read.saturating_sub(total)),
+                Topic::Datagrams if !remarks.numbers.are_one() => remarks.numbers.repeated(),
+                _ => recorded(topic).or(total).map_or(0, |whole| read.saturating_sub(whole)),
             };
             repeated += again;
             let listed = unread.messages.get(&topic).copied().unwrap_or(0);
-            lost.insert(topic, total.map_or(listed, |total| total.saturating_sub(read - again)));
+            // The summary counts what is there twice.
+            let missing = total.map(|total| total.saturating_sub(read));
+            let not_there = recorded(topic).map(|recorded| recorded.saturating_sub(read - again));
+            lost.insert(topic, missing.max(not_there).unwrap_or(listed));
         }
         Condition {
             ending: self.ending.clone(),

@@ -79,6 +79,12 @@ impl Numbers {
         self.repeated
     }
 
+    /// Whether there are several datagrams, all with one arrival number.
+    #[must_use]
+    pub fn are_one(&self) -> bool {
+        self.repeated > 0 && self.runs.len() == 1 && self.runs.iter().all(|(first, last)| first == last)
+    }
+
     /// Number of arrival numbers that are missing between the first and the last.
     #[must_use]
     pub fn skipped(&self) -> u64 {
