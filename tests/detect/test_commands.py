@@ -81,6 +81,13 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
     code, out, _ = call(capsys, *arguments, "--truth", folder / "labels.csv", "--window-ms", 10)
     assert (code, out.count("contact")) == (0, 6 + 4)
     assert "known (ms)" in out
+    assert "not scored" not in out
+    # Labels that the readout does not have do not count as missed; they are named.
+    more = folder / "more.csv"
+    more.write_text((folder / "truth.csv").read_text() + "step,9000\noff,12000\n")
+    code, out, _ = call(capsys, *arguments, "--truth", more, "--window-ms", 10)
+    assert (code, out.splitlines()[-1]) == (0, "not scored, as the readout has contact, lift: off, step")
+    more.unlink()
 
 
 def test_the_command_and_the_function_train_the_same(trained: Path) -> None:

@@ -230,6 +230,18 @@ def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help()
     assert helps(12, 12) == ""
 
 
+def test_a_name_that_is_not_known_as_an_end_is_said_where_no_input_follows_it() -> None:
+    frames, labels = touched((8, 8), 5, gain=200.0, noise=1.0)
+    frames = Frames(frames.values, frames.t, unit="V", array=frames.array)
+    tare = Tare.take(frames, stop_us=900_000)
+    for name, helps in (("drop", "another name of the label"), ("off", "more labels")):
+        times = {"contact": labels["contact"], name: labels["lift"]}
+        example = Example(frames, times, tare)
+        plan = Recipe.load("touch", None, list(times), measured_floor([example]))
+        none = score(taxel.Detections([], [], []), times)
+        assert advised(trained([example], plan, None), [example], none, none, None)[name].helps == helps
+
+
 def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -186,7 +186,9 @@ def layout_said_of(place: Path) -> str:
     return lines
 
 
-@pytest.mark.parametrize("rows", [["0,00;1;-", "0,02;1,5;2"], ["0,00\t1,5", "0,02\t2"], ["t;a", "0,00;1,5", ""]])
+@pytest.mark.parametrize(
+    "rows", [["s;a", "0,00;1;-", "0,02;1,5;2"], ["", "0,00\t1,5", "0,02\t2"], ["t;a", "0,00;1,5", ""]]
+)
 def test_a_table_with_decimal_commas_and_no_layout_says_that_it_has_them(tmp_path, rows):
     path = tmp_path / "glove.csv"
     path.write_text("\n".join(["time;thumb", *rows]) + "\n")

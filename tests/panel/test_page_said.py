@@ -168,3 +168,36 @@ def test_what_lay_there_while_the_rest_was_taken_is_said_above_the_maps(chromium
             "^In the quiet stretch that the rest is taken from, something lay on rows 2 to 4, columns 4",
         )
         assert where in page.locator("#silence").inner_text()
+
+
+def test_a_file_that_was_refused_does_not_stay_chosen(chromium: Any, recording: Path) -> None:
+    broken = recording.with_name("broken.npz")
+    broken.write_bytes(b"PK\x03\x04")
+    with shown(chromium, recording) as page:
+        page.locator("#files").select_option(broken.name)
+        shows(page, "notice-text", "broken.npz: ")
+        until(lambda: page.locator("#files").input_value() == recording.name, "the open recording is chosen again")
+    broken.unlink()
+
+
+def test_a_readout_that_was_refused_does_not_stay_chosen(chromium: Any, recording: Path) -> None:
+    readout = recording.with_name("other.readout.json")
+    readout.write_text("{}")
+    listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
+    with answered(chromium, recording, {"recordings": [listing]}) as page:
+        page.locator("#readout").select_option(readout.name)
+        shows(page, "notice-text", "other.readout.json: ")
+        until(lambda: page.locator("#readout").input_value() == "", "no readout is chosen")
+    readout.unlink()
+
+
+def test_another_recording_has_a_scale_of_its_own(chromium: Any, tmp_path: Path) -> None:
+    y, x = np.mgrid[:8, :8]
+    for name, most in (("large", 60_000.0), ("small", 80.0)):
+        values = np.zeros((200, 8, 8), np.float32)
+        values[60:150] = most * np.exp(-((x - 4) ** 2 + (y - 4) ** 2) / 6.0)
+        taxel.convert(Frames(values, np.arange(200) * 10_000, unit="counts"), tmp_path / f"{name}.npz")
+    with shown(chromium, tmp_path / "large.npz") as page:
+        shows(page, "pressure-top", r"^[56]\d,?\d{3} counts$")
+        page.locator("#files").select_option("small.npz")
+        shows(page, "pressure-top", r"^\d\d(\.\d+)? counts$")

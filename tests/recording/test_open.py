@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -139,6 +140,21 @@ def test_a_plain_npz_or_csv_gets_the_thesis_array_or_one_that_fits(tmp_path: Pat
     assert taxel.open(tmp_path / "b.csv").array.shape == (64, 100)
     with pytest.raises(FormatError, match="outside"):
         taxel.open(tmp_path / "b.csv", array=THESIS)
+
+
+def test_a_table_with_a_layout_beside_a_recording_is_left_out_with_a_warning(tmp_path: Path) -> None:
+    rows = "\n".join(f"{0.01 * k:.2f},{k % 7},{k % 5}" for k in range(100))
+    (tmp_path / "layout.toml").write_text('[table]\ntime_column = "time_s"\ntime_unit = "s"\n')
+    for name in ("day1", "day2"):
+        (tmp_path / f"{name}.csv").write_text(f"time_s,a,b\n{rows}\n")
+    assert len(taxel.open(tmp_path)) == 2
+    taxel.convert(taxel.open(tmp_path / "day1.csv"), tmp_path / "day1.npz")
+    with pytest.warns(UserWarning, match=r": day2.csv left out, as beside recordings \(day1.npz\) tables"):
+        assert [one.name for one in taxel.open(tmp_path)] == ["day1.npz"]
+    (tmp_path / "day2.csv").unlink()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert [one.name for one in taxel.open(tmp_path)] == ["day1.npz"]
 
 
 @pytest.mark.parametrize("ending", ["npz", "h5"])

@@ -89,6 +89,8 @@ def _laid_out(text: str) -> str:
         return option.format("ROWSxCOLUMNS")
     trained = re.search(r"an array of 1 x (\d+) taxels: the readout was trained on (\d+) x (\d+)$", text)
     if trained and int(trained[1]) == int(trained[2]) * int(trained[3]):
+        if trained[2] == "1":
+            return f"; give --array 1x{trained[3]}xMM, MM the distance of the channels, or pitch_mm in a layout file"
         return option.format(f"{trained[2]}x{trained[3]}")
     return ""
 

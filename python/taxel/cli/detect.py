@@ -21,7 +21,7 @@ from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, reference
 from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from taxel.detect import Outcome, PlainRule, Readout, Score
     from taxel.recording import Recording, Verdict
@@ -118,7 +118,7 @@ def detect(
         if isinstance(loaded, Readout):
             typer.echo(outcome.outside_text)
     if together is not None:
-        typer.echo(f"\nagainst {truth} (window {window_ms:g} ms):\n{together!r}")
+        typer.echo(f"\nagainst {truth} (window {window_ms:g} ms):\n{together!r}{_not_scored(events, loaded.labels)}")
     for name, path in places.items():
         typer.echo(f"written to {path}" if name == "written" else f"{name}: {path}")
 
@@ -213,6 +213,12 @@ def _table(outcomes: Sequence[Outcome]) -> str:
         name = '"' + Path(one.name).name.replace('"', '""') + '"'
         lines += [*([] if lines else [f"recording,{head}"]), *(f"{name},{row}" for row in rows)]
     return "\n".join(lines) + "\n"
+
+
+def _not_scored(events: Sequence[Mapping[str, object] | None], labels: Sequence[str]) -> str:
+    """Return a line that names the labels of the truth which the readout does not have; "" where it has all."""
+    unknown = sorted({label for of in events if of is not None for label in of} - set(labels))
+    return f"\nnot scored, as the readout has {', '.join(labels)}: {', '.join(unknown)}" if unknown else ""
 
 
 def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:

@@ -63,15 +63,16 @@ def advised(
     """Return what may help each label of which more than 5 % are missed or false.
 
     Other times of the labels where most of them lie at one distance of more than 50 ms from what the sensor felt. More
-    labels where there are fewer than four. Labels of all events where more are false than missed, and a quarter of the
-    time or more lies before the first label or behind the last. The recipe that fits recording and labels, if a named
-    one was taken that does not. Another tare where it holds a touch, where taxels read above their rest before touches
-    begin, or where nothing was felt of most labels that are missed. Else the plain rule, where it makes at most half
-    the mistakes on the same labels; or the recipe that learns from the same quantities, if this one does not. For
-    contact and lift of channels, and kinds of touch that they do not tell, their distance. Other kinds of touch where
-    neither neuron nor rule tells more of them than chance would. Else more labels, where on its own training data the
-    readout makes at most half the mistakes, as it learnt by heart what these data have. Else a search of other
-    parameters, if the recipe lists any.
+    labels where there are fewer than four. Labels of all events where more are false than missed or less than half is
+    found, and a quarter of the time or more lies before the first label or behind the last. Another name where none is
+    found of a label that no input follows, as it was learnt as a kind of touch. The recipe that fits recording and
+    labels, if a named one was taken that does not. Another tare where it holds a touch, where taxels read above their
+    rest before touches begin, or where nothing was felt of most labels that are missed. Else the plain rule, where it
+    makes at most half the mistakes on the same labels; or the recipe that learns from the same quantities, if this one
+    does not. For contact and lift of channels, and kinds of touch that they do not tell, their distance. Other kinds of
+    touch where neither neuron nor rule tells more of them than chance would. Else more labels, where on its own
+    training data the readout makes at most half the mistakes, as it learnt by heart what these data have. Else a search
+    of other parameters, if the recipe lists any.
 
     Parameters
     ----------
@@ -103,6 +104,7 @@ def advised(
     return {
         label: _of_labels(label, scored[label], times, recipe)
         or _of_time(label, scored[label], sound)
+        or _of_name(made, label, scored[label])
         or _of_tare(made, label, scored[label], times)
         or _advice(
             made,
@@ -142,13 +144,26 @@ def _of_labels(label: str, scored: Score, times: _OfTimes, recipe: Advice | None
 def _of_time(label: str, scored: Score, examples: Sequence[Example]) -> Advice | None:
     """Return that events may lack labels before the first and behind the last, where much time lies there."""
     outside, whole = unlabelled(examples, label)
-    if scored.false <= scored.missed or outside < _UNLABELLED * whole:
+    found = scored.false <= scored.missed and 2 * scored.found >= scored.events
+    if found or outside < _UNLABELLED * whole:
         return None
     return Advice(
         "labels of all events",
         f"{outside / 1e6:.1f} of {whole / 1e6:.1f} s lie before the first or behind the last one, and an event without "
         "its label counts as false: label those too, or cut the recording (taxel cut) to what is labelled",
     )
+
+
+def _of_name(made: Trained, label: str, scored: Score) -> Advice | None:
+    """Return that a label without its name may be the end of a touch, where it was learnt as a kind of touch."""
+    alignment = made.alignments.get(label)
+    kinds = made.recipe.about == recipes.read("touch")["about"] and not recipes.knows("touch", label)
+    if not kinds or scored.found or alignment is None or alignment.train is not None:
+        return None
+    because = (
+        "by this one it is learnt as a kind of touch; the end of a touch is lift, release, removal, end, stop or off"
+    )
+    return Advice("another name of the label", because)
 
 
 def _other_recipe(made: Trained, examples: Sequence[Example]) -> Advice | None:
@@ -175,7 +190,7 @@ def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advic
         return Advice(
             "another tare",
             f"nothing was felt of {counted(unfelt, 'label')}, unless their times are off by more than 50 ms, each by "
-            "another time",
+            "another time, or they are of another recording",
         )
     return None
 

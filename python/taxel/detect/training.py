@@ -405,8 +405,8 @@ class Fitting:
                 raise ProblemError(
                     f"{self._label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; "
                     "either the tare holds a touch, as it ends before the first label, which may be late (give --tare "
-                    "SECONDS), or readings fall with pressure (falls = true in a layout file); taxel info shows what "
-                    "was touched"
+                    "SECONDS), or readings fall with pressure (falls = true in a layout file), or another source felt "
+                    "it (a column source in the labels); taxel info shows what was touched"
                 )
 
     def fits(self, recipe: Recipe) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -233,6 +234,7 @@ def _folder(folder: Path, how: How) -> list[Recording]:
     if how.topic or not own:
         own = [file for file in files if file in own or is_bag(file)]
     if own:
+        _warn_of_tables(folder, own, files, how)
         opened = [_open_one(file, how) for file in own]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
     elif not (names := _formats(folder)) and (foreign := _laid_out_in(files, how.layout)):
@@ -249,6 +251,20 @@ def _folder(folder: Path, how: How) -> list[Recording]:
         trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
         pairs = [(Path(trial.name), _of(trial, folder, names[0], how.layout)) for trial in trials]
     return _labelled(folder / LABELS, pairs)
+
+
+def _warn_of_tables(folder: Path, own: Sequence[Path], files: Sequence[Path], how: How) -> None:
+    """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
+    stems = {file.stem for file in own}
+    left = [file.name for file in _laid_out_in(files, how.layout) if file not in own and file.stem not in stems]
+    if left:
+        names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
+        kept = ", ".join(file.name for file in own[:3]) + " ..." * (len(own) > 3)
+        warnings.warn(
+            f"{folder}: {names} left out, as beside recordings ({kept}) tables and arrays are not read: convert them, "
+            "or keep them in a folder of their own",
+            stacklevel=4,
+        )
 
 
 def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recording]:

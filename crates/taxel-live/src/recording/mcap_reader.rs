@@ -238,7 +238,8 @@ impl Reader {
         let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
         // Another program may have written the file anew without some messages, and a summary that fits: the recorder's own
         // count says how many there were.
-        let total = |topic: Topic| totals.and_then(|totals| totals.get(&topic.channel_name(self.source, name)).copied());
+        let total =
+            |topic: Topic| totals.and_then(|totals| totals.get(&topic.channel_name(self.source, name)).copied());
         let recorded = |topic: Topic| match &self.ending {
             Some(Ending::Finished { counts }) if topic == data => Some(counts.recorded),
             _ => None,
