@@ -124,7 +124,8 @@ def run(*, quick: bool) -> dict[str, Any]:
         times: dict[str, list[dict[str, Any]]] = {name: [] for name in asked}
         for _ in range(rounds):
             for name, one in asked.items():
-                times[name].append(timed([*one.command, *(QUICK if quick else ())]))
+                # The page of the round before is replaced.
+                times[name].append(timed([*one.command, "--overwrite", *(QUICK if quick else ())]))
         for name, one in asked.items():
             results[name] = {
                 "command": " ".join(["taxel", *(Path(word).name for word in one.command)]),
