@@ -7,11 +7,16 @@ shared memory, and one at the end.
 
 import json
 import mmap
+import signal
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 #: Bytes that are read at once; a line is written after each such piece.
 PIECE = 4 << 20
+#: Where the library has returned nothing for so long, s, as it may on a damaged file, the child ends by itself: its
+#: parent ends it much sooner, unless it was killed.
+LIMIT_S = 60
 
 
 def main() -> None:
@@ -24,8 +29,7 @@ def main() -> None:
     try:
         with h5py.File(path) as h5:
             send(attributes={name: whole(value) for name, value in h5.attrs.items()}, entries=entries(h5, h5py))
-            for line in sys.stdin:
-                order = json.loads(line)
+            for order in orders():
                 if order["text"]:
                     send(done=str(h5[order["name"]].asstr()[()]))
                 else:
@@ -35,8 +39,18 @@ def main() -> None:
         send(error=(str(error).splitlines() or [""])[0][:200], kind=type(error).__name__)
 
 
+def orders() -> Iterator[Any]:
+    """Yield the requests; to wait for one is no reason to end."""
+    signal.alarm(0)
+    for line in sys.stdin:
+        signal.alarm(LIMIT_S)
+        yield json.loads(line)
+        signal.alarm(0)
+
+
 def send(**message: Any) -> None:
-    """Write a line."""
+    """Write a line, from which on the limit counts anew."""
+    signal.alarm(LIMIT_S)
     print(json.dumps(message), flush=True)
 
 

@@ -160,9 +160,8 @@ def _of_name(made: Trained, label: str, scored: Score) -> Advice | None:
     kinds = made.recipe.about == recipes.read("touch")["about"] and not recipes.knows("touch", label)
     if not kinds or scored.found or alignment is None or alignment.train is not None:
         return None
-    because = (
-        "by this one it is learnt as a kind of touch; the end of a touch is lift, release, removal, end, stop or off"
-    )
+    ends = ", ".join(("lift", *(name for name, of in recipes.read("touch")["also"].items() if of == "lift")))
+    because = f"by this one it is learnt as a kind of touch; names of the end of a touch are {ends}"
     return Advice("another name of the label", because)
 
 

@@ -116,11 +116,13 @@ def _of_table(lines: Sequence[str]) -> tuple[str, list[str]] | None:
 
 def _refuse_decimal_commas(path: Path, lines: Sequence[str]) -> None:
     """Refuse a table with a line that would hold numbers if its commas were decimal points."""
-    for line, cells in enumerate((_cells(one, mark) for one in lines for mark in (";", "\t", " ")), 3):
-        if len(cells) > 1 and _are_numbers([cell.replace(",", ".", 1) for cell in cells]):
-            for k, cell in enumerate(cells, 1):
-                if cell not in _MISSING:
-                    text.number(cell, path, line // 3, f"column {k}")
+    for number, line in enumerate(lines, 1):
+        for mark in (";", "\t", " "):
+            cells = _cells(line, mark)
+            if len(cells) > 1 and _are_numbers([cell.replace(",", ".", 1) for cell in cells]):
+                for k, cell in enumerate(cells, 1):
+                    if cell not in _MISSING:
+                        text.number(cell, path, number, f"column {k}")
 
 
 def _size(shape: Sequence[int]) -> list[str]:
