@@ -8,6 +8,7 @@ module taxel_command_receiver (
     input  logic        reset,
     input  logic        valid,
     input  logic [7:0]  data,
+    input  logic        broken,    // a byte that was none: its command is none either
     output logic        command,   // a whole one
     output logic [2:0]  number,
     output logic [31:0] value,
@@ -34,6 +35,10 @@ module taxel_command_receiver (
         have    <= have == 3'd4 ? 3'd0 : have + 3'd1;
         command <= have == 3'd4;
       end
+    end
+    if (broken) begin
+      skipped <= have + 3'd1;
+      have    <= '0;
     end
     if (reset) begin
       have    <= '0;

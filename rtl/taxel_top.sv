@@ -69,7 +69,7 @@ module taxel_top #(
   end
 
   // Commands.
-  logic byte_valid, command, answer, room, refused_full, markers_taken, marker_lost;
+  logic byte_valid, byte_broken, command, answer, room, refused_full, markers_taken, marker_lost;
   logic [7:0] byte_data;
   logic [2:0] number, skipped, markers;
   logic [31:0] value;
@@ -79,10 +79,10 @@ module taxel_top #(
   logic answer_ready, answer_pop, status_valid, status_taken;
   logic [7:0] status_data;
 
-  taxel_uart_rx #(.CLOCKS(BAUD_CLOCKS)) uart_rx (.clk, .reset, .rx, .valid(byte_valid), .data(byte_data));
+  taxel_uart_rx #(.CLOCKS(BAUD_CLOCKS)) uart_rx (.clk, .reset, .rx, .valid(byte_valid), .data(byte_data), .broken(byte_broken));
 
   taxel_command_receiver receiver (
-      .clk, .reset, .valid(byte_valid), .data(byte_data), .command, .number, .value, .skipped
+      .clk, .reset, .valid(byte_valid), .data(byte_data), .broken(byte_broken), .command, .number, .value, .skipped
   );
 
   taxel_register_file #(

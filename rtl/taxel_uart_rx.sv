@@ -2,7 +2,7 @@
 //
 // Throughput: a byte in ten bits.
 // Latency: a byte stands 1 to 2 clocks after the middle of its stop bit (half a clock less where CLOCKS is odd).
-// Loses a byte without a stop bit: it is not counted, what is left of its command is (`taxel_command_receiver`).
+// Loses a byte without a stop bit, which is told once, however long the line is held low (`broken`).
 module taxel_uart_rx #(
     parameter int CLOCKS = 868
 ) (
@@ -10,37 +10,42 @@ module taxel_uart_rx #(
     input  logic       reset,
     input  logic       rx,
     output logic       valid,
-    output logic [7:0] data
+    output logic [7:0] data,
+    output logic       broken  // as valid, for a byte without a stop bit
 );
 
   localparam int BITS = $clog2(CLOCKS + CLOCKS / 2 + 1);
 
   logic line, busy;
+  logic low;  // since a byte without a stop bit
   logic [BITS-1:0] left;
   logic [3:0] bits;  // how many are still to come, with the stop bit
 
   taxel_synchroniser settle (.clk, .from(rx), .to(line));
 
   always_ff @(posedge clk) begin
-    valid <= 1'b0;
-    left  <= left - BITS'(1);
+    valid  <= 1'b0;
+    broken <= 1'b0;
+    left   <= left - BITS'(1);
+    if (line) low <= 1'b0;
     if (!busy) begin
       // From the start bit's edge to the middle of the first bit.
       left <= BITS'(CLOCKS + CLOCKS / 2 - 1);
       bits <= 4'd9;
-      busy <= !line;
+      busy <= !line && !low;
     end else if (left == BITS'(1)) begin
       left <= BITS'(CLOCKS);
       bits <= bits - 4'd1;
       if (bits == 4'd1) begin
-        busy  <= 1'b0;
-        // Without a stop bit it is no byte.
-        valid <= line;
+        busy   <= 1'b0;
+        valid  <= line;
+        broken <= !line;
+        low    <= !line;
       end else begin
         data <= {line, data[7:1]};
       end
     end
-    if (reset) {busy, valid} <= '0;
+    if (reset) {busy, low, valid, broken} <= '0;
   end
 
 endmodule

@@ -22,6 +22,7 @@ namespace {
 
 constexpr int kWindow = 1 << 17;  // ticks of a ramp that the bench follows
 constexpr uint16_t kNotReturned = 65535;
+constexpr uint16_t kNoStop = 256;
 
 struct Bench {
     VerilatedContext context;
@@ -44,7 +45,7 @@ struct Bench {
     uint64_t before[2] = {0, 0};      // in the clock before: what the pins' cells hold
     uint64_t driven[2] = {0, 0};      // at the pins
     // The serial line and the link.
-    std::deque<uint8_t> to_send;
+    std::deque<uint16_t> to_send;  // bytes; with kNoStop the stop bit is low, and a bit follows in which the line rests
     int bit = -1, bit_clocks = 0;
     int rx_bit = -1, rx_clocks = 0, rx_byte = 0;
     uint64_t sent_at = ~uint64_t{0};  // the clock of the middle of the last byte's stop bit
@@ -169,7 +170,7 @@ struct Bench {
             bit++;
             bit_clocks = baud;
             if (bit == 9 && to_send.size() == 1) sent_at = clock + baud / 2;
-            if (bit == 10) {
+            if (bit == (to_send.front() & kNoStop ? 11 : 10)) {
                 bit = -1;
                 to_send.pop_front();
             }
@@ -178,7 +179,7 @@ struct Bench {
             bit = 0;
             bit_clocks = baud;
         }
-        top.rx = bit < 0 ? 1 : bit == 0 ? 0 : bit == 9 ? 1 : (to_send.front() >> (bit - 1)) & 1;
+        top.rx = bit < 0 || bit == 10 ? 1 : bit == 0 ? 0 : bit == 9 ? !(to_send.front() & kNoStop) : (to_send.front() >> (bit - 1)) & 1;
         random = random * 1664525u + 1013904223u;
         top.tready = (random >> 24) < ready_of;
     }
@@ -268,6 +269,8 @@ void bench_send(Bench* b, const uint8_t* bytes, int count) {
     b->sent_at = ~uint64_t{0};
     b->to_send.insert(b->to_send.end(), bytes, bytes + count);
 }
+
+void bench_send_broken(Bench* b, int byte) { b->to_send.push_back(byte | kNoStop); }
 
 int bench_sending(Bench* b) { return static_cast<int>(b->to_send.size()); }
 uint64_t bench_sent_at(Bench* b) { return b->sent_at; }

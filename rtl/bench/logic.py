@@ -197,6 +197,10 @@ class Logic:
         """Let bytes go over the serial line, from now on."""
         self.call("send", data, len(data))
 
+    def send_broken(self, byte: int) -> None:
+        """Let a byte without a stop bit go over the serial line, behind what is sent already."""
+        self.call("send_broken", byte)
+
     def serial(self) -> str:
         """Return what came over the serial line since this was last asked."""
         count = self.call("serial", self._data, ROOM)

@@ -16,10 +16,10 @@ module uart_proof #(
 
   logic begun = 1'b0;
   logic [3:0] quiet;  // clocks that the line is quiet after reset, which lasts for most of them
-  logic rx, valid;
+  logic rx, valid, broken;
   logic [7:0] data;
 
-  taxel_uart_rx #(.CLOCKS(CLOCKS)) receiver (.clk, .reset(!begun || quiet > 4'd4), .rx, .valid, .data);
+  taxel_uart_rx #(.CLOCKS(CLOCKS)) receiver (.clk, .reset(!begun || quiet > 4'd4), .rx, .valid, .data, .broken);
 
   // A byte that is sent: since how many clocks, and from which sixteenth of one on; how long its bits are, in sixteenths.
   logic sending, waits, starts;
@@ -74,6 +74,7 @@ module uart_proof #(
     end
     if (begun && quiet == 4'd0) begin
       if (valid) assert (waits && data == sent);
+      assert (!broken);
       // The next one may begin in the clock in which it is received.
       if (!sending) assert (!waits || valid);
       cover (valid && data == 8'hA5 && length == 9'd249);
@@ -87,6 +88,7 @@ module uart_proof #(
                                        : 8'd39 + {4'd8 - receiver.bits, 4'd0} - 8'(receiver.left);
   always_comb begin
     if (LEMMAS && begun) begin
+      assert (!receiver.low || quiet > 4'd3);
       if (!sending) assert (receiver.settle.was && receiver.settle.unsettled && receiver.settle.to || quiet > 4'd8);
       if (quiet != 4'd0) assert (!sending && !waits && (quiet > 4'd3 || (!receiver.busy && !valid)));
       if (sending) begin

@@ -84,6 +84,18 @@ def test_quick_damage_is_counted_and_the_next_command_is_found(host):
     assert [line for line in host.faults if "command" in line][-1] == "fault command 6"
 
 
+def test_quick_a_byte_without_a_stop_bit_counts_with_what_came_of_its_command():
+    host = Host()
+    logic, good = host.pair.logic, Command(6, 5).to_bytes()
+    logic.send(good[:2])
+    logic.send_broken(good[2])
+    logic.send(good[3:])
+    # Three at once, and each of the two that follow.
+    host.receive(60_000)
+    assert [line for line in host.faults if "command" in line][-1] == "fault command 5"
+    assert host.answered(good).startswith("ok")
+
+
 def test_quick_a_command_without_room_for_its_answer_is_refused_and_counted():
     host, sent = Host(), 40
     host.pair.logic.send(b"".join(Command(5, 7 << 16 | k << 8).to_bytes() for k in range(sent)))

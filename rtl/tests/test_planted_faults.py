@@ -139,8 +139,10 @@ OF_MODULES = [
     ("top", "tvalid && tready && tlast", "tvalid && tlast"),
     ("top", ".frame_sync(active.frame_sync)", ".frame_sync(1'b0)"),
     ("uart_rx", "CLOCKS + CLOCKS / 2 - 1)", "CLOCKS + CLOCKS / 2)"),
-    ("uart_rx", "valid <= line;", "valid <= 1'b1;"),
+    ("uart_rx", "valid  <= line;", "valid  <= 1'b1;"),
     ("uart_rx", "CLOCKS + CLOCKS / 2 - 1", "CLOCKS - 1"),
+    ("uart_rx", "busy <= !line && !low;", "busy <= !line;"),
+    ("uart_rx", "broken <= !line;", "broken <= 1'b1;"),
     ("udp_sender", "payload[{filled, place}] <= tdata", "payload[{1'b0, place}] <= tdata"),
     ("udp_sender", "lengths[filled] <= room ? place + BITS'(1) : place", "lengths[filled] <= place + BITS'(1)"),
 ]

@@ -310,9 +310,10 @@ PROOFS = (
         (
             (UART, "left <= BITS'(CLOCKS + CLOCKS / 2 - 1);", "left <= BITS'(CLOCKS - 1);"),
             (UART, "bits <= 4'd9;", "bits <= 4'd8;"),
-            (UART, "busy <= !line;", "busy <= line;"),
+            (UART, "busy <= !line && !low;", "busy <= line && !low;"),
+            (UART, "broken <= !line;", "broken <= line;"),
             (UART, "left <= BITS'(CLOCKS);", "left <= BITS'(CLOCKS - 1);"),
-            (UART, "valid <= line;", "valid <= 1'b0;"),
+            (UART, "valid  <= line;", "valid  <= 1'b0;"),
             (UART, "{line, data[7:1]}", "{data[6:0], line}"),
         ),
         search="abc bmc3",

@@ -1,4 +1,7 @@
-"""Commands of five bytes: the whole ones come out with number and value, all other bytes are counted as skipped."""
+"""Commands of five bytes: the whole ones come out with number and value, all other bytes are counted as skipped.
+
+None stands for a byte without a stop bit.
+"""
 
 import random
 
@@ -11,7 +14,10 @@ def parsed(data):
     """Return commands, each with its last byte's place, and how many bytes belong to none, the end left out."""
     commands, held, skipped = [], [], 0
     for place, byte in enumerate(data):
-        if byte & 0x80:
+        if byte is None:
+            skipped += len(held) + 1
+            held = []
+        elif byte & 0x80:
             skipped += len(held)
             held = [byte]
         elif not held:
@@ -30,7 +36,7 @@ def parsed(data):
 @cocotb.test()
 async def whole_commands_come_out_and_damage_is_counted(dut):
     Clock(dut.clk, 10, "ns").start()
-    dut.valid.value, dut.reset.value = 0, 1
+    dut.valid.value, dut.broken.value, dut.reset.value = 0, 0, 1
     for _ in range(3):
         await FallingEdge(dut.clk)
     dut.reset.value = 0
@@ -41,11 +47,16 @@ async def whole_commands_come_out_and_damage_is_counted(dut):
         data += [byte for byte in whole if random.random() < 0.95]
         if random.random() < 0.2:
             data.append(random.randrange(256))
+        if random.random() < 0.05:
+            data.insert(len(data) - random.randrange(4), None)
     found, skipped = [], 0
     waiting = list(data)
     while waiting:
         valid = random.random() < 0.7
-        dut.valid.value, dut.data.value = int(valid), waiting.pop(0) if valid else random.randrange(256)
+        byte = waiting.pop(0) if valid else random.randrange(256)
+        broken = byte is None
+        dut.valid.value, dut.broken.value = int(valid and not broken), int(broken)
+        dut.data.value = random.randrange(256) if broken else byte
         await FallingEdge(dut.clk)
         skipped += int(dut.skipped.value)
         if int(dut.command.value):
