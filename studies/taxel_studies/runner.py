@@ -111,7 +111,7 @@ class Results:
         seconds = round(seconds, 3)
         row = {"params": task.params, "seed": task.seed, "code": self.code, "seconds": seconds}
         with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row | {"result": result}, sort_keys=True) + "\n")
+            file.write(json.dumps(row | {"result": result}) + "\n")
         self._results[task.key(self.code)], self._seconds[task.key(self.code)] = result, seconds
 
 

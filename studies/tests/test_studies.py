@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import base64
+import functools
 import json
 import re
 import shutil
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +27,12 @@ MADE_HERE = [name for name in STUDIES if not load(name).data]
 @pytest.fixture(scope="module")
 def report(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("report")
+
+
+@pytest.fixture(scope="module")
+def first_run(report) -> Callable[[str], dict[str, Any]]:
+    """Run a study of toy size once for all tests of this file."""
+    return functools.cache(lambda name: load(name).run(report, size="toy", quiet=True))
 
 
 @pytest.fixture
@@ -44,10 +53,9 @@ def ends(arguments: list[str]) -> int:
 
 
 @pytest.mark.parametrize("name", MADE_HERE)
-def test_a_study_of_toy_size_gives_its_statements_and_a_picture(report, name):
-    study = load(name)
-    assert study.name == name
-    section = study.run(report, size="toy", quiet=True)
+def test_a_study_of_toy_size_gives_its_statements_and_a_picture(report, first_run, name):
+    assert load(name).name == name
+    section = first_run(name)
     assert section["title"] == STUDIES[name]
     for statement in section["statements"]:
         assert statement["says"].endswith(".")
@@ -63,9 +71,9 @@ def test_a_study_of_toy_size_gives_its_statements_and_a_picture(report, name):
 
 
 @pytest.mark.parametrize("name", ["fig6.1", "fig6.2", "fig6.3", "fig6.4", "fig6.5", "fig6.6", "fig6.8", "fig6.9"])
-def test_what_the_thesis_says_holds_at_toy_size(report, name):
+def test_what_the_thesis_says_holds_at_toy_size(first_run, name):
     """All but one caption; of 6.9 in the reading of B that gives kappa its power."""
-    for statement in load(name).run(report, size="toy", quiet=True)["statements"]:
+    for statement in first_run(name)["statements"]:
         if statement["says"].startswith("Caption"):
             assert not statement["holds"], statement
         elif name != "fig6.9" or not statement["why"].startswith("B over B_max"):
@@ -73,21 +81,20 @@ def test_what_the_thesis_says_holds_at_toy_size(report, name):
 
 
 @pytest.mark.parametrize("name", MADE_HERE)
-def test_a_second_run_reckons_nothing_again_and_says_the_same(report, name):
-    study = load(name)
-    first = study.run(report, size="toy", quiet=True)
+def test_a_second_run_reckons_nothing_again_and_says_the_same(report, first_run, name):
+    first = first_run(name)
     lines = (report / name / "results.jsonl").read_bytes()
-    second = study.run(report, size="toy", quiet=True)
+    second = load(name).run(report, size="toy", quiet=True)
     assert (report / name / "results.jsonl").read_bytes() == lines
     assert second["said"] == first["said"]
     assert second["statements"] == first["statements"]
 
 
 @pytest.mark.parametrize("name", MADE_HERE)
-def test_a_realisation_is_a_pure_function_of_parameters_and_seed(report, name, courses):
+def test_a_realisation_is_a_pure_function_of_parameters_and_seed(report, first_run, name, courses):
     """Here, alone and after other draws, it gives what the whole study gave among the others."""
     study = load(name)
-    study.run(report, size="toy", quiet=True)
+    first_run(name)
     rows = [json.loads(line) for line in (report / name / "results.jsonl").read_text().splitlines()]
     tasks = study.tasks(study.set("toy"))
     task = tasks[-1]
@@ -114,8 +121,8 @@ class Page(HTMLParser):
         self.text += data
 
 
-def test_the_page_holds_every_picture_and_names_what_was_not_run(report, tmp_path):
-    load(MADE_HERE[0]).run(report, size="toy", quiet=True)
+def test_the_page_holds_every_picture_and_names_what_was_not_run(report, first_run, tmp_path):
+    first_run(MADE_HERE[0])
     page = Page()
     page.feed(write_page(report).read_text())
     assert all(r.startswith("#") for r in page.references)
@@ -127,9 +134,9 @@ def test_the_page_holds_every_picture_and_names_what_was_not_run(report, tmp_pat
     assert '"axes":[' not in empty.text
 
 
-def test_the_page_adds_up_what_its_studies_took(report, tmp_path):
+def test_the_page_adds_up_what_its_studies_took(report, first_run, tmp_path):
     for name, seconds in zip(MADE_HERE, (3600.0, 3000.0), strict=False):
-        load(name).run(report, size="toy", quiet=True)
+        first_run(name)
         folder = shutil.copytree(report / name, tmp_path / name)
         section = json.loads((folder / "summary.json").read_text())
         (folder / "summary.json").write_text(json.dumps(section | {"cpu_seconds": seconds}))
@@ -138,9 +145,9 @@ def test_the_page_adds_up_what_its_studies_took(report, tmp_path):
     assert "1.8 h of CPU" in page.text
 
 
-def test_a_page_shows_the_kept_picture_of_numbers_that_the_code_cannot_draw_any_more(report, tmp_path):
+def test_a_page_shows_the_kept_picture_of_numbers_that_the_code_cannot_draw_any_more(report, first_run, tmp_path):
     name = MADE_HERE[0]
-    load(name).run(report, size="toy", quiet=True)
+    first_run(name)
     folder = shutil.copytree(report / name, tmp_path / name)
     section = json.loads((folder / "summary.json").read_text())
     (folder / "summary.json").write_text(json.dumps(section | {"said": {}}))
