@@ -59,6 +59,11 @@ class Sensor {
     return [x, y];
   }
 
+  /** @returns {Taxel | null} the taxel that is watched until a person chooses one */
+  get first() {
+    return null;
+  }
+
   /** @returns {Taxel} where a crosshair begins */
   get middle() {
     const middle = /** @type {Taxel} */ ([this.columns >> 1, this.rows >> 1]);
@@ -243,8 +248,8 @@ class Channels extends Sensor {
     return `${source ? `${source.name}, ` : ""}channel ${Math.max(x - (source?.left ?? 0), y)}`;
   }
 
-  /** @returns {Taxel} */
-  get middle() {
+  /** Channels have no map in which one could be chosen by its place. @returns {Taxel} */
+  get first() {
     return [0, 0];
   }
 

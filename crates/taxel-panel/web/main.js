@@ -13,7 +13,7 @@ import { Lanes } from "./lanes.js";
 import { Layout } from "./layout.js";
 import { Maps } from "./maps.js";
 import { Notes } from "./notes.js";
-import { failed, notify } from "./notice.js";
+import { failed, notify, silence } from "./notice.js";
 import { Player } from "./player.js";
 import { readPicture } from "./protocol.js";
 import { Raster } from "./raster.js";
@@ -337,9 +337,24 @@ function greet(message) {
   server.send({ type: "recordings" });
   if (message.live) server.send({ type: "overview" });
   const asked = fragment.get("open") ?? message.open;
-  if (asked && (first || !message.live)) ask(asked);
+  if (asked && (first || !message.live)) ask(asked, fragment.get("trial") ?? undefined);
   player.show();
   writeState();
+}
+
+/**
+ * Another recording is shown, or the live source: a reload of the page shows it again, and what was said of the last one goes.
+ * @param {Opened | null} shown
+ */
+function turnTo(shown) {
+  const kept = { open: shown?.name, trial: shown?.pictures?.trial };
+  for (const [key, value] of Object.entries(kept)) {
+    if (value) fragment.set(key, value);
+    else fragment.delete(key);
+  }
+  history.replaceState(null, "", `#${fragment}`);
+  silence();
+  maps.forget();
 }
 
 /** Asks for a recording, or for a trial of it; says so while it is read. @param {string} name @param {string} [trial] */
@@ -387,7 +402,7 @@ function open(message) {
   showUnits();
   resize(message.array);
   timeWindow.forget();
-  if (!again) maps.forget();
+  if (!again) turnTo(message);
   if (timeline && !again) {
     timeline.following = false;
     timeWindow.showAll();
@@ -418,11 +433,11 @@ function move(transport) {
   if (transport.source === null && (opened || changed)) {
     opened = null;
     showUnits();
-    maps.forget();
     strip.overview = null;
     timeline = null;
     training.choose(null);
     if (hello?.array) resize(hello.array);
+    turnTo(null);
     maps.health = null;
     showZeroed();
     part("files", HTMLSelectElement).value = "";
