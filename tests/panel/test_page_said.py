@@ -84,6 +84,29 @@ def test_options_that_the_advice_names_are_given_in_a_shell(chromium: Any, recor
         assert "one without a label counts as false in training" in page.locator("#panel-labels").inner_text()
 
 
+@pytest.mark.parametrize("count", [1, 3, 40])
+def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, chromium: Any, recording: Path) -> None:
+    table = recording.with_suffix("").with_suffix(".notes.csv")
+    table.write_text("label,t_us\n" + "".join(f"contact,{200_000 * k}\n" for k in range(1, count + 1)))
+    printed = "\n".join(f"held out: contact, neuron: {k} of 5 found, 0 missed, 0 false" for k in range(30))
+    trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": printed}
+    found = [{"label": "contact", "t_us": 10**5 * k, "known_us": 10**5 * k} for k in range(40)]
+    detected = {"type": "detections", "source": recording.name, "readout": "walk.readout.json", "labels": ["contact"]}
+    answers = {"train": [trained, {"type": "done"}], "read_out": [{**detected, "detections": found}, {"type": "done"}]}
+    with answered(chromium, recording, answers) as page:
+        page.set_viewport_size({"width": 1400, "height": 900})
+        shows(page, "label-count", f"^{count} label")
+        page.locator("#train").click()
+        until(lambda: page.locator("#detection-list li").count() == 40, "what it detects is listed")
+        panel, list_ = (page.locator(name).bounding_box() for name in ("#panel-labels", "#label-list"))
+        low = panel["y"] + panel["height"]
+        assert page.locator("#panel-labels").evaluate("e => e.scrollTop") == 0
+        rows = [row.bounding_box() for row in page.locator("#label-list li").all()[:3]]
+        assert max(row["y"] + row["height"] for row in rows) <= min(low, list_["y"] + list_["height"])
+        assert page.locator("#train-text").bounding_box()["y"] + 60 < low
+    table.unlink()
+
+
 def test_what_a_training_says_can_be_read_while_it_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     command, end = tmp_path / "python", tmp_path / "end"
     command.write_text(
