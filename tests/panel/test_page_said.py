@@ -20,6 +20,7 @@ from taxel import Array, Frames
 from taxel.live import Panel
 from taxel.live._requests import RequestHandler
 from taxel.live._shown_files import Opening
+from taxel.recording.pressure import readings
 from taxel.recording.rest import of_pictures
 
 __all__ = ["recording"]
@@ -224,3 +225,32 @@ def test_another_recording_has_a_scale_of_its_own(chromium: Any, tmp_path: Path)
         shows(page, "pressure-top", r"^[56]\d,?\d{3} counts$")
         page.locator("#files").select_option("small.npz")
         shows(page, "pressure-top", r"^\d\d(\.\d+)? counts$")
+
+
+@pytest.mark.parametrize(("load", "rows", "columns"), [(60, (2, 4), (3, 6)), (15, (0, 2), (5, 7)), (0, (2, 4), (3, 6))])
+def test_what_lay_there_is_said_of_events_in_the_same_words(
+    load: int, rows: tuple[int, int], columns: tuple[int, int], chromium: Any, tmp_path: Path
+) -> None:
+    on = np.zeros((8, 8), bool)
+    on[rows[0] : rows[1] + 1, columns[0] : columns[1] + 1] = True
+    # It lies there for 2 s, is taken away, and something else touches at 4 s for half a second.
+    stamps = [(0, np.full((8, 8), True), 50 + load * on), (2_000_000, on, 50 + 0 * on)]
+    stamps += [(4_000_000 + 1000 * k, ~on, np.full((8, 8), 50 + 8 * min(k, 9))) for k in range(10)]
+    stamps += [(4_500_000, ~on, np.full((8, 8), 50)), (6_500_000, np.full((8, 8), True), np.full((8, 8), 50))]
+    t, y, x, ticks = (
+        np.concatenate(parts)
+        for parts in zip(
+            *((np.full(of.sum(), at), *np.nonzero(of), values[of]) for at, of, values in stamps), strict=True
+        )
+    )
+    events = taxel.Events(t, x, y, ticks > 50, intensity=ticks, array=Array(8, 8))
+    taxel.convert(events, tmp_path / "mat.mcap")
+    read = readings(taxel.open(tmp_path / "mat.mcap"))
+    assert read is not None
+    assert bool(read[1].on) is bool(load)
+    with shown(chromium, tmp_path / "mat.mcap") as page:
+        if load:
+            shows(page, "silence", r"^In the quiet stretch that the rest is taken from, something lay on ")
+            assert page.locator("#silence").inner_text().endswith(f"something lay on {read[1].on}.")
+        else:
+            assert page.locator("#silence").is_hidden()

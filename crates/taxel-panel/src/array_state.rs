@@ -105,6 +105,8 @@ pub struct ArrayState {
     /// The rest as it is tracked; `None` where it was given.
     tracked: Option<Box<TrackedRest>>,
     /// When the rest is tracked next, us.
+    /// That of the first quiet stretch.
+    first_quiet: Option<Vec<f64>>,
     track_at: Option<i64>,
     /// Number of changes of the rest.
     rests: u64,
@@ -151,6 +153,7 @@ impl ArrayState {
             rests: 1,
             change: vec![0; from.held.len()],
             time_columns: TimeColumns::new(array, time_column_bytes),
+            first_quiet: None,
             column_us,
             column: None,
             decay_column: 0,
@@ -319,6 +322,9 @@ impl ArrayState {
     }
 
     fn move_to(&mut self, t: i64) {
+        if self.first_quiet.is_none() && tracked.quiet().is_some() {
+            self.first_quiet = Some(tracked.begins().to_vec());
+        }
         if self.latest.is_some_and(|latest| t < latest) {
             return;
         }
@@ -444,6 +450,16 @@ impl ArrayState {
         self.floor = floor;
         self.sum_above_rest();
     }
+    /// By how much each taxel rested lower later than in the first quiet stretch, ticks; not a number where it had no rest
+    /// then. Empty without such a stretch.
+    #[must_use]
+    pub(crate) fn rests_less(&self) -> Vec<f64> {
+        let first = self.first_quiet.as_deref().unwrap_or_default();
+        let lowest = self.tracked.as_ref().map_or(&[][..], |tracked| tracked.begins());
+        let less = |(first, lowest): (&f64, &f64)| if first.is_finite() { first - lowest } else { f64::NAN };
+        first.iter().zip(lowest).map(less).collect()
+    }
+
 
     /// Held value of each taxel.
     #[must_use]

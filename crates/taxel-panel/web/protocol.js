@@ -37,7 +37,7 @@ export const MISSING_AREA = 0xffffffff;
  * @typedef {{ type: "loading", name: string, share: number }} Loading
  * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null,
  *   touch_us: number | null, events: number, bytes: number, train: string, pictures: Pictures | null,
- *   verdict: string, unfinished: boolean, pace: Pace | null, registers: Record<string, number | boolean> | null,
+ *   verdict: string, unfinished: boolean, on: string, pace: Pace | null, registers: Record<string, number | boolean> | null,
  *   frame_us: number | null, markers: { t_us: number, start: boolean }[],
  *   notes: RecordedNote[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
  * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[],
