@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.panel.browser import running
-from tests.panel.pages import opened, press, recording, shown, shows, until
+from tests.panel.pages import clock, opened, press, recording, shown, shows, still, until
 
 import taxel
 from taxel import Array, Frames
@@ -134,6 +134,26 @@ print("held out: all found")
     assert handler.training_progress() == ""
 
 
+def test_detections_of_a_recording_are_in_order_and_the_time_stays_without_them(chromium: Any, recording: Path) -> None:
+    readout = recording.with_name("walk.readout.json")
+    readout.write_text("{}")
+    times = [400_000, 2_000_000, 2_500_000, 9_000_000]
+    found = [{"label": "contact", "t_us": t, "known_us": t} for t in times]
+    message = {"type": "detections", "source": recording.name, "readout": readout.name, "labels": ["contact"]}
+    listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
+    answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
+    with answered(chromium, recording, answers) as page:
+        page.locator("#readout").select_option(readout.name)
+        rows = page.locator("#detection-list .when")
+        until(lambda: rows.all_inner_texts() == [f"{t / 1e6:.3f} s" for t in times], "as the labels are listed")
+        rows.nth(1).click()
+        until(lambda: clock(page) == 2, "its picture")
+        page.locator("#readout").select_option("")
+        shows(page, "detections-none", "^None in this recording")
+        assert still(page) == 2
+    readout.unlink()
+
+
 @pytest.mark.parametrize("order", [["contact", "lift"], ["lift", "contact"]])
 def test_shapes_of_detections_follow_the_order_of_the_readout(order: list[str], chromium: Any, recording: Path) -> None:
     readout = recording.with_name("walk.readout.json")
@@ -169,6 +189,19 @@ def test_why_a_file_was_not_opened_is_said_once_with_its_name_and_fits_a_phone(c
         shows(page, "silence", rf"{name}.*line 3")
         assert page.locator("#notice").is_hidden()
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_of_pictures_there_are_no_maps_to_choose_from_and_no_counters_of_a_board(
+    chromium: Any, recording: Path, tmp_path: Path
+) -> None:
+    frames = Frames(np.ones((40, 4, 4)), np.arange(40) * 20_000, unit="N", array=Array(4, 4))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    for file, there in ((recording, True), (tmp_path / "mat.npz", False)):
+        with shown(chromium, file) as page:
+            press(page, "4")
+            assert page.locator("#map-choice").is_visible() is there
+            assert page.locator("#pressure-alone").is_visible() is there
+            assert page.locator("#counters").is_hidden()
 
 
 def test_the_views_never_scroll_sideways(chromium: Any, recording: Path) -> None:

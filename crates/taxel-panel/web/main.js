@@ -61,7 +61,7 @@ const channels = new Channels(part("channels", HTMLCanvasElement));
 const lanes = new Lanes();
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
 const notes = new Notes(server, player, labels);
-const training = new Training(server);
+const training = new Training(server, player);
 const layout = new Layout(arrangement, () => {
   lanes.fit();
   lanesDue = true;
@@ -120,10 +120,11 @@ function writeState() {
   writePace(opened ? opened.pace : (counters?.pace ?? null));
 }
 
-/** The maps that are shown: of pictures there are no events, and of channels no map, so that only their values are. */
-function mapsShown() {
-  return opened?.pictures || maps.geometry.kind === "channels" ? "pressure" : settings.values.maps;
-}
+/** Whether there are two maps to choose from: of pictures there are no events, and of channels no map, only their values. */
+const hasMaps = () => !opened?.pictures && maps.geometry.kind !== "channels";
+
+/** The maps that are shown. */
+const mapsShown = () => (hasMaps() ? settings.values.maps : "pressure");
 
 /** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of pictures. */
 function showUnits() {
@@ -139,7 +140,6 @@ function showUnits() {
   trials.hidden = !pictures?.trials.length;
   trials.replaceChildren(...(pictures?.trials ?? []).map((name) => make("option", { value: name }, name)));
   trials.value = pictures?.trial ?? "";
-  part("pressure-alone", HTMLButtonElement).hidden = maps.values.pictures;
   showSums();
   showLanes();
 }
@@ -329,7 +329,7 @@ function greet(message) {
   recorder.write();
   part("record", HTMLButtonElement).hidden = !message.live;
   part("record-start", HTMLButtonElement).disabled = !message.live;
-  part("live-counters", HTMLElement).hidden = !message.live;
+  part("counters", HTMLElement).hidden = !message.live;
   if (first && !message.live) showTab("labels");
   showDetections(detections.shown, opened ? detections.labels : (message.readout ?? []));
   document.title = message.live ? "taxel · live" : "taxel · view";
@@ -452,7 +452,7 @@ function move(transport) {
   writeState();
 }
 
-/** @param {import("./detections.js").Detection[]} shown newest first @param {string[]} labels in the order of their readout */
+/** @param {import("./detections.js").Detection[]} shown of the live source newest first @param {string[]} labels in the order of their readout */
 function showDetections(shown, labels) {
   const none = opened ? "None in this recording: train on labels, or choose a readout." : hello?.readout ? "None yet." : "No readout runs: start taxel live with one, or choose one here.";
   detections.show(shown, none, labels);
@@ -551,6 +551,7 @@ function showLanes() {
     part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
   }
   part("raster-changes", HTMLElement).hidden = values.raster === "spikes";
+  part("pressure-alone", HTMLButtonElement).hidden = part("maps-field", HTMLElement).hidden = !hasMaps();
   part("raster-spikes", HTMLElement).hidden = values.raster !== "spikes";
   layout.arrange();
   lanes.fit();
