@@ -196,7 +196,9 @@ class Placed extends Sensor {
 
   /** @param {number} x @param {number} y @returns {string} a centre, in the unit of the places */
   centre(x, y) {
-    return `${rounded(x)}, ${rounded(y)} ${this.places.unit ?? "in the places' own unit"}`;
+    // Coordinates are in steps of the extent.
+    const [across, down] = [x, y].map((at) => rounded(Math.abs(at) < this.near / 100 ? 0 : at));
+    return `${across}, ${down} ${this.places.unit ?? "in the places' own unit"}`;
   }
 
   /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */

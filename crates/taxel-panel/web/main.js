@@ -511,6 +511,7 @@ function drawLanes(shown) {
     const most = channels.draw(shown, geometry.there, maps.taxel && Math.max(...maps.taxel));
     write(part("channels-scale", HTMLElement), `each up to ${rounded(most * maps.values.step)} ${maps.values.unit}`);
   }
+  lanes.name(geometry.sources.slice(0, shown.source_count).map(({ name }) => name));
   if (arrangement().lanes.includes("raster")) raster.draw(shown, values.raster === "spikes" ? "spikes" : "changes");
   lanes.draw(shown);
   labels.place();
@@ -550,8 +551,8 @@ function showLanes() {
     part(`${name}-figure`, HTMLElement).hidden = mapsShown() !== "both" && mapsShown() !== name;
     part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
   }
-  part("raster-changes", HTMLElement).hidden = values.raster === "spikes";
   part("pressure-alone", HTMLButtonElement).hidden = part("maps-field", HTMLElement).hidden = !hasMaps();
+  part("raster-changes", HTMLElement).hidden = values.raster === "spikes";
   part("raster-spikes", HTMLElement).hidden = values.raster !== "spikes";
   layout.arrange();
   lanes.fit();

@@ -4,8 +4,8 @@ export const VERSION = 1;
 
 /** The value of a taxel without any event so far. */
 export const UNKNOWN_VALUE = 65535;
-/** The area of a picture in which no taxel has a value. */
-export const MISSING_AREA = 0xffffffff;
+/** The area of a picture in which no taxel has a value, and the sum of a source of which none has one. */
+export const MISSING = 0xffffffff;
 
 /**
  * @typedef {{ x: number[], y: number[], area?: number[], unit: "mm" | null }} TaxelPlaces
@@ -89,6 +89,7 @@ export const MISSING_AREA = 0xffffffff;
  * @property {"given" | "quiet" | "none"} restFrom where the rest comes from
  * @property {Uint8Array | null} spikes of the encoder, as the raster
  * @property {Uint16Array | null} channels ticks above rest of each channel, column after column
+ * @property {Uint32Array | null} sources sum of each of several sources, column after column
  */
 
 /**
@@ -141,5 +142,6 @@ export function readPicture(buffer) {
     rest: words(5, Uint16Array),
     spikes: words(6, Uint8Array),
     channels: words(7, Uint16Array),
+    sources: words(8, Uint32Array),
   };
 }
