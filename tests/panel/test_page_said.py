@@ -154,6 +154,21 @@ def test_detections_of_a_recording_are_in_order_and_the_time_stays_without_them(
     readout.unlink()
 
 
+@pytest.mark.parametrize("count", [100, 101])
+def test_where_not_all_detections_are_listed_it_is_said(count: int, chromium: Any, recording: Path) -> None:
+    readout = recording.with_name("walk.readout.json")
+    readout.write_text("{}")
+    found = [{"label": "contact", "t_us": 50_000 * k, "known_us": 50_000 * k} for k in range(count)]
+    message = {"type": "detections", "source": recording.name, "readout": readout.name, "labels": ["contact"]}
+    listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
+    answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
+    with answered(chromium, recording, answers) as page:
+        page.locator("#readout").select_option(readout.name)
+        shows(page, "detection-count", "^100$" if count == 100 else "^101, 100 listed$")
+        until(lambda: page.locator("#detection-list li").count() == 100, "the first of them")
+    readout.unlink()
+
+
 @pytest.mark.parametrize("order", [["contact", "lift"], ["lift", "contact"]])
 def test_shapes_of_detections_follow_the_order_of_the_readout(order: list[str], chromium: Any, recording: Path) -> None:
     readout = recording.with_name("walk.readout.json")

@@ -40,7 +40,7 @@ export class Detections {
   show(detections, none, labels) {
     this.shown = detections;
     this.labels = labels;
-    write(part("detection-count", HTMLElement), detections.length ? whole(detections.length) : "");
+    write(part("detection-count", HTMLElement), detections.length ? `${whole(detections.length)}${detections.length > LISTED ? `, ${LISTED} listed` : ""}` : "");
     const empty = part("detections-none", HTMLElement);
     empty.hidden = detections.length > 0;
     write(empty, none);
