@@ -88,6 +88,8 @@ def test_the_page_fits_a_phone_and_its_foot_hides_nothing(chromium: Any, live: S
         assert low["y"] + low["height"] <= foot["y"]
         for button in page.locator("footer button:visible, header button:visible").all():
             assert min(button.bounding_box()["height"], button.bounding_box()["width"]) >= 44, button.inner_text()
+        for button in page.locator(".under button:visible").all():
+            assert min(button.bounding_box()["height"], button.bounding_box()["width"]) >= 36, button.inner_text()
 
 
 @pytest.mark.parametrize("motion", ["reduce", "no-preference"])

@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.panel.browser import running
-from tests.panel.pages import opened, press, recording, shown, shows, until
+from tests.panel.pages import clock, opened, press, recording, shown, shows, still, until
 
 import taxel
 from taxel import Array, Frames
 from taxel.live import Panel
 from taxel.live._requests import RequestHandler
 from taxel.live._shown_files import Opening
+from taxel.recording.pressure import readings
 from taxel.recording.rest import of_pictures
 
 __all__ = ["recording"]
@@ -84,6 +85,29 @@ def test_options_that_the_advice_names_are_given_in_a_shell(chromium: Any, recor
         assert "one without a label counts as false in training" in page.locator("#panel-labels").inner_text()
 
 
+@pytest.mark.parametrize("count", [1, 3, 40])
+def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, chromium: Any, recording: Path) -> None:
+    table = recording.with_suffix("").with_suffix(".notes.csv")
+    table.write_text("label,t_us\n" + "".join(f"contact,{200_000 * k}\n" for k in range(1, count + 1)))
+    printed = "\n".join(f"held out: contact, neuron: {k} of 5 found, 0 missed, 0 false" for k in range(30))
+    trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": printed}
+    found = [{"label": "contact", "t_us": 10**5 * k, "known_us": 10**5 * k} for k in range(40)]
+    detected = {"type": "detections", "source": recording.name, "readout": "walk.readout.json", "labels": ["contact"]}
+    answers = {"train": [trained, {"type": "done"}], "read_out": [{**detected, "detections": found}, {"type": "done"}]}
+    with answered(chromium, recording, answers) as page:
+        page.set_viewport_size({"width": 1400, "height": 900})
+        shows(page, "label-count", f"^{count} label")
+        page.locator("#train").click()
+        until(lambda: page.locator("#detection-list li").count() == 40, "what it detects is listed")
+        panel, list_ = (page.locator(name).bounding_box() for name in ("#panel-labels", "#label-list"))
+        low = panel["y"] + panel["height"]
+        assert page.locator("#panel-labels").evaluate("e => e.scrollTop") == 0
+        rows = [row.bounding_box() for row in page.locator("#label-list li").all()[:3]]
+        assert max(row["y"] + row["height"] for row in rows) <= min(low, list_["y"] + list_["height"])
+        assert page.locator("#train-text").bounding_box()["y"] + 60 < low
+    table.unlink()
+
+
 def test_what_a_training_says_can_be_read_while_it_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     command, end = tmp_path / "python", tmp_path / "end"
     command.write_text(
@@ -108,6 +132,41 @@ print("held out: all found")
     training.join()
     assert printed == ["held out: all found\nwarning: 3 labels are alone"]
     assert handler.training_progress() == ""
+
+
+def test_detections_of_a_recording_are_in_order_and_the_time_stays_without_them(chromium: Any, recording: Path) -> None:
+    readout = recording.with_name("walk.readout.json")
+    readout.write_text("{}")
+    times = [400_000, 2_000_000, 2_500_000, 9_000_000]
+    found = [{"label": "contact", "t_us": t, "known_us": t} for t in times]
+    message = {"type": "detections", "source": recording.name, "readout": readout.name, "labels": ["contact"]}
+    listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
+    answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
+    with answered(chromium, recording, answers) as page:
+        page.locator("#readout").select_option(readout.name)
+        rows = page.locator("#detection-list .when")
+        until(lambda: rows.all_inner_texts() == [f"{t / 1e6:.3f} s" for t in times], "as the labels are listed")
+        rows.nth(1).click()
+        until(lambda: clock(page) == 2, "its picture")
+        page.locator("#readout").select_option("")
+        shows(page, "detections-none", "^None in this recording")
+        assert still(page) == 2
+    readout.unlink()
+
+
+@pytest.mark.parametrize("count", [100, 101])
+def test_where_not_all_detections_are_listed_it_is_said(count: int, chromium: Any, recording: Path) -> None:
+    readout = recording.with_name("walk.readout.json")
+    readout.write_text("{}")
+    found = [{"label": "contact", "t_us": 50_000 * k, "known_us": 50_000 * k} for k in range(count)]
+    message = {"type": "detections", "source": recording.name, "readout": readout.name, "labels": ["contact"]}
+    listing = {"type": "recordings", "folder": "", "files": [], "readouts": [readout.name]}
+    answers = {"read_out": [{**message, "detections": found}, {"type": "done"}], "recordings": [listing]}
+    with answered(chromium, recording, answers) as page:
+        page.locator("#readout").select_option(readout.name)
+        shows(page, "detection-count", "^100$" if count == 100 else "^101, 100 listed$")
+        until(lambda: page.locator("#detection-list li").count() == 100, "the first of them")
+    readout.unlink()
 
 
 @pytest.mark.parametrize("order", [["contact", "lift"], ["lift", "contact"]])
@@ -145,6 +204,19 @@ def test_why_a_file_was_not_opened_is_said_once_with_its_name_and_fits_a_phone(c
         shows(page, "silence", rf"{name}.*line 3")
         assert page.locator("#notice").is_hidden()
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_of_pictures_there_are_no_maps_to_choose_from_and_no_counters_of_a_board(
+    chromium: Any, recording: Path, tmp_path: Path
+) -> None:
+    frames = Frames(np.ones((40, 4, 4)), np.arange(40) * 20_000, unit="N", array=Array(4, 4))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    for file, there in ((recording, True), (tmp_path / "mat.npz", False)):
+        with shown(chromium, file) as page:
+            press(page, "4")
+            assert page.locator("#map-choice").is_visible() is there
+            assert page.locator("#pressure-alone").is_visible() is there
+            assert page.locator("#counters").is_hidden()
 
 
 def test_the_views_never_scroll_sideways(chromium: Any, recording: Path) -> None:
@@ -201,3 +273,32 @@ def test_another_recording_has_a_scale_of_its_own(chromium: Any, tmp_path: Path)
         shows(page, "pressure-top", r"^[56]\d,?\d{3} counts$")
         page.locator("#files").select_option("small.npz")
         shows(page, "pressure-top", r"^\d\d(\.\d+)? counts$")
+
+
+@pytest.mark.parametrize(("load", "rows", "columns"), [(60, (2, 4), (3, 6)), (15, (0, 2), (5, 7)), (0, (2, 4), (3, 6))])
+def test_what_lay_there_is_said_of_events_in_the_same_words(
+    load: int, rows: tuple[int, int], columns: tuple[int, int], chromium: Any, tmp_path: Path
+) -> None:
+    on = np.zeros((8, 8), bool)
+    on[rows[0] : rows[1] + 1, columns[0] : columns[1] + 1] = True
+    # It lies there for 2 s, is taken away, and something else touches at 4 s for half a second.
+    stamps = [(0, np.full((8, 8), True), 50 + load * on), (2_000_000, on, 50 + 0 * on)]
+    stamps += [(4_000_000 + 1000 * k, ~on, np.full((8, 8), 50 + 8 * min(k, 9))) for k in range(10)]
+    stamps += [(4_500_000, ~on, np.full((8, 8), 50)), (6_500_000, np.full((8, 8), True), np.full((8, 8), 50))]
+    t, y, x, ticks = (
+        np.concatenate(parts)
+        for parts in zip(
+            *((np.full(of.sum(), at), *np.nonzero(of), values[of]) for at, of, values in stamps), strict=True
+        )
+    )
+    events = taxel.Events(t, x, y, ticks > 50, intensity=ticks, array=Array(8, 8))
+    taxel.convert(events, tmp_path / "mat.mcap")
+    read = readings(taxel.open(tmp_path / "mat.mcap"))
+    assert read is not None
+    assert bool(read[1].on) is bool(load)
+    with shown(chromium, tmp_path / "mat.mcap") as page:
+        if load:
+            shows(page, "silence", r"^In the quiet stretch that the rest is taken from, something lay on ")
+            assert page.locator("#silence").inner_text().endswith(f"something lay on {read[1].on}.")
+        else:
+            assert page.locator("#silence").is_hidden()

@@ -325,6 +325,57 @@ def test_a_picture_of_missing_values_alone_has_no_force(seconds: int, chromium: 
             shows(page, "force-sum", says)
 
 
+def pointed(page: Any, t_s: float, name: str, says: str) -> None:
+    """Point at a time in the lanes, and wait until one says this."""
+    page.mouse.move(pixel(page, t_s), page.locator("#force-lane .u-over").bounding_box()["y"] + 5)
+    shows(page, name, says)
+
+
+#: The colours of a canvas below an element, as "r,g,b" texts.
+COLOURS = """e => {
+    const { width, height } = e.querySelector("canvas");
+    const { data } = e.querySelector("canvas").getContext("2d").getImageData(0, 0, width, height);
+    const all = new Set();
+    for (let i = 0; i < data.length; i += 4) if (data[i + 3] === 255) all.add(data.slice(i, i + 3).join(", "));
+    return [...all];
+}"""
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_each_foot_has_a_sum_and_a_colour_of_its_own(size: dict[str, int], chromium: Any, tmp_path: Path) -> None:
+    file = write_gaitpdb(tmp_path)
+    with shown(chromium, file, **size) as page:
+        for t_s, left, right in ((0.05, 320, 320), (0.3, 320, 0), (0.8, 0, 320), (5.05, 320, 320)):
+            pointed(page, t_s, "force-sums", rf"^\s*left\s+{left} N\s+right\s+{right} N\s*$")
+        shows(page, "force-area", "^16 taxels$")
+        for name in ("force", "centre"):
+            head = page.locator(f"#{name}-block h2")
+            assert head.evaluate("e => e.scrollWidth <= e.clientWidth"), f"all is in sight of {head.inner_text()}"
+        shows(page, "centre-now", "^0, 0 ")
+        named = page.locator("#force-sums .swatch").evaluate_all(
+            "all => all.map(e => getComputedStyle(e).backgroundColor.slice(4, -1))"
+        )
+        assert len(set(named)) == 2
+        assert set(named) <= set(page.locator("#force-lane").evaluate(COLOURS))
+
+
+@pytest.mark.parametrize("noise", [0, 3, 6])
+def test_of_noise_alone_no_centre_is_drawn(noise: int, chromium: Any, tmp_path: Path) -> None:
+    random = np.random.default_rng(noise)
+    values = random.normal(200, 20, (12, 10)) + random.normal(0, noise, (600, 12, 10))
+    presses = [(k, 2 + k // 100, 1 + k // 150) for k in range(100, 600, 100)]
+    for k, y, x in presses:
+        values[k : k + 40, y : y + 3, x : x + 4] += 120
+    frames = Frames(np.round(values), np.arange(600) * 10_000, unit="counts", array=Array(12, 10))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    with shown(chromium, tmp_path / "mat.npz") as page:
+        for k, y, x in presses:
+            pointed(page, k / 100 - 0.3, "centre-now", "^nothing pressed$")
+            pointed(page, k / 100 + 0.2, "centre-now", r"^\d")
+            column, row = (float(n) for n in page.locator("#centre-now").inner_text().split(", "))
+            assert (column, row) == (pytest.approx(x + 1.5, abs=0.5), pytest.approx(y + 1, abs=0.5))
+
+
 @pytest.mark.parametrize("feet", [1, 2])
 def test_on_a_phone_the_map_leaves_the_curves_in_sight(feet: int, chromium: Any, tmp_path: Path) -> None:
     path = tmp_path / "walk.npz"

@@ -6,7 +6,8 @@
 use std::sync::Arc;
 
 use super::centre::Coordinates;
-use super::time_columns::{COLUMN_US, Curve, MISSING, NOTHING, TimeColumns, column_of};
+use super::keyframe_index::Pictures;
+use super::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, TimeColumns, column_of};
 use super::weights::Weights;
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
@@ -104,6 +105,8 @@ pub struct ArrayState {
     rest: Rest<u16>,
     /// The rest as it is tracked; `None` where it was given.
     tracked: Option<Box<TrackedRest>>,
+    /// That of the first quiet stretch.
+    first_quiet: Option<Vec<f64>>,
     /// When the rest is tracked next, us.
     track_at: Option<i64>,
     /// Number of changes of the rest.
@@ -127,6 +130,9 @@ pub struct ArrayState {
     sum_x: u64,
     sum_y: u64,
     area: u32,
+    /// Number of the source of each column of several sources, and the sum and the weighted sum of each; else empty.
+    source_of: Arc<[usize]>,
+    sums: Vec<(u64, u64)>,
 }
 
 impl ArrayState {
@@ -147,6 +153,7 @@ impl ArrayState {
             held: from.held.clone().into(),
             rest: Rest::measured(from.rest.clone()),
             tracked: Some(from.tracked.clone().unwrap_or_else(|| Box::new(tracked_from(columns, &from.rest)))),
+            first_quiet: None,
             track_at: from.latest.map(next_track),
             rests: 1,
             change: vec![0; from.held.len()],
@@ -163,6 +170,8 @@ impl ArrayState {
             sum_x: 0,
             sum_y: 0,
             area: 0,
+            source_of: Arc::default(),
+            sums: vec![],
         };
         state.sum_above_rest();
         if let Some(t) = from.latest {
@@ -171,11 +180,14 @@ impl ArrayState {
         state
     }
 
-    /// The state where pictures are shown, whose taxels have these weights: the rest is that of the keyframe until
-    /// [`ArrayState::set_rest`], and known from `source`; a change without a value is a value that is missing from then on, and pictures are counted as events are.
+    /// The state where these pictures are shown: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change
+    /// without a value is a value that is missing from then on, and pictures are counted as events are.
     #[must_use]
-    pub(crate) fn of_pictures(mut self, from: &Keyframe, source: RestSource, weights: Weights) -> Self {
-        (self.pictures, self.weights) = (Some(source), weights);
+    pub(crate) fn of_pictures(mut self, from: &Keyframe, pictures: &dyn Pictures) -> Self {
+        (self.pictures, self.weights) = (Some(pictures.rest_source()), pictures.weights().clone());
+        self.source_of = pictures.source_of();
+        self.sums = vec![(0, 0); self.source_of.last().map_or(0, |last| last + 1)];
+        self.time_columns = self.time_columns.with_sources(self.sums.len());
         (self.tracked, self.track_at) = (None, None);
         self.rest = Rest::measured(from.rest.clone());
         self.sum_above_rest();
@@ -193,6 +205,7 @@ impl ArrayState {
     /// Computes the sums above rest from all taxels.
     fn sum_above_rest(&mut self) {
         (self.sum, self.weighted, self.sum_x, self.sum_y, self.area) = (0, 0, 0, 0, 0);
+        self.sums.fill((0, 0));
         for taxel in 0..self.places.len() {
             self.change_above_rest(taxel, 0, self.above(taxel));
         }
@@ -213,6 +226,11 @@ impl ArrayState {
         self.sum_x = self.sum_x.wrapping_add(moved.wrapping_mul(x));
         self.sum_y = self.sum_y.wrapping_add(moved.wrapping_mul(y));
         self.area = self.area + u32::from(now > 0) - u32::from(before > 0);
+        if let Some(&source) = self.source_of.get(usize::from(self.places[taxel].0)) {
+            let (sum, weighted) = &mut self.sums[source];
+            *sum = sum.wrapping_add(moved);
+            *weighted = weighted.wrapping_add(self.weights.weighed(taxel, moved));
+        }
     }
 
     fn curve(&self) -> Curve {
@@ -304,6 +322,9 @@ impl ArrayState {
         let Some(tracked) = &mut self.tracked else { return };
         let value = |&held: &u16| if held == UNKNOWN { f32::NAN } else { f32::from(held) };
         tracked.take(t, self.held.values().iter().map(value));
+        if self.first_quiet.is_none() && tracked.quiet().is_some() {
+            self.first_quiet = Some(tracked.begins().to_vec());
+        }
         let mut changed = false;
         for (taxel, rest) in tracked.rests().enumerate() {
             // The rest follows values of 16 bits.
@@ -429,6 +450,16 @@ impl ArrayState {
         }
     }
 
+    /// By how much each taxel rested lower later than in the first quiet stretch, ticks; not a number where it had no rest
+    /// then. Empty without such a stretch.
+    #[must_use]
+    pub(crate) fn rests_less(&self) -> Vec<f64> {
+        let first = self.first_quiet.as_deref().unwrap_or_default();
+        let lowest = self.tracked.as_ref().map_or(&[][..], |tracked| tracked.begins());
+        let less = |(first, lowest): (&f64, &f64)| if first.is_finite() { first - lowest } else { f64::NAN };
+        first.iter().zip(lowest).map(less).collect()
+    }
+
     /// Copies rest and noise floor from another state of the same source, where they differ.
     pub fn copy_rest(&mut self, other: &Self) {
         if self.floor != other.floor || self.rest != other.rest {
@@ -488,16 +519,26 @@ impl ArrayState {
         }
     }
 
-    /// Writes the current curve, and the values of channels, into a column.
+    /// Writes the current curve, and the values that have a curve each, into a column.
     fn store_curve(&mut self, column: i64) {
         let missing = self.pictures.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN);
         let curve = if missing { MISSING } else { self.curve() };
         self.time_columns.set_curve(column, curve);
-        let count = self.time_columns.channel_count();
-        if count > 0 {
-            let values: Vec<u16> = (0..count).map(|channel| self.above(channel)).collect();
-            self.time_columns.set_channels(column, &values);
+        if self.time_columns.value_count() > 0 {
+            let channels = (0..self.time_columns.channel_count()).map(|channel| self.above(channel).into());
+            let sums = self.sums.iter().enumerate().map(|(source, &(sum, weighted))| match self.knows(source) {
+                true => self.weights.sum(sum, weighted),
+                false => MISSING_SUM,
+            });
+            let values: Vec<u32> = channels.chain(sums).collect();
+            self.time_columns.set_values(column, &values);
         }
+    }
+
+    /// Whether any taxel of a source has a value.
+    fn knows(&self, source: usize) -> bool {
+        let mut held = self.places.iter().zip(self.held.values());
+        held.any(|(&(x, _), &held)| held != UNKNOWN && self.source_of[usize::from(x)] == source)
     }
 
     /// Raster and curves; the current column is as of the last [`ArrayState::update_curve`].

@@ -119,6 +119,7 @@ impl Indexed {
                     "registers": header.registers,
                     "frame_us": header.registers.map(|registers| registers.frame_us()),
                     "pace": index.pace,
+                    "on": index.on,
                     "pictures": null,
                 });
                 (&index.remarks, more)
@@ -138,6 +139,7 @@ impl Indexed {
                     "registers": null,
                     "frame_us": null,
                     "pace": null,
+                    "on": "",
                     "pictures": {
                         "count": index.pictures, "unit": file.unit, "step": index.step, "zero": index.zero, "floor": index.floor,
                         "newtons": index.newtons, "picture_us": file.picture_us, "sources": places.collect::<Vec<_>>(),

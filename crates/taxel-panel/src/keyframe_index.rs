@@ -58,6 +58,9 @@ pub trait Pictures: Send + Sync {
     /// How much each taxel counts in the sum.
     fn weights(&self) -> &Weights;
 
+    /// Number of the source of each column of the array; empty where there is one, or more than have a curve each.
+    fn source_of(&self) -> Arc<[usize]>;
+
     /// The sensor of each source.
     fn sensors(&self) -> Vec<Array>;
 

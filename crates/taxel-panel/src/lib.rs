@@ -17,6 +17,7 @@ mod hub;
 mod indexed;
 mod keyframe_index;
 mod labels;
+mod lain;
 mod limits;
 mod live_source;
 mod messages;

@@ -8,14 +8,14 @@ use super::array_state::{ArrayState, RestSource};
 use super::encoded_spikes::EncodedSpikes;
 use super::player::Player;
 use super::taxel_history::TaxelHistory;
-use super::time_columns::{COLUMN_US, Curve, MISSING, NOTHING, SPAN, TimeColumns, column_of};
+use super::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, SPAN, TimeColumns, column_of};
 
 /// Bytes of the header.
-const HEADER: usize = 128;
+const HEADER: usize = 136;
 
 /// Where the table of sections begins, and how many there are.
 const SECTIONS: usize = 64;
-const SECTION_COUNT: usize = 8;
+const SECTION_COUNT: usize = 9;
 
 /// The flags of the header.
 pub(super) const LIVE: u16 = 1;
@@ -50,6 +50,8 @@ struct ShownColumns<'a> {
     last: i64,
     /// Stored columns in one shown column.
     factor: i64,
+    /// The most that noise adds up to.
+    noise: u32,
 }
 
 impl<'a> ShownColumns<'a> {
@@ -59,12 +61,13 @@ impl<'a> ShownColumns<'a> {
         whole: Option<&'a TimeColumns>,
         latest: Option<i64>,
         column_us: i64,
+        noise: u32,
     ) -> Self {
         let stored_us = column_us.min(COLUMN_US);
         let last = latest.map_or(i64::MIN, |t| column_of(t, stored_us));
         // A view that has played for long has dropped the beginning of its own columns.
         let first_own = first_own.max(own.reach().map_or(i64::MAX, |(first, _)| first));
-        Self { own, first_own, whole, latest, last, factor: column_us / stored_us }
+        Self { own, first_own, whole, latest, last, factor: column_us / stored_us, noise }
     }
 
     /// The first known column.
@@ -93,15 +96,22 @@ impl<'a> ShownColumns<'a> {
         let parts = self.parts(column).into_iter().filter(|(_, columns)| !columns.is_empty());
         let greatest =
             |most: Curve, one: Curve| if one.sum > most.sum || most.area == MISSING.area { one } else { most };
-        parts.map(|(store, columns)| store.greatest(columns)).reduce(greatest).unwrap_or(NOTHING)
+        let curve = parts.map(|(store, columns)| store.greatest(columns)).reduce(greatest).unwrap_or(NOTHING);
+        if curve.sum > self.noise { curve } else { Curve { x: f32::NAN, y: f32::NAN, ..curve } }
     }
 
-    fn channels(&self, column: i64, out: &mut Vec<u8>) {
-        let begin = out.len();
-        out.resize(begin + 2 * self.own.channel_count(), 0);
-        for (store, columns) in self.parts(column) {
-            store.raise_channels(columns, &mut out[begin..]);
+    /// The values that have a curve each, column after column.
+    fn values(&self, columns: Range<i64>) -> Vec<u32> {
+        let mut all = vec![];
+        for column in columns {
+            let begin = all.len();
+            all.resize(begin + self.own.channel_count(), 0);
+            all.resize(begin + self.own.value_count(), MISSING_SUM);
+            for (store, columns) in self.parts(column) {
+                store.raise_values(columns, &mut all[begin..]);
+            }
         }
+        all
     }
 }
 
@@ -126,7 +136,7 @@ pub(super) fn of_state(
         None if about.column_us < COLUMN_US => (state.time_columns(), i64::MAX),
         None => (state.time_columns(), i64::MIN),
     };
-    let shown = ShownColumns::new(own, first_own, None, state.latest(), about.column_us);
+    let shown = ShownColumns::new(own, first_own, None, state.latest(), about.column_us, 0);
     write(state, columns, &shown, history, spikes, about)
 }
 
@@ -143,7 +153,8 @@ pub(super) fn of_player(player: &mut Player, window: Option<&mut Player>, about:
         None => player,
     };
     let (own, first_own, whole) = beside.time_columns();
-    let shown = ShownColumns::new(own, first_own, whole, beside.state().latest(), about.column_us);
+    let noise = player.index().time_columns().map_or(0, TimeColumns::noise);
+    let shown = ShownColumns::new(own, first_own, whole, beside.state().latest(), about.column_us, noise);
     write(player.state(), player.index().array().columns, &shown, beside.history(), beside.spikes(), about)
 }
 
@@ -192,7 +203,16 @@ fn write(
     if let Some(spikes) = spikes {
         section(&mut out, 6, &|out| spikes.write(range.clone(), out));
     }
-    section(&mut out, 7, &|out| range.clone().for_each(|column| shown.channels(column, out)));
+    let (own, of_all) = (shown.own, shown.values(range.clone()));
+    let each = || of_all.chunks_exact(own.value_count().max(1)).map(|all| all.split_at(own.channel_count()));
+    section(&mut out, 7, &|out| {
+        // Values above rest have 16 bits.
+        #[allow(clippy::cast_possible_truncation)]
+        each().for_each(|(channels, _)| channels.iter().for_each(|&v| out.extend((v as u16).to_le_bytes())));
+    });
+    section(&mut out, 8, &|out| {
+        each().for_each(|(_, sums)| sums.iter().for_each(|sum| out.extend(sum.to_le_bytes())));
+    });
     let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
     put(0, b"TXP1");
     // The protocol's fields are as wide as the largest array and section need.

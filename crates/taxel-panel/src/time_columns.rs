@@ -58,33 +58,39 @@ pub fn is_column(us: i64) -> bool {
 struct Block {
     raster: Vec<u8>,
     curves: Vec<Curve>,
-    channels: Vec<u16>,
+    values: Vec<u32>,
 }
 
-/// What a column of time holds of each row, and of each channel.
+/// What a column of time holds of each row, of each channel, and of each of several sources.
 #[derive(Debug, Clone, Copy)]
 struct Shape {
     rows: usize,
     channels: usize,
+    sources: usize,
 }
 
 impl Shape {
     fn of(array: &Array) -> Self {
         let channels = if array.is_channels() && array.len() <= MOST_CHANNELS { array.len() } else { 0 };
-        Self { rows: array.rows.into(), channels }
+        Self { rows: array.rows.into(), channels, sources: 0 }
+    }
+
+    /// Number of values that have a curve of their own.
+    fn values(self) -> usize {
+        self.channels + self.sources
     }
 
     fn block_bytes(self) -> usize {
-        let curves = std::mem::size_of::<Curve>() + self.channels * std::mem::size_of::<u16>();
+        let curves = std::mem::size_of::<Curve>() + self.values() * std::mem::size_of::<u32>();
         BLOCK.unsigned_abs() as usize * (self.rows + curves)
     }
 }
 
 impl Block {
-    /// Repeats the channels of its column `k` up to its end.
-    fn repeat_channels(&mut self, k: usize, channels: usize) {
+    /// Repeats the values of its column `k`, so many, up to its end.
+    fn repeat_values(&mut self, k: usize, count: usize) {
         for later in k + 1..BLOCK.unsigned_abs() as usize {
-            self.channels.copy_within(k * channels..(k + 1) * channels, later * channels);
+            self.values.copy_within(k * count..(k + 1) * count, later * count);
         }
     }
 }
@@ -99,6 +105,8 @@ pub struct TimeColumns {
     reach: Option<(i64, i64)>,
     /// Maximum number of blocks.
     max_blocks: usize,
+    /// Up to this sum of ticks above rest there is noise alone, and no centre.
+    noise: u32,
 }
 
 impl TimeColumns {
@@ -112,7 +120,29 @@ impl TimeColumns {
             blocks: VecDeque::new(),
             reach: None,
             max_blocks: (bytes / block).max(SPAN.unsigned_abs() as usize / BLOCK.unsigned_abs() as usize + 2),
+            noise: 0,
         }
+    }
+
+    /// The same with a curve for each of so many sources; nothing may be stored yet.
+    #[must_use]
+    pub(super) fn with_sources(mut self, sources: usize) -> Self {
+        debug_assert!(self.blocks.is_empty());
+        self.shape.sources = sources;
+        self
+    }
+
+    /// The same with this sum as the most that noise adds up to.
+    #[must_use]
+    pub(super) fn with_noise(mut self, noise: u32) -> Self {
+        self.noise = noise;
+        self
+    }
+
+    /// The most that noise adds up to, ticks above rest.
+    #[must_use]
+    pub fn noise(&self) -> u32 {
+        self.noise
     }
 
     /// Bytes that `columns` columns of an array take.
@@ -133,6 +163,12 @@ impl TimeColumns {
         self.shape.channels
     }
 
+    /// Number of values that have a curve each: of channels, and then of sources if there are several.
+    #[must_use]
+    pub fn value_count(&self) -> usize {
+        self.shape.values()
+    }
+
     /// First and last known column.
     #[must_use]
     pub fn reach(&self) -> Option<(i64, i64)> {
@@ -148,7 +184,7 @@ impl TimeColumns {
     }
 
     fn block(&mut self, column: i64) -> (&mut Block, usize) {
-        let (key, Shape { rows, channels }) = (column.div_euclid(BLOCK), self.shape);
+        let (key, rows, count) = (column.div_euclid(BLOCK), self.shape.rows, self.shape.values());
         let place = match self.place(key) {
             Ok(place) => place,
             Err(mut place) => {
@@ -163,8 +199,8 @@ impl TimeColumns {
                 let n = BLOCK.unsigned_abs() as usize;
                 let before = place.checked_sub(1).map(|before| &self.blocks[before].1);
                 let curve = before.map_or(NOTHING, |before| before.curves[n - 1]);
-                let values = before.map_or_else(|| vec![0; channels], |b| b.channels[(n - 1) * channels..].to_vec());
-                let block = Block { raster: vec![0; n * rows], curves: vec![curve; n], channels: values.repeat(n) };
+                let values = before.map_or_else(|| vec![0; count], |b| b.values[(n - 1) * count..].to_vec());
+                let block = Block { raster: vec![0; n * rows], curves: vec![curve; n], values: values.repeat(n) };
                 self.blocks.insert(place, (key, block));
                 place
             }
@@ -192,7 +228,7 @@ impl TimeColumns {
             block.raster[(k + 1) * self.shape.rows..].fill(0);
             let curve = block.curves[k];
             block.curves[k + 1..].fill(curve);
-            block.repeat_channels(k, self.shape.channels);
+            block.repeat_values(k, self.shape.values());
         }
     }
 
@@ -225,31 +261,33 @@ impl TimeColumns {
         }
     }
 
-    /// Sets the values of all channels, ticks above rest, from this column to the end of its block.
-    pub(super) fn set_channels(&mut self, column: i64, values: &[u16]) {
-        let channels = self.shape.channels;
-        if values.len() == channels && self.channels_at(column).is_none_or(|before| before != values) {
+    /// Sets the values that have a curve each, from this column to the end of its block: ticks above rest of the channels,
+    /// and sums of the sources.
+    pub(super) fn set_values(&mut self, column: i64, values: &[u32]) {
+        let count = self.shape.values();
+        if values.len() == count && self.values_at(column).is_none_or(|before| before != values) {
             let (block, k) = self.block(column);
-            block.channels[k * channels..(k + 1) * channels].copy_from_slice(values);
-            block.repeat_channels(k, channels);
+            block.values[k * count..(k + 1) * count].copy_from_slice(values);
+            block.repeat_values(k, count);
         }
     }
 
-    /// The values of all channels at the end of a column; `None` before the first block.
-    fn channels_at(&self, column: i64) -> Option<&[u16]> {
-        let (key, n, channels) = (column.div_euclid(BLOCK), BLOCK.unsigned_abs() as usize, self.shape.channels);
+    /// The values at the end of a column; `None` before the first block.
+    fn values_at(&self, column: i64) -> Option<&[u32]> {
+        let (key, n, count) = (column.div_euclid(BLOCK), BLOCK.unsigned_abs() as usize, self.shape.values());
         let (place, k) = match self.place(key) {
             Ok(place) => (place, column.rem_euclid(BLOCK).unsigned_abs() as usize),
             Err(place) => (place.checked_sub(1)?, n - 1),
         };
-        Some(&self.blocks[place].1.channels[k * channels..(k + 1) * channels])
+        Some(&self.blocks[place].1.values[k * count..(k + 1) * count])
     }
 
-    /// Raises channels in `out`, 16 bits each, little-endian, to the greatest value of each in columns.
-    pub fn raise_channels(&self, columns: Range<i64>, out: &mut [u8]) {
-        for values in self.differing(columns).filter_map(|column| self.channels_at(column)) {
-            for (cell, &value) in out.as_chunks_mut().0.iter_mut().zip(values) {
-                *cell = value.max(u16::from_le_bytes(*cell)).to_le_bytes();
+    /// Raises the values in `out` to the greatest of each in columns; any is greater than [`MISSING_SUM`].
+    pub fn raise_values(&self, columns: Range<i64>, out: &mut [u32]) {
+        for values in self.differing(columns).filter_map(|column| self.values_at(column)) {
+            for (most, &value) in out.iter_mut().zip(values) {
+                // What is missing wraps to 0.
+                *most = most.wrapping_add(1).max(value.wrapping_add(1)).wrapping_sub(1);
             }
         }
     }
@@ -342,6 +380,9 @@ impl TimeColumns {
 
 /// The curve while nothing is pressed.
 pub const NOTHING: Curve = Curve { sum: 0, area: 0, x: f32::NAN, y: f32::NAN };
+
+/// The sum of a source of which no taxel has a value.
+pub const MISSING_SUM: u32 = u32::MAX;
 
 /// The curve of a picture in which no taxel has a value.
 pub const MISSING: Curve = Curve { area: u32::MAX, ..NOTHING };

@@ -120,10 +120,11 @@ export class Cursor {
   write() {
     const timeline = this.timeline();
     const place = timeline?.pointed ?? -1;
+    const outputs = [...part("force-sums", HTMLElement).querySelectorAll("output")];
     const cursor = timeline?.cursor_us ?? null;
     write(part("cursor-time", HTMLElement), cursor === null ? "" : seconds(cursor));
     if (!timeline || place < 0) {
-      for (const id of ["taxel-now", "force-sum", "force-area", "centre-now"]) write(part(id, HTMLElement), "");
+      for (const output of [...outputs, ...["taxel-now", "force-area", "centre-now"].map((id) => part(id, HTMLElement))]) write(output, "");
       return;
     }
     const [least, greatest, last] = timeline.history.subarray(3 * place, 3 * place + 3);
@@ -132,19 +133,20 @@ export class Cursor {
     const now = `${value(last)} ${unit}`;
     write(part("taxel-now", HTMLElement), last === UNKNOWN_VALUE ? "" : least === greatest ? now : `${now} (${value(least)} to ${value(greatest)})`);
     const { sums } = this;
+    const written = timeline.sums(place).map((sum) => (Number.isNaN(sum) ? "missing" : `${sums.step === 1 ? whole(sum) : rounded(sum * sums.step)} ${sums.unit}`));
+    outputs.forEach((output, k) => write(output, written[k] ?? ""));
     if (Number.isNaN(timeline.sum[place])) {
-      for (const id of ["force-sum", "picture-info"]) write(part(id, HTMLElement), "missing");
+      write(part("picture-info", HTMLElement), "missing");
       for (const id of ["force-area", "centre-now"]) write(part(id, HTMLElement), "");
       return;
     }
-    const sum = `${sums.step === 1 ? whole(timeline.sum[place]) : rounded(timeline.sum[place] * sums.step)} ${sums.unit}`;
-    write(part("force-sum", HTMLElement), sum);
     const area = this.sensor?.area(timeline.area[place]) ?? "";
     write(part("force-area", HTMLElement), area);
     const [x, y] = [timeline.x[place], timeline.y[place]];
     const centre = Number.isNaN(x) ? "nothing pressed" : (this.sensor?.centre(x, y) ?? "");
     write(part("centre-now", HTMLElement), centre);
     const channels = this.sensor?.kind === "channels";
+    const sum = written.length > 1 ? written.map((one, k) => `${this.sensor?.sources[k].name ?? ""} ${one}`).join(", ") : written[0];
     write(part("picture-info", HTMLElement), `${sum}${channels ? "" : ` over ${area}, centre (${this.sensor?.axes.join(", ") ?? ""}): ${centre}`}`);
   }
 }

@@ -6,8 +6,8 @@ import { seconds, short, whole } from "./words.js";
 /** @typedef {{ label: string, t_us: number, latency_us: number | null }} Detection */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
-/** Detections of a recording, newest first. @param {{ label: string, t_us: number }[]} found @returns {Detection[]} */
-export const recorded = (found) => found.map(({ label, t_us }) => ({ label, t_us, latency_us: null })).reverse();
+/** Detections of a recording, in their order. @param {{ label: string, t_us: number }[]} found @returns {Detection[]} */
+export const recorded = (found) => found.map(({ label, t_us }) => ({ label, t_us, latency_us: null }));
 
 /** Detections of the live source that are stored, and the number of those that are listed and marked. */
 const MOST_STORED = 300;
@@ -21,7 +21,7 @@ export class Detections {
   /** @param {(t_us: number) => void} seek */
   constructor(seek) {
     this.seek = seek;
-    /** Those that are shown, newest first. @type {Detection[]} */
+    /** Those that are shown: of the live source newest first. @type {Detection[]} */
     this.shown = [];
     /** Those of the live source, newest first. @type {Detection[]} */
     this.live = [];
@@ -36,11 +36,11 @@ export class Detections {
     this.live.length = Math.min(this.live.length, MOST_STORED);
   }
 
-  /** @param {Detection[]} detections newest first @param {string} none the text where there are none @param {string[]} labels in the order of their readout */
+  /** @param {Detection[]} detections of the live source newest first @param {string} none the text where there are none @param {string[]} labels in the order of their readout */
   show(detections, none, labels) {
     this.shown = detections;
     this.labels = labels;
-    write(part("detection-count", HTMLElement), detections.length ? whole(detections.length) : "");
+    write(part("detection-count", HTMLElement), detections.length ? `${whole(detections.length)}${detections.length > LISTED ? `, ${LISTED} listed` : ""}` : "");
     const empty = part("detections-none", HTMLElement);
     empty.hidden = detections.length > 0;
     write(empty, none);

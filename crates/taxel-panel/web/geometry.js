@@ -59,6 +59,11 @@ class Sensor {
     return [x, y];
   }
 
+  /** @returns {Taxel | null} the taxel that is watched until a person chooses one */
+  get first() {
+    return null;
+  }
+
   /** @returns {Taxel} where a crosshair begins */
   get middle() {
     const middle = /** @type {Taxel} */ ([this.columns >> 1, this.rows >> 1]);
@@ -191,7 +196,9 @@ class Placed extends Sensor {
 
   /** @param {number} x @param {number} y @returns {string} a centre, in the unit of the places */
   centre(x, y) {
-    return `${rounded(x)}, ${rounded(y)} ${this.places.unit ?? "in the places' own unit"}`;
+    // Coordinates are in steps of the extent.
+    const [across, down] = [x, y].map((at) => rounded(Math.abs(at) < this.near / 100 ? 0 : at));
+    return `${across}, ${down} ${this.places.unit ?? "in the places' own unit"}`;
   }
 
   /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
@@ -243,8 +250,8 @@ class Channels extends Sensor {
     return `${source ? `${source.name}, ` : ""}channel ${Math.max(x - (source?.left ?? 0), y)}`;
   }
 
-  /** @returns {Taxel} */
-  get middle() {
+  /** Channels have no map in which one could be chosen by its place. @returns {Taxel} */
+  get first() {
     return [0, 0];
   }
 

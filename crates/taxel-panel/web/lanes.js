@@ -1,7 +1,7 @@
 // Curves under the raster: the watched taxel, force and area, the centre. All share one time.
 
 import uPlot from "./vendor/uPlot.js";
-import { part, themed, write } from "./dom.js";
+import { make, part, themed, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { rounded } from "./words.js";
 
@@ -15,6 +15,8 @@ const SIDE = 44;
 const GRID_PX = 96;
 /** @type {readonly Name[]} */
 const NAMES = ["taxel", "force", "centre"];
+/** Colours of the sums of several sources, by their names in style.css. */
+const COLOURS = ["more", "less", "label", "good"];
 
 /** Curves of the window, drawn by uPlot. */
 export class Lanes {
@@ -23,6 +25,8 @@ export class Lanes {
     this.plots = new Map();
     /** Least and greatest coordinate of a centre; null of channels, which have neither centre nor area. @type {[number, number] | null} */
     this.limits = [0, 64];
+    /** Names of the sources that have a curve each; empty: one curve for all. @type {string[]} */
+    this.sources = [];
     /** Size of a tick in the unit of the values, and ticks of the value 0. */
     this.values = { step: 1, zero: 0 };
     /** Size of a tick in the unit of the sum of the values. */
@@ -69,6 +73,9 @@ export class Lanes {
     const fromZero = (least) => (_, __, most) => [0, Math.max(least(), (most ?? 0) * 1.1)];
     const [low, high] = this.limits ?? [0, 1];
     const areas = this.limits !== null;
+    const colours = this.sources.length ? COLOURS.slice(0, this.sources.length).map(themed) : [one];
+    // Beside the colours of several sources the area has none.
+    const area = this.sources.length ? text : two;
     /** @type {Record<Name, { scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }>} */
     const plans = {
       taxel: {
@@ -79,8 +86,8 @@ export class Lanes {
       },
       force: {
         scales: { force: { range: fromZero(() => 8 * this.sum_step) }, area: { range: fromZero(() => 8) } },
-        series: [{}, line(one, "force"), { ...line(two, "area", [5, 3]), show: areas }],
-        axes: [time, axis("force", 3, one), { ...axis("area", 1, two), ...(areas ? {} : { values: () => [] }) }],
+        series: [{}, ...colours.map((colour) => line(colour, "force")), { ...line(area, "area", [5, 3]), show: areas }],
+        axes: [time, axis("force", 3, this.sources.length ? text : one), { ...axis("area", 1, area), ...(areas ? {} : { values: () => [] }) }],
       },
       centre: {
         scales: { place: { range: [low, high] } },
@@ -123,6 +130,20 @@ export class Lanes {
     this.make();
   }
 
+  /** Names the curves of the sums, by their colours. @param {string[]} sources that have a curve each; none: one curve for all */
+  name(sources) {
+    if (String(this.sources) === String(sources)) return;
+    this.sources = sources;
+    /** @type {Curve[]} */
+    const curves = [[], ...(sources.length ? sources.map(() => []) : [[]])];
+    this.data.force = [this.data.taxel[0], ...curves];
+    const one = () => make("output", { id: "force-sum", "aria-live": "off" });
+    const names = sources.flatMap((source, k) => [make("span", { class: `swatch ${COLOURS[k]}` }), ` ${source} `, make("output", { "aria-live": "off" }), " "]);
+    part("force-sums", HTMLElement).replaceChildren(...(names.length ? names : [make("span", { class: "swatch more" }), " ", one()]));
+    part("area-legend", HTMLElement).classList.toggle("apart", sources.length > 0);
+    this.make();
+  }
+
   /** Fits the plots to their places. */
   fit() {
     for (const [name, plot] of this.plots) {
@@ -133,7 +154,7 @@ export class Lanes {
 
   /** @param {Timeline} timeline */
   draw(timeline) {
-    const { columns, window, column_us, history, sum, area, x, y } = timeline;
+    const { columns, window, column_us, history, area, x, y } = timeline;
     const { step, zero } = this.values;
     if (!columns || !window) return;
     this.span_s = timeline.span_us / 1e6;
@@ -142,10 +163,11 @@ export class Lanes {
     // A column more on the left, so that curves begin at the edge.
     const count = end - first + 2;
     const [times, least, greatest, last] = this.data.taxel;
-    const [, force, touched] = this.data.force;
+    const [, ...sums] = this.data.force;
+    const touched = sums.pop() ?? [];
     const [, column, row] = this.data.centre;
     this.data.force[0] = this.data.centre[0] = times;
-    for (const curve of [times, least, greatest, last, force, touched, column, row]) curve.length = count;
+    for (const curve of [times, least, greatest, last, ...sums, touched, column, row]) curve.length = count;
     for (let i = 0; i < count; i++) {
       const place = timeline.known(first - 1 + i);
       // A curve has the value at the end of its column.
@@ -154,9 +176,9 @@ export class Lanes {
       least[i] = known ? (history[3 * place] - zero) * step : null;
       greatest[i] = known ? (history[3 * place + 1] - zero) * step : null;
       last[i] = known ? (history[3 * place + 2] - zero) * step : null;
-      const there = place >= 0 && !Number.isNaN(sum[place]);
-      force[i] = there ? sum[place] * this.sum_step : null;
-      touched[i] = there ? area[place] : null;
+      const each = place >= 0 ? timeline.sums(place) : [];
+      sums.forEach((curve, k) => (curve[i] = each[k] >= 0 ? each[k] * this.sum_step : null));
+      touched[i] = place >= 0 && area[place] >= 0 ? area[place] : null;
       const pressed = place >= 0 && !Number.isNaN(x[place]);
       column[i] = pressed ? x[place] : null;
       row[i] = pressed ? y[place] : null;

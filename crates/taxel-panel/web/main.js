@@ -13,7 +13,7 @@ import { Lanes } from "./lanes.js";
 import { Layout } from "./layout.js";
 import { Maps } from "./maps.js";
 import { Notes } from "./notes.js";
-import { failed, notify } from "./notice.js";
+import { failed, notify, silence } from "./notice.js";
 import { Player } from "./player.js";
 import { readPicture } from "./protocol.js";
 import { Raster } from "./raster.js";
@@ -61,7 +61,7 @@ const channels = new Channels(part("channels", HTMLCanvasElement));
 const lanes = new Lanes();
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
 const notes = new Notes(server, player, labels);
-const training = new Training(server);
+const training = new Training(server, player);
 const layout = new Layout(arrangement, () => {
   lanes.fit();
   lanesDue = true;
@@ -120,10 +120,11 @@ function writeState() {
   writePace(opened ? opened.pace : (counters?.pace ?? null));
 }
 
-/** The maps that are shown: of pictures there are no events, and of channels no map, so that only their values are. */
-function mapsShown() {
-  return opened?.pictures || maps.geometry.kind === "channels" ? "pressure" : settings.values.maps;
-}
+/** Whether there are two maps to choose from: of pictures there are no events, and of channels no map, only their values. */
+const hasMaps = () => !opened?.pictures && maps.geometry.kind !== "channels";
+
+/** The maps that are shown. */
+const mapsShown = () => (hasMaps() ? settings.values.maps : "pressure");
 
 /** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of pictures. */
 function showUnits() {
@@ -139,7 +140,6 @@ function showUnits() {
   trials.hidden = !pictures?.trials.length;
   trials.replaceChildren(...(pictures?.trials ?? []).map((name) => make("option", { value: name }, name)));
   trials.value = pictures?.trial ?? "";
-  part("pressure-alone", HTMLButtonElement).hidden = maps.values.pictures;
   showSums();
   showLanes();
 }
@@ -329,7 +329,7 @@ function greet(message) {
   recorder.write();
   part("record", HTMLButtonElement).hidden = !message.live;
   part("record-start", HTMLButtonElement).disabled = !message.live;
-  part("live-counters", HTMLElement).hidden = !message.live;
+  part("counters", HTMLElement).hidden = !message.live;
   if (first && !message.live) showTab("labels");
   showDetections(detections.shown, opened ? detections.labels : (message.readout ?? []));
   document.title = message.live ? "taxel · live" : "taxel · view";
@@ -337,9 +337,24 @@ function greet(message) {
   server.send({ type: "recordings" });
   if (message.live) server.send({ type: "overview" });
   const asked = fragment.get("open") ?? message.open;
-  if (asked && (first || !message.live)) ask(asked);
+  if (asked && (first || !message.live)) ask(asked, fragment.get("trial") ?? undefined);
   player.show();
   writeState();
+}
+
+/**
+ * Another recording is shown, or the live source: a reload of the page shows it again, and what was said of the last one goes.
+ * @param {Opened | null} shown
+ */
+function turnTo(shown) {
+  const kept = { open: shown?.name, trial: shown?.pictures?.trial };
+  for (const [key, value] of Object.entries(kept)) {
+    if (value) fragment.set(key, value);
+    else fragment.delete(key);
+  }
+  history.replaceState(null, "", `#${fragment}`);
+  silence();
+  maps.forget();
 }
 
 /** Asks for a recording, or for a trial of it; says so while it is read. @param {string} name @param {string} [trial] */
@@ -387,7 +402,7 @@ function open(message) {
   showUnits();
   resize(message.array);
   timeWindow.forget();
-  if (!again) maps.forget();
+  if (!again) turnTo(message);
   if (timeline && !again) {
     timeline.following = false;
     timeWindow.showAll();
@@ -418,11 +433,11 @@ function move(transport) {
   if (transport.source === null && (opened || changed)) {
     opened = null;
     showUnits();
-    maps.forget();
     strip.overview = null;
     timeline = null;
     training.choose(null);
     if (hello?.array) resize(hello.array);
+    turnTo(null);
     maps.health = null;
     showZeroed();
     part("files", HTMLSelectElement).value = "";
@@ -437,7 +452,7 @@ function move(transport) {
   writeState();
 }
 
-/** @param {import("./detections.js").Detection[]} shown newest first @param {string[]} labels in the order of their readout */
+/** @param {import("./detections.js").Detection[]} shown of the live source newest first @param {string[]} labels in the order of their readout */
 function showDetections(shown, labels) {
   const none = opened ? "None in this recording: train on labels, or choose a readout." : hello?.readout ? "None yet." : "No readout runs: start taxel live with one, or choose one here.";
   detections.show(shown, none, labels);
@@ -496,6 +511,7 @@ function drawLanes(shown) {
     const most = channels.draw(shown, geometry.there, maps.taxel && Math.max(...maps.taxel));
     write(part("channels-scale", HTMLElement), `each up to ${rounded(most * maps.values.step)} ${maps.values.unit}`);
   }
+  lanes.name(geometry.sources.slice(0, shown.source_count).map(({ name }) => name));
   if (arrangement().lanes.includes("raster")) raster.draw(shown, values.raster === "spikes" ? "spikes" : "changes");
   lanes.draw(shown);
   labels.place();
@@ -535,6 +551,7 @@ function showLanes() {
     part(`${name}-figure`, HTMLElement).hidden = mapsShown() !== "both" && mapsShown() !== name;
     part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
   }
+  part("pressure-alone", HTMLButtonElement).hidden = part("maps-field", HTMLElement).hidden = !hasMaps();
   part("raster-changes", HTMLElement).hidden = values.raster === "spikes";
   part("raster-spikes", HTMLElement).hidden = values.raster !== "spikes";
   layout.arrange();

@@ -136,10 +136,11 @@ export class Maps {
     }
   }
 
-  /** Begins the scales of colours anew, for another recording. */
+  /** Another recording is shown: scales of colours and crosshair are as when the page is opened. */
   forget() {
     this.pressureScale.forget();
     this.changeScale.forget();
+    this.point(this.geometry.first);
   }
 
   /** @param {import("./protocol.js").ArrayInfo} array @param {PictureSource[]} sources that stand side by side in it */
@@ -159,9 +160,7 @@ export class Maps {
       this.picture = null;
     }
     this.health = null;
-    if (this.taxel && !this.geometry.has(...this.taxel)) this.point(null);
-    // Channels have no map in which one could be chosen by its place.
-    if (channels && !this.taxel) this.point(this.geometry.middle);
+    if (!this.taxel || !this.geometry.has(...this.taxel)) this.point(this.geometry.first);
     this.mark();
   }
 

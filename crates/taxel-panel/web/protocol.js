@@ -4,8 +4,8 @@ export const VERSION = 1;
 
 /** The value of a taxel without any event so far. */
 export const UNKNOWN_VALUE = 65535;
-/** The area of a picture in which no taxel has a value. */
-export const MISSING_AREA = 0xffffffff;
+/** The area of a picture in which no taxel has a value, and the sum of a source of which none has one. */
+export const MISSING = 0xffffffff;
 
 /**
  * @typedef {{ x: number[], y: number[], area?: number[], unit: "mm" | null }} TaxelPlaces
@@ -37,7 +37,7 @@ export const MISSING_AREA = 0xffffffff;
  * @typedef {{ type: "loading", name: string, share: number }} Loading
  * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null,
  *   touch_us: number | null, events: number, bytes: number, train: string, pictures: Pictures | null,
- *   verdict: string, unfinished: boolean, pace: Pace | null, registers: Record<string, number | boolean> | null,
+ *   verdict: string, unfinished: boolean, on: string, pace: Pace | null, registers: Record<string, number | boolean> | null,
  *   frame_us: number | null, markers: { t_us: number, start: boolean }[],
  *   notes: RecordedNote[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
  * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[],
@@ -89,6 +89,7 @@ export const MISSING_AREA = 0xffffffff;
  * @property {"given" | "quiet" | "none"} restFrom where the rest comes from
  * @property {Uint8Array | null} spikes of the encoder, as the raster
  * @property {Uint16Array | null} channels ticks above rest of each channel, column after column
+ * @property {Uint32Array | null} sources sum of each of several sources, column after column
  */
 
 /**
@@ -141,5 +142,6 @@ export function readPicture(buffer) {
     rest: words(5, Uint16Array),
     spikes: words(6, Uint8Array),
     channels: words(7, Uint16Array),
+    sources: words(8, Uint32Array),
   };
 }

@@ -41,7 +41,7 @@ function fall(opened) {
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
 function lain(opened) {
-  const sources = opened?.pictures?.sources ?? [];
+  const sources = opened?.pictures?.sources ?? [{ name: "", on: opened?.on ?? "" }];
   const lay = sources.filter(({ on }) => on).map(({ name, on }) => (sources.length > 1 ? `${name}, ${on}` : on));
   return lay.length ? `In the quiet stretch that the rest is taken from, something lay on ${lay.join("; ")}.` : "";
 }

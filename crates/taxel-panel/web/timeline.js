@@ -1,6 +1,6 @@
 // What the lanes show, by columns of time; the window of time that is shown, and the one time cursor that every view shares.
 
-import { MISSING_AREA, UNKNOWN_VALUE } from "./protocol.js";
+import { MISSING, UNKNOWN_VALUE } from "./protocol.js";
 import { numbering, seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
@@ -30,6 +30,9 @@ export class Timeline {
     /** How many channels have a curve each, and their ticks above rest, column after column. */
     this.channel_count = 0;
     this.channels = new Uint16Array(0);
+    /** How many of several sources have a curve each, and their sums. */
+    this.source_count = 0;
+    this.sources = new Uint32Array(0);
     this.number = new Float64Array(SPAN);
     /** The window, us from its left edge to its right one; null before the first picture. @type {[number, number] | null} */
     this.window = null;
@@ -75,9 +78,11 @@ export class Timeline {
       const end = (Math.floor(picture.t_us / this.column_us) + 1) * this.column_us;
       this.window = [end - this.span_us, end];
     }
-    const { first, count, raster, spikes, sums, centres, history, channels } = picture;
+    const { first, count, raster, spikes, sums, centres, history, channels, sources } = picture;
     const each = channels && count ? channels.length / count : this.channel_count;
     if (each !== this.channel_count) [this.channel_count, this.channels] = [each, new Uint16Array(SPAN * each)];
+    const several = count ? (sources?.length ?? 0) / count : this.source_count;
+    if (several !== this.source_count) [this.source_count, this.sources] = [several, new Uint32Array(SPAN * several)];
     for (let i = 0; i < count; i++) {
       const place = this.place(first + i);
       this.number[place] = first + i;
@@ -85,16 +90,24 @@ export class Timeline {
       if (spikes) this.spikes.set(spikes.subarray(i * this.rows, (i + 1) * this.rows), place * this.rows);
       else this.spikes.fill(0, place * this.rows, (place + 1) * this.rows);
       if (sums && centres) {
-        const missing = sums[4 * i + 1] === MISSING_AREA;
+        const missing = sums[4 * i + 1] === MISSING;
         this.sum[place] = missing ? NaN : sums[4 * i];
         this.area[place] = missing ? NaN : sums[4 * i + 1];
         this.x[place] = centres[4 * i + 2];
         this.y[place] = centres[4 * i + 3];
       }
+      if (sources) this.sources.set(sources.subarray(i * several, (i + 1) * several), place * several);
       if (channels) this.channels.set(channels.subarray(i * each, (i + 1) * each), place * each);
       if (history) this.history.set(history.subarray(3 * i, 3 * i + 3), 3 * place);
       else this.history.fill(UNKNOWN_VALUE, 3 * place, 3 * place + 3);
     }
+  }
+
+  /** @param {number} place @returns {number[]} the sum of each of several sources, or of all; not a number where no taxel has a value */
+  sums(place) {
+    const { source_count: count, sources } = this;
+    if (!count) return [this.sum[place]];
+    return Array.from(sources.subarray(place * count, (place + 1) * count), (sum) => (sum === MISSING ? NaN : sum));
   }
 
   /** Another taxel is watched: the values of the last one are discarded. */

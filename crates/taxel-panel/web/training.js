@@ -12,9 +12,10 @@ const ASKED_MS = 3000;
 
 /** The button that trains, what the training prints, and the choice of the readout. */
 export class Training {
-  /** @param {Server} server */
-  constructor(server) {
+  /** @param {Server} server @param {import("./player.js").Player} player */
+  constructor(server, player) {
     this.server = server;
+    this.player = player;
     /** When the training began, ms; null while none runs. @type {number | null} */
     this.since = null;
     /** The recording that is shown; null: the live source. @type {string | null} */
@@ -72,12 +73,16 @@ export class Training {
   /** Lets a readout read what is shown. @param {string} readout */
   async read(readout) {
     const { source } = this;
+    const { t_us } = this.player;
     this.readout.value = readout;
     if (readout) notify(`${readout} reads ${source ?? "the board: leave it at rest for the tare"}`);
     const without = source === null ? { type: "live" } : { type: "open", name: source };
     try {
       await this.server.request(readout ? { type: "read_out", readout } : without);
-      if (source === this.source) this.reads = readout;
+      if (source !== this.source) return;
+      this.reads = readout;
+      // What is opened again begins at its beginning.
+      if (!readout && source !== null && t_us !== null) this.player.seek(t_us);
     } catch (error) {
       if (source === this.source && this.readout.value === readout) this.readout.value = this.reads;
       failed(error);

@@ -17,7 +17,7 @@ use taxel_live::recording::Remarks;
 use super::{ChangeReader, KeyframeIndex, Pictures, Read};
 use crate::array_state::{Keyframe, RestSource};
 use crate::centre::Coordinates;
-use crate::time_columns::{COLUMN_US, Curve, MISSING, NOTHING, TimeColumns, column_of};
+use crate::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, TimeColumns, column_of};
 use crate::weights::Weights;
 
 /// Memory that the curves may take, bytes.
@@ -28,6 +28,9 @@ const MOST_STEPS: usize = 65_533;
 
 /// Bins of the overview.
 const BINS: i64 = 1000;
+
+/// Of so many sources at most each has a curve of its sum.
+const MOST_SOURCES: usize = 4;
 
 /// Number of changes that are read at once.
 const AT_ONCE: usize = 4096;
@@ -341,8 +344,11 @@ impl PictureIndex {
     /// Computes the curves of the whole recording.
     fn measure(&mut self) {
         let Some((first, _)) = self.range else { return };
-        let mut columns = TimeColumns::new(&self.array, TIME_COLUMN_BYTES);
-        let mut channels = vec![0; columns.channel_count()];
+        let mut columns = TimeColumns::new(&self.array, TIME_COLUMN_BYTES).with_sources(self.curves());
+        let mut values = vec![0; columns.value_count()];
+        let sums = columns.channel_count()..values.len();
+        values[sums.clone()].fill(MISSING_SUM);
+        let mut noise = vec![Noise::default(); self.sources.len()];
         let mut cursor = vec![0; self.sources.len()];
         let mut loads = vec![Load::default(); self.sources.len()];
         let at = Coordinates::new(&self.array);
@@ -353,13 +359,31 @@ impl PictureIndex {
             columns.extend_to(column);
             let load = loads.iter().fold(Load::default(), Load::plus);
             columns.set_curve(column, load.curve(&at, &self.weights));
-            if !channels.is_empty() {
-                self.above(&self.sources[source], k).for_each(|(taxel, above)| channels[taxel] = above);
-                columns.set_channels(column, &channels);
+            let sum = self.weights.sum(loads[source].sum, loads[source].weighted);
+            let known = loads[source].known;
+            if known {
+                noise[source].take(t - first, sum);
+            }
+            if !values.is_empty() {
+                if sums.start > 0 {
+                    self.above(&self.sources[source], k).for_each(|(taxel, above)| values[taxel] = above.into());
+                }
+                if let Some(of_source) = values[sums.clone()].get_mut(source) {
+                    *of_source = if known { sum } else { MISSING_SUM };
+                }
+                columns.set_values(column, &values);
             }
         }
         let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
-        self.time_columns = whole.then_some(columns);
+        // Noise is what is above a rest that was found: above a given one any value is load.
+        let found = self.sources.iter().zip(noise).filter(|(source, _)| source.rest_source == RestSource::Quiet);
+        let most = found.map(|(_, noise)| noise.most(self.floor)).fold(0, u32::saturating_add);
+        self.time_columns = whole.then(|| columns.with_noise(most));
+    }
+
+    /// The number of sources that have a curve each.
+    fn curves(&self) -> usize {
+        Some(self.sources.len()).filter(|count| (2..=MOST_SOURCES).contains(count)).unwrap_or(0)
     }
 
     /// The taxels of a source's picture, each with its steps above rest.
@@ -383,6 +407,37 @@ impl PictureIndex {
         }
         load.known = source.picture(k).iter().any(|&ticks| ticks != UNKNOWN);
         load
+    }
+}
+
+/// Stretches of this length are told apart, us: a quiet one holds one of them at least.
+const STRETCH_US: i64 = 250_000;
+/// Noise is never more than one and a half times that of the quietest stretch and so many taxels just above the floor.
+const NOISY_TAXELS: u32 = 4;
+
+/// What the noise of a source adds up to: the greatest sum of the stretch in which it is least.
+#[derive(Debug, Clone, Copy, Default)]
+struct Noise {
+    stretch: i64,
+    greatest: u32,
+    least: Option<u32>,
+}
+
+impl Noise {
+    /// Takes the sum of a picture, whose time counts from the first one.
+    fn take(&mut self, t: i64, sum: u32) {
+        let stretch = t / STRETCH_US;
+        if stretch != self.stretch {
+            self.least = Some(self.least.map_or(self.greatest, |least| least.min(self.greatest)));
+            (self.stretch, self.greatest) = (stretch, 0);
+        }
+        self.greatest = self.greatest.max(sum);
+    }
+
+    /// The most that it adds up to, of values that count from a floor on.
+    fn most(self, floor: u16) -> u32 {
+        let least = self.least.unwrap_or(self.greatest);
+        (least + least / 2).saturating_add(NOISY_TAXELS * u32::from(floor))
     }
 }
 
@@ -486,6 +541,15 @@ impl Pictures for PictureIndex {
 
     fn weights(&self) -> &Weights {
         &self.weights
+    }
+
+    fn source_of(&self) -> Arc<[usize]> {
+        if self.curves() == 0 {
+            return Arc::default();
+        }
+        // An empty column between two sources counts as of the one before.
+        let of = |x| self.sources.partition_point(|source| source.place.left <= x).saturating_sub(1);
+        (0..self.array.columns).map(of).collect()
     }
 
     fn sensors(&self) -> Vec<Array> {
@@ -642,12 +706,15 @@ mod tests {
                 if t >= player.t() {
                     player.advance(t).unwrap();
                 }
-                let (mut expected, mut sum) = (vec![f32::NAN; 14], 0.0);
-                for ((times, values), offset) in [(&left, 0), (&right, 4)] {
+                let (mut expected, mut sums) = (vec![f32::NAN; 14], [None; 2]);
+                for (of, ((times, values), offset)) in [(&left, 0), (&right, 4)].into_iter().enumerate() {
                     let Some(k) = times.partition_point(|&at| at <= t).checked_sub(1) else { continue };
                     for cell in 0..6 {
-                        expected[cell / 3 * 7 + offset + cell % 3] = values[6 * k + cell];
-                        sum += values[6 * k + cell].max(0.0);
+                        let value = values[6 * k + cell];
+                        expected[cell / 3 * 7 + offset + cell % 3] = value;
+                        if !value.is_nan() {
+                            *sums[of].get_or_insert(0.0) += value.max(0.0);
+                        }
                     }
                 }
                 let shown = |player: &Player| -> Vec<f64> {
@@ -663,12 +730,62 @@ mod tests {
                 }
                 sought.state_mut().update_curve();
                 let column = column_of(t, COLUMN_US);
-                let curve = sought.state().time_columns().curve(column);
+                let of_state = sought.state().time_columns();
+                let curve = of_state.curve(column);
                 let load = f64::from(curve.sum) * index.step;
+                let sum: f32 = sums.iter().flatten().sum();
                 assert!((load - f64::from(sum)).abs() < 12.0 * index.step, "{load} {sum}");
-                if sought.t() == last {
-                    assert_eq!(shared.time_columns().unwrap().curve(column).sum, curve.sum);
+                let each = |columns: &TimeColumns| {
+                    let mut each = [MISSING_SUM; 2];
+                    columns.raise_values(column..column + 1, &mut each);
+                    each
+                };
+                for (&ours, theirs) in each(of_state).iter().zip(sums) {
+                    assert_eq!(ours == MISSING_SUM, theirs.is_none());
+                    let near = |sum: f32| (f64::from(ours) * index.step - f64::from(sum)).abs() < 6.0 * index.step;
+                    assert!(theirs.is_none_or(near), "{ours} {theirs:?}");
                 }
+                if sought.t() == last {
+                    let whole = shared.time_columns().unwrap();
+                    assert_eq!((whole.curve(column).sum, each(whole)), (curve.sum, each(of_state)));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noise_has_no_centre_and_a_touch_has_one_also_where_one_foot_always_stands() {
+        let mut random = StdRng::seed_from_u64(5);
+        let stands = |foot: usize, k: usize| k >= 60 && (k / 40 + foot).is_multiple_of(2);
+        for spread in [0, 2, 4, 6] {
+            let values = [0, 1].map(|foot| {
+                let mut value = |k: usize| -> f32 {
+                    let noise: i16 = (0..4).map(|_| random.random_range(-spread..=spread)).sum();
+                    f32::from(200 + noise) + if stands(foot, k) { 60.0 } else { 0.0 }
+                };
+                (0..600).flat_map(|k| [k; 16]).map(&mut value).collect::<Vec<f32>>()
+            });
+            let rest = PictureRest {
+                source: RestSource::Quiet,
+                values: vec![200.0; 16],
+                ticks_by_unit: 0.5,
+                falls: false,
+                flickering: vec![],
+                on: String::new(),
+            };
+            let sources = values.iter().zip([("left", 0), ("right", 5)]).map(|(values, (name, left))| PictureSource {
+                place: PicturePlace { name: name.to_owned(), left, rows: 4, columns: 4 },
+                t: (0..600).map(|k| 10_000 * k).collect(),
+                values,
+                rest: rest.clone(),
+            });
+            let array = Array::new(4, 9, 1.0, "feet").unwrap();
+            let index = PictureIndex::new(array, PictureFile::default(), sources.collect());
+            let columns = index.time_columns.as_ref().unwrap();
+            for k in 0..600 {
+                let sum = columns.curve(column_of(10_000 * k as i64, COLUMN_US)).sum;
+                let (touches, noise) = (stands(0, k) || stands(1, k), columns.noise());
+                assert_eq!(sum > noise, touches, "spread {spread}, picture {k}: {sum} of {noise}");
             }
         }
     }

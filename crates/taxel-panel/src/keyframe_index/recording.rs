@@ -15,6 +15,7 @@ use taxel_core::{Array, Events, problem};
 use super::event_rate::EventRate;
 use super::{Activity, ChangeReader, KeyframeIndex, Read};
 use crate::array_state::{ArrayState, Keyframe};
+use crate::lain::lain;
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
 use taxel_live::clock::{BoardClock, Pace, leaves};
@@ -79,6 +80,8 @@ pub struct RecordingIndex {
     pub remarks: Remarks,
     /// The drift and the delays that its datagrams' arrivals show; `None` of raw bytes.
     pub pace: Option<Pace>,
+    /// Where something lay in the quiet stretch that the rest is first taken from, for people; empty where nothing did.
+    pub on: String,
     /// One line that states what was lost.
     pub verdict: String,
     /// Whether the end of the file is missing.
@@ -122,6 +125,7 @@ impl RecordingIndex {
             activity: Activity::new(&header_array),
             remarks: Remarks::default(),
             pace: None,
+            on: String::new(),
             verdict: String::new(),
             unfinished,
         };
@@ -280,6 +284,7 @@ impl RecordingIndex {
         self.remarks = contents.remarks;
         self.verdict = contents.verdict;
         self.pace = contents.clock.pace();
+        self.on = lain(&state.rests_less(), &self.header.array);
         state.update_curve();
         let columns = state.time_columns().clone();
         let whole =
