@@ -18,7 +18,7 @@ from taxel._base.arguments import callback, finite, flag, instance, several, sho
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.detect.ages import in_pictures
-from taxel.detect.examples import Example, array_of, checked
+from taxel.detect.examples import Example, array_of, checked, unit_of
 from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, floor_of, plain_score
 from taxel.detect.readout import Readout, run
@@ -162,7 +162,7 @@ def judge(
     whole = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
     recipe = possible(whole, examples)
     patterns = Encoded(examples, recipe, report, search=search)
-    array = array_of(examples)
+    array, unit = array_of(examples), unit_of(examples)
     detections: dict[int, list[Detections]] = {}
     trained = []
     for n, fold in enumerate(ways):
@@ -175,7 +175,8 @@ def judge(
         with _quiet():
             parts_of = partial(_parts_of, fold.train)
             made = learn(patterns.part(parts_of), plan, array, report)
-        trained.append(made._replace(recipe=replace(whole, neurons=plan.neurons)._at(made.recipe.neurons)))
+        of_fold = replace(whole, neurons=plan.neurons)._at(made.recipe.neurons)
+        trained.append(made._replace(recipe=of_fold, readout=made.readout._with(unit=unit)))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, clocks))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
@@ -241,6 +242,7 @@ def choose(
     {'contact': {'ub': 2.0}}
     """
     examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
+    unit_of(examples)
     recipe = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
     report = _reporting(progress)
     if isinstance(k, int | np.integer):
