@@ -259,9 +259,7 @@ def _by_rule(made: Trained, left: int, wrong: int) -> Advice:
     because = f"leaves {left} missed and false on the same labels, the neuron {wrong}"
     if _for_touch(made) and not any(isinstance(one, ContactArea) for one in made.recipe.encoder._each()):
         return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}")
-    return Advice(
-        "the plain rule", f"it {because}; taxel train --json prints its file (docs/howto.md), and taxel detect runs it"
-    )
+    return Advice("the plain rule", f"it {because}; taxel train --rule FILE writes it, and taxel detect runs it")
 
 
 def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:
