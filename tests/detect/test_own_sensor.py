@@ -401,3 +401,22 @@ def test_a_plain_rule_is_written_and_detects_what_the_training_says(
         found = score(run(load(one), frames, tare=tare), {label: truth[label]})
         counts = f"{label}, plain rule: {found.found} of 12 found, {found.missed} missed, {found.false} false"
         assert counts in out
+
+
+@pytest.mark.parametrize("unit", ["N", "kPa", "mN", "Pa", "N/cm2"])
+def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
+    tmp_path: Path, capsys, unit: str
+) -> None:
+    frames, labels = touched((8, 8), 4, gain=60.0, noise=1.0)
+    mat = Frames(np.abs(frames.values), frames.t, unit=unit, array=Array(8, 8, pitch_mm=10.0))
+    arguments = written(tmp_path, mat, labels)
+    code, out, error = call(capsys, "info", tmp_path / "own.npz")
+    assert (code, "rest                0, as the values are force or pressure" in out) == (0, True), error
+    (area,) = re.findall(r"contact area +at most (\d+) mm2", out)
+    assert 100 <= int(area) <= 2500, "the noise of the others is no contact"
+    code, out, error = call(capsys, *arguments)
+    assert (code, "\ntare: " in out) == (0, False), error
+    truth = ("--truth", tmp_path / "labels.csv", "--json")
+    code, out, error = call(capsys, "detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", *truth)
+    assert code == 0, error
+    assert json.loads(out)["score"]["found"] >= 22, out[:500]

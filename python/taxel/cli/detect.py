@@ -17,7 +17,7 @@ from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_of, try_report
+from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_or_by_unit, try_report
 from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def detect(
         for one, labelled in zip(opened, events, strict=True):
             update(f"detecting in {one.title}")
             _warn_of_losses(one)
-            rest = tare_of(tare, one)
+            rest = tare_or_by_unit(tare, one)
             with _naming(one.title, readout):
                 begin_us = end_of_rest_us(tare, rest)
                 detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest, begin_us=begin_us)

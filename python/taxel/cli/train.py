@@ -17,7 +17,6 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import (
-    BY_UNIT,
     SET_HELP,
     TARE_HELP,
     assignments,
@@ -195,6 +194,7 @@ def _of_label(place: Path, label: str) -> Path:
 def _tares(examples: Sequence[Example]) -> str:
     """Return the line of which tares were taken from the recordings; of those whose rest is 0 by their unit nothing."""
     from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.rest import BY_UNIT  # noqa: PLC0415
     from taxel.spikes import SpikeTrains, to_ms  # noqa: PLC0415
 
     spans = []
