@@ -401,6 +401,8 @@ def test_a_plain_rule_is_written_and_detects_what_the_training_says(
         found = score(run(load(one), frames, tare=tare), {label: truth[label]})
         counts = f"{label}, plain rule: {found.found} of 12 found, {found.missed} missed, {found.false} false"
         assert counts in out
+    code, out, _ = call(capsys, "detect", tmp_path / "own.npz", "--readout", places[0], "--tare", "0.5")
+    assert (code, "known (ms)" in out, "nan" in out, "slope" in out) == (0, True, False, False)
 
 
 @pytest.mark.parametrize("unit", ["N", "kPa", "mN", "Pa", "N/cm2"])

@@ -236,8 +236,10 @@ def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:
         typer.echo(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
     first = detections[:_ROWS]
-    typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}  {'slope (mV/ms)':>13}")
+    # A plain rule has no slope.
+    sloped = not np.isnan(first.slope).all()
+    typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
-        typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}  {slope:>13.4g}")
+        typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped)
     if len(detections) > _ROWS:
         typer.echo(f"... and {len(detections) - _ROWS} more; --csv and --json hold all")
