@@ -1,6 +1,7 @@
 """What is judged was not trained on, each thing is judged once, and the better point is chosen."""
 
 import dataclasses
+import re
 import warnings
 
 import numpy as np
@@ -305,3 +306,16 @@ def test_a_search_scores_held_out_data_wherever_the_events_of_a_label_lie(seed: 
         )
         chosen = made.recipe.neurons["release"]["ub"]
         assert chosen == 2.0 or (events < 4 and few), (events, few)
+
+
+def test_what_a_search_reports_is_in_plain_words() -> None:
+    said: list[str] = []
+    plan = {"ub": 1e-6, "search": [{"ub": 2.0}]}
+    searched = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "delay_ms": 1.0}, {"press": plan})
+    data = [one._replace(labels={"press": one.labels["press"]}) for one in presses(1, 0, 1)]
+    judge(data, searched, 2, search=True, progress=said.append)
+    assert "trying parameters 2 of 2 for press, on part 1 of 3" in said
+    rounds = [line for line in said if ", round 1: " in line]
+    assert rounds
+    assert all(re.search(r"weights at most [\d.]+% from the best", line) for line in rounds), rounds
+    assert not any(re.search(r"\bpoint\b|\de[+-]\d", line) for line in said)

@@ -318,7 +318,7 @@ def _marks(
         known: Known = {}
         for m in in_turn:
             plan = plans[m]
-            report(f"trying point {m + 1} of {len(plans)} for {label}, fold {n + 1} of {len(folds)}")
+            report(f"trying parameters {m + 1} of {len(plans)} for {label}, on part {n + 1} of {len(folds)}")
             if m in refused:
                 continue
             if rows is None or not rows.fits(plan):

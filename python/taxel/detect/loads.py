@@ -74,7 +74,7 @@ class Loads:
         for quantity in quantities:
             if quantity == "local_load" and lacks_noise(examples):
                 continue
-            report(f"plain rules by {quantity.replace('_', ' ')}")
+            report(f"measuring the {quantity.replace('_', ' ')} for plain rules")
             self._curves[quantity] = [
                 _curve(quantity, noise_floor, one, *clock) for one, clock in zip(examples, clocks, strict=True)
             ]

@@ -444,7 +444,7 @@ class Fitting:
                 cone,
                 start=self._before,
                 progress=lambda n, _rows, _objective, gap: self._report(
-                    f"{self._what}, round {n}: within {gap:.1e} of the least"
+                    f"{self._what}, round {n}: weights at most {gap:.2%} from the best"
                 ),
             )
         begins = [_begin_ms(source) for source in self._sources]
