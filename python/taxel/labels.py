@@ -28,8 +28,8 @@ __all__ = ["TURN_US", "Labels", "Note", "ahead_us", "beside", "source_of", "tria
 #: The period after which the board's 16-bit clock of 100 us wraps, us.
 TURN_US = 6_553_600
 
-#: The columns of a table, as an error lists them; those in brackets are optional.
-_WANTED, _OTHERS = ("label", "t_us"), ("recording", "source", "host_ns", "replaces_us")
+#: The columns of a table, and those that it may have.
+_WANTED, _KNOWN = ("label", "t_us"), ("source", "recording", "replaces_us", "host_ns")
 
 #: The columns of times by the board's clock, us.
 _TIMES = ("t_us", "replaces_us")
@@ -54,6 +54,8 @@ class Note:
         The source of the recording that it is of, as "left"; "" for all of them.
     replaces : int, us, optional
         Time of the recording's own note that a label replaces, which then counts no more.
+    others : tuple of (str, str)
+        The columns of its table that taxel does not know, as a `comment`, and what they say of it.
 
     Examples
     --------
@@ -67,6 +69,7 @@ class Note:
     recording: str = ""
     source: str = ""
     replaces: int | None = field(default=None, repr=False)
+    others: tuple[tuple[str, str], ...] = field(default=(), repr=False)
 
     def __getattr__(self, name: str) -> Any:
         """Return a field by its old name in `taxel.Label`; this is removed in the next version."""
@@ -99,7 +102,8 @@ class Labels:
         A CSV ``recording,source,label,t_us,host_ns,replaces_us``, its columns in any order; all but `label` and `t_us`
         may be absent. A label without a source is of all sources of its recording; a source that was a topic of a ROS
         bag may have the topic's name. A row with `replaces_us` stands for
-        the recording's own note of that time; one without a label says that this note is none.
+        the recording's own note of that time; one without a label says that this note is none. Other columns are kept
+        (`Note.others`).
 
     Attributes
     ----------
@@ -110,7 +114,7 @@ class Labels:
 
     Raises
     ------
-    FormatError : another header, or an invalid value (names the line)
+    FormatError : a column is missing, or an invalid value (names the line)
     FileNotFoundError : no such file
 
     Examples
@@ -126,7 +130,7 @@ class Labels:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         place = Path(checked_path("path", path))
         table = HeaderTable.read(place, text_of(place))
-        table.has(_WANTED, _OTHERS)
+        table.has(_WANTED)
         rows = [_row(f"{place}, line {line}", cells) for line, cells in table]
         self.path, self.rows = place, tuple(row for row in rows if row.text)
         self.removed = tuple(row for row in rows if not row.text)
@@ -265,6 +269,8 @@ def write_labels(
 ) -> None:
     r"""Write a table `label,t_us` in the order of time; an existing one is replaced atomically.
 
+    Columns of the existing table that taxel does not know stay with their labels; of a single label that changed too.
+
     Parameters
     ----------
     path : path
@@ -276,6 +282,7 @@ def write_labels(
 
     Raises
     ------
+    FormatError : the existing one is no table of labels (names the line)
     OSError : the disk is full, the table is write-protected
 
     Examples
@@ -287,12 +294,41 @@ def write_labels(
     'label,t_us\ncontact,400\nlift,900\n'
     """
     rows: list[tuple[Any, ...]] = sorted(labels, key=lambda row: row[1])
-    more = {"source": 2, "recording": 3, "replaces_us": 4, "host_ns": 5}
-    kept = {name: k for name, k in more.items() if any(row[k:] and row[k] not in ("", None) for row in rows)}
+    full = [(*row, *("", "", None, None)[len(row) - 2 :]) for row in rows]
+    kept = [k for k, _ in enumerate(_KNOWN, 2) if any(row[k] not in ("", None) for row in full)]
+    others = _others(path, full)
+    more = list(dict.fromkeys(name for one in others for name in one))
     with whole_file(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow([*_WANTED, *kept])
-        table.writerows([[*row[:2], *((*row, "", "", "", "")[k] for k in kept.values())] for row in rows])
+        table.writerow([*_WANTED, *(_KNOWN[k - 2] for k in kept), *more])
+        table.writerows(
+            [*row[:2], *(row[k] for k in kept), *(one.get(name, "") for name in more)]
+            for row, one in zip(full, others, strict=True)
+        )
+
+
+def _others(path: str | os.PathLike[str], rows: Sequence[tuple[Any, ...]]) -> list[dict[str, str]]:
+    """Return what the columns of an existing table that taxel does not know say of each label to write."""
+    before = []
+    if Path(checked_path("path", path)).is_file():
+        table = Labels(path)
+        before = [*table.rows, *table.removed]
+    found: list[dict[str, str]] = [{} for _ in rows]
+    new = []
+    # A row of the table's own recording may have lost its name: those with one are found first.
+    for k in sorted(range(len(rows)), key=lambda k: not rows[k][3]):
+        text, t, source, recording, replaces, _ = rows[k]
+        same = (text, t, source, replaces)
+        own = (n for n in before if (n.text, n.t, n.source, n.replaces) == same and recording in ("", n.recording))
+        note = next(own, None)
+        if note is None:
+            new.append(k)
+            continue
+        before.remove(note)
+        found[k] = dict(note.others)
+    if len(new) == len(before) == 1:
+        found[new[0]] = dict(before[0].others)
+    return found
 
 
 def _row(place: str, cells: Mapping[str, str]) -> Note:
@@ -313,4 +349,5 @@ def _row(place: str, cells: Mapping[str, str]) -> Note:
         raise FormatError(f"{place}: host_ns must be ns since 1970")
     source = values.get("source", "")
     named = values.get("recording", ""), source_of(source) if source.startswith("/") else source
-    return Note(values["label"], times["t_us"], times.get("host_ns", 0), *named, replaces)
+    others = tuple((name, cell) for name, cell in cells.items() if name not in (*_WANTED, *_KNOWN))
+    return Note(values["label"], times["t_us"], times.get("host_ns", 0), *named, replaces, others)

@@ -16,7 +16,7 @@ from taxel.clock import Clock
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 
-__all__ = ["Recorded", "recorded", "refuse_numbered"]
+__all__ = ["Recorded", "recorded", "refuse_numbered", "unit_of"]
 
 T = TypeVar("T")
 
@@ -87,6 +87,11 @@ def _filled(frames: Frames, path: Path) -> Frames:
         stacklevel=3,
     )
     return frames.held()
+
+
+def unit_of(source: Events | Frames) -> str:
+    """Return the unit of values: that of pictures; the intensities of events are ticks."""
+    return source.unit if isinstance(source, Frames) else "ticks"
 
 
 def refuse_numbered(recording: Recorded) -> None:

@@ -1,14 +1,18 @@
 """What is judged was not trained on, each thing is judged once, and the better point is chosen."""
 
 import dataclasses
+import re
 import warnings
 
 import numpy as np
 import pytest
+from hypothesis import Phase, assume, given, settings
+from hypothesis import strategies as st
 from test_readout import recipe, tare, touches
 
 import taxel
 from taxel.detect import Example, Fold, Part, Score, choose, judge, run, score, train
+from taxel.detect import folds as folds_module
 from taxel.detect.folds import _folds as folds
 from taxel.detect.folds import count_of_folds
 
@@ -255,3 +259,63 @@ def test_the_better_rank_misses_less_and_then_lies_nearer() -> None:
     assert sorted(order, key=lambda one: one.rank) == order
     assert ranked(11_000, 20_000).rank[1] == pytest.approx(np.sqrt(0.5))
     assert ranked().rank[1] == np.inf
+
+
+def presses(seed: int, rare: int, recordings: int) -> list[Example]:
+    """One taxel is pressed at drawn times of each recording; after so many of the presses, in a row, another one is."""
+    random = np.random.default_rng(seed)
+    made, left = [], rare
+    for _ in range(recordings):
+        begins = 40 + 50 * np.arange(12) + random.integers(0, 20, 12)
+        first = int(random.integers(0, 12))
+        ends = begins[first : first + left] + 15
+        left -= len(ends)
+        values = np.zeros((700, 1, 2))
+        for x, starts in enumerate((begins, ends)):
+            for start in starts:
+                values[start : start + 10, 0, x] = 9.0
+        frames = taxel.Frames(values, 10_000 * np.arange(700), unit="N")
+        labels = {"press": 10_000 * begins} | ({"release": 10_000 * ends} if len(ends) else {})
+        made.append(Example(frames, labels))
+    return made
+
+
+@settings(max_examples=6, phases=[Phase.explicit, Phase.generate])
+@given(st.integers(0, 10_000), st.integers(2, 12), st.integers(1, 4))
+def test_a_search_scores_held_out_data_wherever_the_events_of_a_label_lie(seed: int, rare: int, recordings: int):
+    data = presses(seed, rare, recordings)
+    count, _ = count_of_folds(data)
+    assume(count)
+    ways, _ = folds(data, count)
+    assume(not any(folds_module._lacks(data, way.train, ("press", "release")) for way in ways))
+    plan = {"ub": 1e-6, "search": [{"ub": 2.0}]}
+    searched = taxel.detect.Recipe(
+        taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "delay_ms": 1.0}, dict.fromkeys(("press", "release"), plan)
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        judged = judge(data, searched, count, search=True)
+    assert judged.together["release"].events == sum(len(one.labels.get("release", ())) for one in data)
+    few = [str(one.message) for one in caught if "too few events to choose" in str(one.message)]
+    assert len(few) <= count
+    for n, made in enumerate(judged.trained):
+        events = sum(
+            len(folds_module._only_inside(only, part))
+            for part in ways[n].train
+            for only in [folds_module._only(data, "release")[part.example]]
+        )
+        chosen = made.recipe.neurons["release"]["ub"]
+        assert chosen == 2.0 or (events < 4 and few), (events, few)
+
+
+def test_what_a_search_reports_is_in_plain_words() -> None:
+    said: list[str] = []
+    plan = {"ub": 1e-6, "search": [{"ub": 2.0}]}
+    searched = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "delay_ms": 1.0}, {"press": plan})
+    data = [one._replace(labels={"press": one.labels["press"]}) for one in presses(1, 0, 1)]
+    judge(data, searched, 2, search=True, progress=said.append)
+    assert "trying parameters 2 of 2 for press, on part 1 of 3" in said
+    rounds = [line for line in said if ", round 1: " in line]
+    assert rounds
+    assert all(re.search(r"weights at most [\d.]+% from the best", line) for line in rounds), rounds
+    assert not any(re.search(r"\bpoint\b|\de[+-]\d", line) for line in said)

@@ -17,7 +17,7 @@ from shell import call
 import taxel
 from taxel import Array, Frames, SpikeTrains, Tare
 from taxel.cli import _recordings
-from taxel.detect import Example, PlainRule, Recipe, choose, judge, recipes, run, score, training
+from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score, training
 from taxel.detect.advice import advised
 from taxel.detect.floors import measured_floor
 from taxel.detect.followed import follow
@@ -378,3 +378,47 @@ def test_info_takes_the_rate_of_numbered_pictures(tmp_path: Path, capsys) -> Non
     (tmp_path / "b.layout.toml").write_text('unit = "counts"')
     facts = json.loads(call(capsys, "info", tmp_path / "b.npy", "--rate-hz", "10", "--json")[1])
     assert (facts["timed"], facts["to_us"]) == (True, 800_000)
+
+
+@pytest.mark.parametrize("labels", [("contact", "lift"), ("contact",)])
+def test_a_plain_rule_is_written_and_detects_what_the_training_says(
+    tmp_path: Path, capsys, labels: tuple[str, ...]
+) -> None:
+    frames, truth = touched((6, 6), 1, gain=100.0, noise=1.0, offset=10.0)
+    arguments = written(tmp_path, frames, {label: truth[label] for label in labels})
+    place = tmp_path / "rule.json"
+    places = [tmp_path / f"rule.{label}.json" for label in labels] if len(labels) > 1 else [place]
+    places[-1].write_text("mine")
+    code, _, error = call(capsys, *arguments, "--folds", "0", "--rule", place)
+    assert (code, f"{places[-1].name}: exists already; give --overwrite" in error) == (2, True), error
+    assert (places[-1].read_text(), (tmp_path / "readout.json").exists()) == ("mine", False)
+    code, out, error = call(capsys, *arguments, "--folds", "0", "--rule", place, "--overwrite")
+    assert code == 0, error
+    assert sorted(tmp_path.glob("rule*")) == sorted(places)
+    tare = Tare.take(frames, stop_us=int(truth["contact"][0]) - 20_000)
+    for label, one in zip(labels, places, strict=True):
+        assert f"plain rule of {label}: written to {one}" in out
+        found = score(run(load(one), frames, tare=tare), {label: truth[label]})
+        counts = f"{label}, plain rule: {found.found} of 12 found, {found.missed} missed, {found.false} false"
+        assert counts in out
+    code, out, _ = call(capsys, "detect", tmp_path / "own.npz", "--readout", places[0], "--tare", "0.5")
+    assert (code, "known (ms)" in out, "nan" in out, "slope" in out) == (0, True, False, False)
+
+
+@pytest.mark.parametrize("unit", ["N", "kPa", "mN", "Pa", "N/cm2"])
+def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
+    tmp_path: Path, capsys, unit: str
+) -> None:
+    frames, labels = touched((8, 8), 4, gain=60.0, noise=1.0)
+    mat = Frames(np.abs(frames.values), frames.t, unit=unit, array=Array(8, 8, pitch_mm=10.0))
+    arguments = written(tmp_path, mat, labels)
+    code, out, error = call(capsys, "info", tmp_path / "own.npz")
+    assert (code, "rest                0, as the values are force or pressure" in out) == (0, True), error
+    (area,) = re.findall(r"contact area +at most (\d+) mm2", out)
+    assert 100 <= int(area) <= 3200, "the noise of the others is no contact"
+    code, out, error = call(capsys, *arguments)
+    assert (code, "\ntare: " in out) == (0, False), error
+    truth = ("--truth", tmp_path / "labels.csv", "--json")
+    code, out, error = call(capsys, "detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", *truth)
+    assert code == 0, error
+    assert json.loads(out)["score"]["found"] >= 22, out[:500]

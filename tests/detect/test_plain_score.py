@@ -162,3 +162,13 @@ def test_the_page_of_training_says_that_the_rule_knows_sooner() -> None:
         "hit: the plain rule is as good and knows sooner: 0 missed and false, as the neuron, known +0.2 ms after the "
         "label (median), the neuron +0.5 ms; "
     )
+
+
+def test_where_the_rule_is_better_the_training_says_how_to_write_it() -> None:
+    true = {"hit": [1000]}
+    mine = taxel.detect.score(taxel.Detections(["hit"], [1000], [1200]), true)
+    plain = taxel.detect.PlainScore({"hit": taxel.detect.PlainRule("area", 2)}, mine)
+    nothing = taxel.detect.score(taxel.Detections([], [], []), true)
+    result = Result((), None, SimpleNamespace(plain=plain, together=nothing), "", {}, 50.0, searched=False)
+    (line,) = result._better()
+    assert line.endswith("; --rule FILE writes it, for taxel detect --readout FILE")

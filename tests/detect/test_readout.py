@@ -146,9 +146,9 @@ def test_a_readout_holds_what_it_was_given(readout: Readout) -> None:
     assert {label: one.delay_ms for label, one in readout.neurons.items()} == {"contact": 2.0, "lift": 1.0}
     assert repr(readout).startswith("Readout(contact, lift; ContactArea(")
     assert repr(readout).endswith("on 8 x 8 taxels; grid, keep, threshold x 0.9)")
-    made = Readout(readout.encoder, readout.neurons, array=ARRAY, run_threshold=0.9)
+    made = Readout(readout.encoder, readout.neurons, array=ARRAY, unit="ticks", run_threshold=0.9)
     assert made != readout, "what was seen in training belongs to it"
-    assert made._with_seen(readout._parts["seen"]) == readout
+    assert made._with(seen=readout._parts["seen"]) == readout
     assert Readout.from_json(readout.to_json()) == readout
     assert readout != 3
 

@@ -1,14 +1,20 @@
 """Reference events find their recording, and its own clock."""
 
+import csv
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import taxel
 from taxel import _core
 from taxel.labels import TURN_US
+from taxel.live._requests import RequestHandler
+from taxel.live._shown_files import Opening
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
 BEGAN_NS = 1_700_000_000_000_000_000
@@ -146,3 +152,51 @@ def test_a_row_that_replaces_nothing_is_refused(tmp_path: Path, cells: str, said
     (tmp_path / "walk.notes.csv").write_text(f"label,t_us,replaces_us\n{cells}\n")
     with pytest.raises(taxel.FormatError, match=f"line 2: .*{said}"):
         taxel.Labels(tmp_path / "walk.notes.csv")
+
+
+#: Rows of a table: label, time, source, recording and what two columns say that taxel does not know.
+ROWS = st.lists(
+    st.tuples(
+        st.sampled_from(["heel", "toe"]), st.integers(0, 20), st.sampled_from(["", "left"]),
+        st.sampled_from(["walk", "trial 2"]), st.sampled_from(["", "late", 'hit, "hard"']), st.sampled_from(["", "3"]),
+    ),
+    min_size=1, max_size=8, unique_by=lambda row: row[:4],
+)  # fmt: skip
+
+
+@given(ROWS, st.sampled_from(["none", "mark", "rename", "move", "delete"]), st.randoms(use_true_random=False))
+def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(rows, change: str, random) -> None:
+    with TemporaryDirectory() as folder:
+        place = Path(folder) / "walk.notes.csv"
+        with place.open("w", newline="") as file:
+            table = csv.writer(file)
+            table.writerows([("label", "t_us", "source", "recording", "comment", "sure"), *rows])
+        handler = RequestHandler(*[lambda *_: None] * 3, None, Opening())
+        shown = handler.read_labels(place, "walk.mcap")
+        assert len(shown) == len(rows)
+        at = random.randrange(len(rows))
+        left = [row if row[3] != "walk" else (*row[:3], "", *row[4:]) for row in rows]
+        label, t, source, trial, *said = left[at]
+        changed = {"rename": ("ball", t), "move": (label, 77)}.get(change, (label, t))
+        if change == "mark":
+            shown.append(("ball", 5, "", "", None, None))
+            left.append(("ball", 5, "", "", "", ""))
+        elif change == "delete":
+            del shown[at], left[at]
+        else:
+            shown[at], left[at] = (*changed, *shown[at][2:]), (*changed, source, trial, *said)
+        random.shuffle(shown)
+        handler.write_labels(place, shown)
+        again = taxel.Labels(place).rows
+        names = {"comment": "", "sure": ""}
+        found = [(one.text, one.t, one.source, one.recording, *(names | dict(one.others)).values()) for one in again]
+        assert sorted(found) == sorted(left)
+
+
+def test_a_cell_in_a_column_without_a_name_is_refused_and_an_empty_one_is_not(tmp_path: Path) -> None:
+    place = tmp_path / "labels.csv"
+    place.write_text("label,t_us,\nheel,5,\n")
+    assert [row.others for row in taxel.Labels(place).rows] == [()]
+    place.write_text("label,t_us,,\nheel,5,late,\n")
+    with pytest.raises(taxel.FormatError, match="line 2: 'late' stands in a column without a name; give it one"):
+        taxel.Labels(place)

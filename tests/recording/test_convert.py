@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from shell import call
 
 import taxel
 from taxel import Frames
@@ -258,3 +259,16 @@ def test_a_source_that_is_no_recording_says_so(tmp_path: Path) -> None:
     path.write_bytes(b"\x1f\x8b\x08\x00")
     with pytest.raises(FormatError, match="gzip"):
         taxel.convert(path, tmp_path / "b.npz")
+
+
+@pytest.mark.parametrize(
+    ("pitch_mm", "said"), [(None, 'lost: the name of the sensor ("mat")'), (5.0, "the sensor (3 x 4")]
+)
+def test_a_csv_loses_of_a_sensor_of_unknown_pitch_its_name_alone(
+    tmp_path: Path, capsys, pitch_mm: float | None, said: str
+) -> None:
+    array = taxel.Array(3, 4, pitch_mm=pitch_mm, name="mat")
+    taxel.convert(taxel.Frames(np.ones((5, 3, 4)), np.arange(5) * 10_000, array=array), tmp_path / "mat.npz")
+    code, out, error = call(capsys, "convert", tmp_path / "mat.npz", tmp_path / "mat.csv")
+    assert (code, said in out) == (0, True), (out, error)
+    assert ("the sensor (3" in out) == (pitch_mm is not None)

@@ -108,6 +108,13 @@ def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path)
         taxel.open(tmp_path)
 
 
+def test_a_folder_without_a_recording_names_bags_arrays_and_tables_too(tmp_path: Path) -> None:
+    (tmp_path / "notes.pdf").write_bytes(b"%PDF")
+    with pytest.raises(FormatError, match=r"there are .*ROS bags .*tekscan.*by a layout file \.npy, \.txt and") as said:
+        taxel.open(tmp_path)
+    assert "\n" not in str(said.value)
+
+
 def test_info_of_a_folder_says_all_of_them(tmp_path: Path) -> None:
     for k in range(2):
         taxel.convert(some_events(40, seed=k), tmp_path / f"walk{k}.npz")

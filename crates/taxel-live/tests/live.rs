@@ -96,6 +96,7 @@ fn of(encoder: &str, one: TrainedNeuron) -> Readout {
     Readout {
         encoder: Encoder::from_json(encoder).expect("an encoder"),
         array: None,
+        unit: None,
         time: Time::Continuous,
         after_spike: one.neuron.after_spike,
         run_threshold: 1.0,

@@ -140,6 +140,7 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
     let readout = Readout {
         encoder: Encoder::from_json(r#"{"name": "change_events"}"#).expect("an encoder"),
         array: None,
+        unit: None,
         time: Time::Continuous,
         after_spike: one.neuron.after_spike,
         run_threshold: 1.0,

@@ -88,17 +88,12 @@ class HeaderTable:
             raise FormatError(f"{self.place}, line {line}: {len(cells)} cells, must have {len(self.header)}")
         return cells
 
-    def has(self, required: Sequence[str], others: Sequence[str] | None = None) -> None:
-        """Check the names of the columns.
-
-        Parameters
-        ----------
-        wanted : names that must be there
-        others : names of optional columns; default: any
+    def has(self, required: Sequence[str]) -> None:
+        """Check that columns of these names are there; there may be others.
 
         Raises
         ------
-        FormatError : a column is missing or not allowed (names it)
+        FormatError : a column is missing (names it)
         """
         missing = [name for name in required if name not in self.header]
         if missing:
@@ -110,15 +105,22 @@ class HeaderTable:
             raise FormatError(
                 f"{self.place}, line 1: no column {missing[0]!r}; {there}; must be {','.join(required)} ..."
             )
-        strange = [name for name in self.header if others is not None and name not in (*required, *others)]
-        if strange:
-            known = ",".join((*required, *(others or ())))
-            raise FormatError(f"{self.place}, line 1: column {shown(strange[0])}; must be {known} or some of them")
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:
-        """Yield the line number of each row, and its cells by the names of their columns."""
+        """Yield the line number of each row, and its cells by the names of their columns.
+
+        Raises
+        ------
+        FormatError : a row of another length than the header, or a cell in a column without a name (names the line)
+        """
         for line, cells in self.lines:
-            yield line, dict(zip(self.header, self._row(line, cells), strict=True))
+            named = list(zip(self.header, self._row(line, cells), strict=True))
+            stray = next((cell for name, cell in named if not name and cell.strip()), None)
+            if stray is not None:
+                raise FormatError(
+                    f"{self.place}, line {line}: {shown(stray)} stands in a column without a name; give it one"
+                )
+            yield line, {name: cell for name, cell in named if name}
 
 
 def text_of(path: Path) -> list[str]:

@@ -40,13 +40,9 @@ _REPORT_S = (2.0, 8.0, 20.0, 30.0)
 #: So long after the last event of a board a label may follow, us, as people mark late; one further than the window of a
 #: score is named, as no detection can lie so near to it.
 _LATE_US, _NEAR_US = 1_000_000, 50_000
-#: Units of pictures that read 0 at rest.
-_RESTS_AT_0 = ("N", "kPa")
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
-#: The note of a tare that was not measured.
-BY_UNIT = "0, by the unit"
 TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest at the beginning of the recording."
 SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
 
@@ -107,6 +103,16 @@ def tare_of(value: str | None, recording: Recording) -> Tare | None:
     return tare
 
 
+def tare_or_by_unit(value: str | None, recording: Recording) -> Tare | None:
+    """Return the tare that ``--tare`` names; without one 0 of pictures in a unit of force or pressure, else none."""
+    from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
+    from taxel.recorded import recorded  # noqa: PLC0415
+    from taxel.recording.rest import by_unit  # noqa: PLC0415
+
+    source = recorded(recording, hold=False)
+    return by_unit(source) if value is None and isinstance(source, Frames) else tare_of(value, recording)
+
+
 def _warn_of_touch(value: str, recording: Recording, source: Events | Frames, tare: Tare) -> None:
     """Warn of a tare in which something was touched, by which lifts are missed or false."""
     from taxel.detect import Example  # noqa: PLC0415  the command line starts quickly
@@ -138,6 +144,7 @@ def end_of_rest_us(value: str | None, tare: Tare | None) -> int | None:
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
     """Return the tare of the time before a recording's first label, or before the board's start marker.
 
+    Of pictures in a unit of force or pressure it is 0, as everywhere (`taxel.recording.rest`).
     A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 pictures come before
     it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
     away, the tare is of the longest time without it, before the label if there is one; a warning says so.
@@ -145,10 +152,12 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
     from taxel.recorded import recorded  # noqa: PLC0415
     from taxel.recording.lain import without_what_lay  # noqa: PLC0415
-    from taxel.recording.rest import of_quiet  # noqa: PLC0415
+    from taxel.recording.rest import by_unit, of_quiet  # noqa: PLC0415
     from taxel.tare import Tare  # noqa: PLC0415
 
     source = recorded(recording)
+    if isinstance(source, Frames) and (rest := by_unit(source)) is not None:
+        return rest
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
     tare, said = without_what_lay(recording, first)
     if said:
@@ -180,15 +189,14 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
 
 
 def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
-    """Return a recording's tare: 0 for pictures in N or kPa, else as `tare_before`, or None without such a time."""
+    """Return a recording's tare: 0 of force or pressure, else as `tare_before`, or None without such a time."""
     from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
     from taxel.recorded import recorded  # noqa: PLC0415
-    from taxel.tare import Tare  # noqa: PLC0415
+    from taxel.recording.rest import by_unit  # noqa: PLC0415
 
     source = recorded(recording)
-    if isinstance(source, Frames) and source.unit in _RESTS_AT_0:
-        nothing = np.zeros((2, *source.array.shape))
-        return Tare.take(Frames(nothing, [0, 1], unit=source.unit, array=source.array), note=BY_UNIT)
+    if isinstance(source, Frames) and (rest := by_unit(source)) is not None:
+        return rest
     try:
         return _before(labels, recording)
     except ProblemError:

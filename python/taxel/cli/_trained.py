@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ __all__ = ["Result"]
 #: How many labels without a pair a line names.
 _NAMED = 5
 #: Where to find the file of a plain rule.
-_RULE_FILE = "--json prints its file as plain_rule.rules (docs/howto.md)"
+_RULE_FILE = "--rule FILE writes it, for taxel detect --readout FILE"
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,8 @@ class Result:
     advice: Mapping[str, Advice]
     window_ms: float
     searched: bool
+    #: Where the plain rules of which labels were written.
+    rules: Mapping[Path, Sequence[str]] = field(default_factory=dict)
 
     @property
     def how(self) -> str:
@@ -68,6 +70,8 @@ class Result:
             result["alignment"] = {label: one.to_dict() for label, one in self.made.alignments.items()}
             for one in result["alignment"].values():
                 one["unpaired"] = [{"recording": self.opened[k].title, "t_us": t} for k, t in one["unpaired"]]
+        if self.rules:
+            result["rules"] = {str(path): list(labels) for path, labels in self.rules.items()}
         if report is not None:
             result["report"] = str(report / "report.html")
         if self.searched:
@@ -98,6 +102,7 @@ class Result:
         if len(self.scored.scores) > 1:
             lines.append(f"\nall recordings:\n{self.scored.together!r}")
         lines.append(f"\nwritten to {out}")
+        lines += [f"plain rule of {' and '.join(labels)}: written to {path}" for path, labels in self.rules.items()]
         if report is not None:
             lines.append(f"report: {report / 'report.html'}")
         lines += [f"warning: {one}" for one in self._warnings()]

@@ -17,7 +17,7 @@ from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_of, try_report
+from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_or_by_unit, try_report
 from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def detect(
         for one, labelled in zip(opened, events, strict=True):
             update(f"detecting in {one.title}")
             _warn_of_losses(one)
-            rest = tare_of(tare, one)
+            rest = tare_or_by_unit(tare, one)
             with _naming(one.title, readout):
                 begin_us = end_of_rest_us(tare, rest)
                 detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest, begin_us=begin_us)
@@ -236,8 +236,10 @@ def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:
         typer.echo(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
     first = detections[:_ROWS]
-    typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}  {'slope (mV/ms)':>13}")
+    # A plain rule has no slope.
+    sloped = not np.isnan(first.slope).all()
+    typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
-        typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}  {slope:>13.4g}")
+        typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped)
     if len(detections) > _ROWS:
         typer.echo(f"... and {len(detections) - _ROWS} more; --csv and --json hold all")

@@ -14,7 +14,7 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, progress, tare_of
+from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, progress, tare_or_by_unit
 
 __all__ = ["encode"]
 
@@ -44,7 +44,7 @@ def encode(
         update(f"reading {recording}")
         opened = files.one(recording)
         source = opened.events if opened.has_events else opened.frames()
-        rest = tare_of(tare, opened)
+        rest = tare_or_by_unit(tare, opened)
         if rest is not None:
             chosen = chosen.with_tare(rest)
         update(f"encoding {counted(len(source), 'event' if opened.has_events else 'picture')}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,6 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import (
-    BY_UNIT,
     SET_HELP,
     TARE_HELP,
     assignments,
@@ -66,7 +66,14 @@ def train(
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
     ),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout if it exists.")] = False,
+    rule: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the plain rule to this file, for taxel detect --readout; rules of several labels each to its "
+            "own: FILE with the label before its suffix."
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files if they exist.")] = False,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     folds: Annotated[
         int | None,
@@ -115,8 +122,9 @@ def train(
         try_report(report)
     if folds == 1:
         raise ProblemError("--folds 1: must be 2 or more, or 0 for none")
-    changes = assignments(values or [])
-    changes |= {key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None}
+    changes = assignments(values or []) | {
+        key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
+    }
     _planned(recipe, changes)  # reports errors of the recipe before the recordings are read
     with progress(as_json) as update:
         update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3))
@@ -126,6 +134,7 @@ def train(
             table = "; give --labels FILE, a table label,t_us" if labels == "notes" else ""
             raise ProblemError(f"--labels {labels}: names no event in {', '.join(one.title for one in opened)}{table}")
         names = sorted({label for events in labelled for label in events})
+        _try_rules(rule, names, overwrite=overwrite)
         if recipe is None and "encoder.name" not in changes:
             recipe, why = recipes.chosen(recorded(opened[0]), names)
             update(f"recipe {recipe}, chosen for {why}")
@@ -144,19 +153,48 @@ def train(
             said = (f"{label}: {one}" for label, one in off.items())
             raise ProblemError("; ".join([str(error), *said])) from None
     result.made.readout.save(out, overwrite=overwrite)
+    result = replace(result, rules=_write_rules(result.scored.plain, rule, overwrite=overwrite))
     if report is not None:
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
         title, held_out = f"Training of {out}", () if result.why else result.scored.scores
         more: dict[str, Any] = {"held_out": held_out, "alignments": result.made.alignments, "scored": result.scored}
         write_listening(report, result.made.readout, outcomes, title=title, judged=result.how, **more)
-    page = result.page(out, recipe, report, _tares(examples) if tare is None else "")
-    typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else page)
+    tares = _tares(examples) if tare is None else ""
+    typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else result.page(out, recipe, report, tares))
+
+
+def _try_rules(place: Path | None, labels: Sequence[str], *, overwrite: bool) -> None:
+    """Check that plain rules can be written, before the work whose result they hold."""
+    from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
+
+    for one in () if place is None else (place, *(_of_label(place, label) for label in labels)):
+        try_whole(one, overwrite=overwrite)
+
+
+def _write_rules(plain: PlainScore | None, place: Path | None, *, overwrite: bool) -> dict[Path, list[str]]:
+    """Write the plain rules, one of kinds of touch once; return the files, and which labels each detects."""
+    if place is None or plain is None:
+        return {}
+    every = {label: rule for label, rule in plain.rules.items() if rule is not None}
+    rules = {rule.to_json(): rule for rule in every.values()}
+    written = {}
+    for rule in rules.values():
+        labels = [label for label in every if label in rule.labels and every[label] == rule]
+        path = place if len(rules) == 1 else _of_label(place, labels[0])
+        written[rule.save(path, overwrite=overwrite)] = labels
+    return written
+
+
+def _of_label(place: Path, label: str) -> Path:
+    """Return the file of the rule of one of several labels."""
+    return place.with_name(f"{place.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{place.suffix}")
 
 
 def _tares(examples: Sequence[Example]) -> str:
     """Return the line of which tares were taken from the recordings; of those whose rest is 0 by their unit nothing."""
     from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.rest import BY_UNIT  # noqa: PLC0415
     from taxel.spikes import SpikeTrains, to_ms  # noqa: PLC0415
 
     spans = []

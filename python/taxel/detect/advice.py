@@ -216,7 +216,10 @@ def _advice(
         return Advice(f"--array {size}", because)
     if chance and any(isinstance(one, Moments) for one in made.recipe.encoder._each()):
         return Advice(
-            "other kinds", f"{chance}: no input tells these kinds apart, or the labels are too few or mixed up"
+            "other kinds",
+            f"{chance}: the inputs of this recipe are moments of the picture, as area and load, the same wherever it "
+            "is touched; where kinds differ by place, --recipe gait_plate, whose inputs are the taxels, may tell them, "
+            "and taxel information says whether places do; or the labels are too few or mixed up",
         )
     if search_s is not None and 2 * learnt > wrong and points > 1:
         return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
@@ -259,9 +262,7 @@ def _by_rule(made: Trained, left: int, wrong: int) -> Advice:
     because = f"leaves {left} missed and false on the same labels, the neuron {wrong}"
     if _for_touch(made) and not any(isinstance(one, ContactArea) for one in made.recipe.encoder._each()):
         return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}")
-    return Advice(
-        "the plain rule", f"it {because}; taxel train --json prints its file (docs/howto.md), and taxel detect runs it"
-    )
+    return Advice("the plain rule", f"it {because}; taxel train --rule FILE writes it, and taxel detect runs it")
 
 
 def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:

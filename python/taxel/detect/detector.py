@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
 
 from taxel import _core
-from taxel._base.arguments import instance, number, shown, whole
+from taxel._base.arguments import instance, number, parameters, shown, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
@@ -19,6 +19,8 @@ from taxel.array import Array
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recorded import unit_of
+from taxel.recording.rest import FORCE_UNITS
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
@@ -47,6 +49,25 @@ class _Detector(ABC):
     @abstractmethod
     def labels(self) -> tuple[str, ...]:
         """The labels that it detects."""
+
+    @property
+    def unit(self) -> str | None:
+        """The unit of the values that it was trained on ("ticks" of a board's events), or None where any will do."""
+        unit = self._parts.get("unit")
+        return None if unit is None else str(unit)
+
+    def _check_unit(self, unit: str, what: str = "values") -> None:
+        """Refuse values in another unit than it was trained on, as its weights and thresholds are of that unit."""
+        if self.unit not in (None, unit):
+            how = ", as a calibration gives (Recording.calibrated)" if self.unit in FORCE_UNITS else ""
+            raise ProblemError(
+                f"{what} in {unit}, and the {self._WHAT} was trained on {self.unit}: must be in {self.unit}{how}, or "
+                f"train anew on recordings in {unit}"
+            )
+
+    def _with(self, **parts: Any) -> Self:
+        """Return it with other parts of its file."""
+        return self._from_text(parameters(self._parts | parts))
 
     @classmethod
     def _from_text(cls, text: str) -> Self:
@@ -193,7 +214,7 @@ class ReadoutStream:
         tare: Tare | None = None,
         wire_version: int = 1,
     ) -> None:
-        self._text = detector("readout", readout).to_json()
+        self._detector = detector("readout", readout)
         self._frame_us = number("frame_us", frame_us, "us")
         self._tare = tare_text(tare)
         self._version = whole("wire_version", wire_version, 1, 2)
@@ -205,7 +226,7 @@ class ReadoutStream:
     def _begin(self, array: Array) -> _core.ReadoutStream:
         if self._core is None:
             parts = instance("array", array, Array)._parts()
-            self._core = _core.ReadoutStream(self._text, parts, self._frame_us, self._version, self._tare)
+            self._core = _core.ReadoutStream(self._detector.to_json(), parts, self._frame_us, self._version, self._tare)
         return self._core
 
     def push(self, x: Events | Frames) -> Detections:
@@ -224,9 +245,11 @@ class ReadoutStream:
 
         Raises
         ------
-        ProblemError : neither, another array's, events without intensities where the encoder reads them, frames out of
-            order
+        ProblemError : neither, another array's, another unit than it was trained on, events without intensities where
+            the encoder reads them, frames out of order
         """
+        if isinstance(x, Events | Frames):
+            self._detector._check_unit(unit_of(x))
         if isinstance(x, Events):
             return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
         if isinstance(x, Frames):

@@ -20,10 +20,11 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
+from taxel.recorded import unit_of as recorded_unit
 from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
 
-__all__ = ["Example", "Outcome", "array_of", "called", "checked"]
+__all__ = ["Example", "Outcome", "array_of", "called", "checked", "unit_of"]
 
 
 class Example(NamedTuple):
@@ -151,3 +152,18 @@ def array_of(examples: Sequence[Example]) -> Array | None:
         # One line for all, as every second recording may be of the other foot.
         any(first._warn_apart(array, "examples", stacklevel=3) for array in arrays if array is not None)
     return first
+
+
+def unit_of(examples: Sequence[Example]) -> str | None:
+    """Return the unit that the values of all (checked) examples are in; None of spike trains, which do not state it.
+
+    Raises
+    ------
+    ProblemError : examples in different units (names two of them)
+    """
+    units = [None if isinstance(one.source, SpikeTrains) else recorded_unit(one.source) for one in examples]  # type: ignore[arg-type]
+    for k, unit in enumerate(units):
+        if unit != units[0]:
+            of = f"{called(k, examples[k])} is in {unit}, {called(0, examples[0])} in {units[0]}"
+            raise ProblemError(f"{of}: must be in one unit, as a readout learns values of one only")
+    return units[0]

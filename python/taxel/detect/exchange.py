@@ -50,6 +50,8 @@ class Parts:
         With one weight a train of the encoder, also where they receive some of its parts.
     array : Array, optional
     delays_ms : float64, shape (copies,), ms
+    unit : str, optional
+        Of the values that it was trained on.
     run_threshold : float
     time, after_spike : str
         As its neurons have them.
@@ -61,6 +63,7 @@ class Parts:
     neurons: Mapping[str, TrainedNeuron]
     array: Array | None
     delays_ms: Sequence[float] | NDArray[np.float64]
+    unit: str | None = None
     run_threshold: float = 1.0
     time: str = ""
     after_spike: str = ""
@@ -277,8 +280,8 @@ def _parts(
         one = Neuron(**{**rest.get_params(), **constants})
         delay_ms, inputs = (0.0, ()) if template is None else (template.delay_ms, template.inputs)
         trained[label] = TrainedNeuron(one, 1000.0 * row * factor, delay_ms, inputs)
-    array = None if own is None else own.array
-    return Parts(encoder, trained, array, delays_ms)
+    array, unit = (None, None) if own is None else (own.array, own.unit)
+    return Parts(encoder, trained, array, delays_ms, unit)
 
 
 def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], float]:

@@ -9,13 +9,10 @@ import numpy as np
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
+from taxel.recording.rest import SHARE, TIMES_NOISE
 
 __all__ = ["measured_floor"]
 
-#: Reading: so many standard deviations of the noise, so that two neighbours rarely exceed it together.
-_TIMES_NOISE = 6.0
-#: Noise and range are those that this share of the taxels has at most: of the others some may be bad.
-_SHARE = 0.9
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
 
@@ -40,6 +37,6 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
             continue
         above = np.fmax.reduce(source.values, axis=0, initial=-np.inf) - one.tare.rest
         known = np.isfinite(above) & np.isfinite(one.tare.noise)
-        noise, reach = (float(np.quantile(of[known], _SHARE)) for of in (one.tare.noise, above))
-        floors.append(max(_TIMES_NOISE * noise, _SHARE_OF_RANGE * reach))
+        noise, reach = (float(np.quantile(of[known], SHARE)) for of in (one.tare.noise, above))
+        floors.append(max(TIMES_NOISE * noise, _SHARE_OF_RANGE * reach))
     return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -18,7 +19,7 @@ from taxel._base.arguments import callback, finite, flag, instance, several, sho
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.detect.ages import in_pictures
-from taxel.detect.examples import Example, array_of, checked
+from taxel.detect.examples import Example, array_of, checked, unit_of
 from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, floor_of, plain_score
 from taxel.detect.readout import Readout, run
@@ -162,20 +163,21 @@ def judge(
     whole = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
     recipe = possible(whole, examples)
     patterns = Encoded(examples, recipe, report, search=search)
-    array = array_of(examples)
+    array, unit = array_of(examples), unit_of(examples)
     detections: dict[int, list[Detections]] = {}
     trained = []
     for n, fold in enumerate(ways):
         report(f"fold {n + 1} of {len(ways)}")
         plan = recipe
         if search:
-            inner = fold.inner or _split(examples, fold.train, INNER)
-            chosen = _chosen(examples, patterns.patterns, patterns.plan, inner, window, clocks, report)
+            inner = fold.inner or INNER
+            chosen = _chosen(examples, patterns.patterns, patterns.plan, inner, fold.train, window, clocks, report)
             plan = replace(recipe, neurons=chosen.neurons)
         with _quiet():
             parts_of = partial(_parts_of, fold.train)
             made = learn(patterns.part(parts_of), plan, array, report)
-        trained.append(made._replace(recipe=replace(whole, neurons=plan.neurons)._at(made.recipe.neurons)))
+        of_fold = replace(whole, neurons=plan.neurons)._at(made.recipe.neurons)
+        trained.append(made._replace(recipe=of_fold, readout=made.readout._with(unit=unit)))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, clocks))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
@@ -217,7 +219,8 @@ def choose(
     recipe : Recipe
         As in `judge`.
     k : int, 2 or more; or sequence of Fold
-        How many folds; of fewer recordings than that, as many as there are. Or the folds themselves.
+        How many folds; of fewer recordings than that, as many as there are, and of few events of a label as many as
+        these allow. Or the folds themselves.
     window_ms : float, ms
     frame_us : float, us, optional
     progress : function of a str, optional
@@ -231,6 +234,10 @@ def choose(
     ------
     ProblemError : as `judge`
 
+    Warns
+    -----
+    UserWarning : a label has too few events for two folds; its first point is taken
+
     Examples
     --------
     >>> from taxel.encode import LevelCrossing
@@ -241,15 +248,13 @@ def choose(
     {'contact': {'ub': 2.0}}
     """
     examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
+    unit_of(examples)
     recipe = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
     report = _reporting(progress)
-    if isinstance(k, int | np.integer):
-        k = whole("k", k, 2, 2**31)
-        recordings = len(_grouped(examples, [Part(n) for n in range(len(examples))]))
-        k = min(k, recordings) if recordings > 1 else k
-    ways, _ = _folds(examples, k)
+    parts = [Part(n) for n in range(len(examples))]
+    ways = whole("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
-    chosen = _chosen(examples, encoded(examples, narrowed, report), narrowed, ways, window, clocks, report)
+    chosen = _chosen(examples, encoded(examples, narrowed, report), narrowed, ways, parts, window, clocks, report)
     return replace(chosen, encoder=recipe.encoder)
 
 
@@ -257,20 +262,33 @@ def _chosen(
     examples: Sequence[Example],
     patterns: Sequence[Example],
     recipe: Recipe,
-    folds: Sequence[Fold],
+    folds: Sequence[Fold] | int,
+    parts: Sequence[Part],
     window: float,
     clocks: Sequence[Clock],
     report: Callable[[str], object],
 ) -> Recipe:
-    """Return the recipe with the best point of each neuron; `patterns` are the examples as spike trains."""
+    """Return the recipe with the best point of each neuron; `patterns` are the examples as spike trains.
+
+    The folds are given, or how many of `parts` are made for each label.
+    """
     best: dict[str, Mapping[str, Any]] = {}
     for label in recipe._labels(examples):
         points = recipe.points_of(label)
         choices = {key: value for key, value in recipe.neurons.get(label, {}).items() if key == "choose"}
         best[label] = points[0] | choices
-        if len(points) > 1:
+        if len(points) == 1:
+            continue
+        ways = _folds_for(label, examples, parts, folds) if isinstance(folds, int) else folds
+        if not ways:
+            warnings.warn(
+                f"{label}: too few events to choose its parameters on held-out data, as two folds need 4: the first of "
+                "the recipe's are taken",
+                stacklevel=4,
+            )
+        else:
             plans = [replace(recipe, neurons={label: point}) for point in points]
-            marks = _marks(_only(examples, label), _only(patterns, label), plans, label, folds, window, clocks, report)
+            marks = _marks(_only(examples, label), _only(patterns, label), plans, label, ways, window, clocks, report)
             best[label] = points[marks.index(min(marks))] | choices
     return replace(recipe, neurons=best)
 
@@ -300,7 +318,7 @@ def _marks(
         known: Known = {}
         for m in in_turn:
             plan = plans[m]
-            report(f"trying point {m + 1} of {len(plans)} for {label}, fold {n + 1} of {len(folds)}")
+            report(f"trying parameters {m + 1} of {len(plans)} for {label}, on part {n + 1} of {len(folds)}")
             if m in refused:
                 continue
             if rows is None or not rows.fits(plan):
@@ -491,6 +509,34 @@ def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> li
             [Part(part.example, *own[n]) for part, own in zip(group, stretches, strict=True) if n < len(own)]
             for n in range(max(map(len, stretches)))
         ]
+    return _dealt(groups, count)
+
+
+def _folds_for(label: str, examples: Sequence[Example], parts: Sequence[Part], count: int) -> list[Fold]:
+    """Return folds of parts in which the point of a label's neuron is chosen: each has events of it to train on.
+
+    Those of all labels alike where they do; else folds by its own events, to test as well; none where it has too few.
+    """
+    with contextlib.suppress(ProblemError):
+        folds = _split(examples, parts, count)
+        if not any(_lacks(examples, fold.train, [label]) for fold in folds):
+            return folds
+    own = _only(examples, label)
+    groups = _grouped(examples, parts)
+    events = [sum(len(_only_inside(own[part.example], part)) for part in group) for group in groups]
+    having = [group for group, count_of in zip(groups, events, strict=True) if count_of]
+    others = [group for group, count_of in zip(groups, events, strict=True) if not count_of]
+    if len(having) > 1:
+        return _dealt([*having, *others], min(count, len(having)))
+    if sum(events) < 4:
+        return []
+    silent = [part for group in others for part in group]
+    folds = _split(own, having[0], min(count, sum(events) // 2))
+    return [Fold([*fold.train, *silent], fold.test) for fold in folds]
+
+
+def _dealt(groups: Sequence[Sequence[Part]], count: int) -> list[Fold]:
+    """Return folds that test each group of parts once."""
     count = min(count, len(groups))
     return [
         Fold(

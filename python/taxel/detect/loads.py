@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel.detect.detector import tare_text
-from taxel.detect.examples import Example
+from taxel.detect.examples import Example, unit_of
 from taxel.detect.scoring import APART_US
 from taxel.frames import Frames
 from taxel.recording import Recording
@@ -61,7 +61,7 @@ class Loads:
         report: Callable[[str], object],
         quantities: Sequence[str] = ("area", "total", "local_load"),
     ) -> None:
-        self.noise_floor = noise_floor
+        self.noise_floor, self.unit = noise_floor, unit_of(examples)
         self.names = sorted({name for one in examples for name in one.labels})
         self._labels = [{name: np.sort(times) for name, times in one.labels.items()} for one in examples]
         self.every: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
@@ -74,7 +74,7 @@ class Loads:
         for quantity in quantities:
             if quantity == "local_load" and lacks_noise(examples):
                 continue
-            report(f"plain rules by {quantity.replace('_', ' ')}")
+            report(f"measuring the {quantity.replace('_', ' ')} for plain rules")
             self._curves[quantity] = [
                 _curve(quantity, noise_floor, one, *clock) for one, clock in zip(examples, clocks, strict=True)
             ]

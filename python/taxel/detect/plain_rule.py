@@ -48,6 +48,8 @@ class PlainRule(_Detector):
         below it. None: those are not reported.
     noise_floor : float, 0 or more, in the sensor's unit (ticks)
         The board's: a taxel is loaded above its rest by more than this and half a tick, or half of a floor below 1.
+    unit : str, optional
+        The unit of the values that it was tuned on ("ticks" of a board's events); it then accepts no other.
     tare : Tare, optional
         The taxels' rest. It belongs to a board and a day and may be given later.
 
@@ -89,6 +91,7 @@ class PlainRule(_Detector):
         *,
         labels: Sequence[str | None] | None = None,
         noise_floor: float = 3.0,
+        unit: str | None = None,
         tare: Tare | None = None,
     ) -> None:
         age = None if age_ms is None else number("age_ms", age_ms, "ms")
@@ -103,6 +106,7 @@ class PlainRule(_Detector):
                         "age_ms": age,
                         "labels": _labels(labels, age),
                         "noise_floor": number("noise_floor", noise_floor),
+                        "unit": None if unit is None else text("unit", unit),
                     }
                     | ({} if tare is None else {"tare": json.loads(instance("tare", tare, Tare).to_json())})
                 )

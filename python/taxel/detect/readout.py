@@ -22,7 +22,7 @@ from taxel.encode import Composite, Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.neuron import Neuron
-from taxel.recorded import recorded
+from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
 from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
@@ -54,6 +54,8 @@ class Readout(_Detector):
     array : Array, optional
         The sensor that it was trained on; it then accepts no other. Left out, any will do that gives as many
         trains.
+    unit : str, optional
+        The unit of the values that it was trained on ("ticks" of a board's events); it then accepts no other.
     delay_ms : float, or mapping of str to float, ms, 0 or more
         How much later than the event the neurons were trained to fire, the encoder's latency apart: target = event +
         latency + delay. A detection's `t` takes both off again.
@@ -96,6 +98,7 @@ class Readout(_Detector):
         neurons: Mapping[str, Learner | TrainedNeuron | tuple[Any, ...]],
         *,
         array: Array | None = None,
+        unit: str | None = None,
         delay_ms: float | Mapping[str, float] = 0.0,
         run_threshold: float = 1.0,
         delays_ms: ArrayLike = (0.0,),
@@ -117,6 +120,7 @@ class Readout(_Detector):
                 {
                     "encoder": json.loads(encoder.to_json()),
                     "array": None if array is None else instance("array", array, Array)._geometry(),
+                    "unit": None if unit is None else text("unit", unit),
                     "time": first.time,
                     "after_spike": first.after_spike,
                     "run_threshold": number("run_threshold", run_threshold),
@@ -233,10 +237,6 @@ class Readout(_Detector):
         """The delays at each of which every train is an input, ms."""
         return np.array(self._parts.get("delays_ms", [0.0]), np.float64)
 
-    def _with_seen(self, seen: Mapping[str, Mapping[str, Any]]) -> Readout:
-        """Return the readout with the range of each neuron's inputs in its training data."""
-        return Readout._from_text(_core.check_readout(parameters(self._parts | {"seen": dict(seen)})))
-
     def to_nir(
         self, path: str | os.PathLike[str], *, spike_ms: float | None = None, overwrite: bool = False
     ) -> list[str]:
@@ -272,8 +272,8 @@ class Readout(_Detector):
         """Return the parts that the exchange format is made of; weights of trains that a neuron lacks are 0."""
         neurons = {label: one._replace(weights=self._spread(one)) for label, one in self.neurons.items()}
         return Parts(
-            self.encoder, neurons, self.array, self.delays_ms, self.run_threshold, self.time, self.after_spike,
-            self.to_json(),
+            self.encoder, neurons, self.array, self.delays_ms, self.unit, self.run_threshold, self.time,
+            self.after_spike, self.to_json(),
         )  # fmt: skip
 
     def _spread(self, one: TrainedNeuron) -> NDArray[np.float64]:
@@ -327,7 +327,7 @@ class Readout(_Detector):
             if parts.text:
                 return cls.from_json(parts.text)
             neurons = {label: _gathered(parts, one) for label, one in parts.neurons.items()}
-            return cls(parts.encoder, neurons, array=parts.array, delays_ms=parts.delays_ms)
+            return cls(parts.encoder, neurons, array=parts.array, unit=parts.unit, delays_ms=parts.delays_ms)
 
         return read_nir(
             path,
@@ -382,8 +382,8 @@ def run(
 
     Raises
     ------
-    ProblemError : another array than the readout was trained on, a tare that is missing, events without intensities
-        where the encoder reads them
+    ProblemError : another array or unit than the readout was trained on, a tare that is missing, events without
+        intensities where the encoder reads them
 
     Examples
     --------
@@ -426,6 +426,7 @@ def run_counting(
             raise ProblemError(f"source is {shown(source)}: a plain rule reads a recording, events or frames")
         return _run_spikes(readout, source), None
     if isinstance(source, Events | Frames):
+        readout._check_unit(unit_of(source))
         for own in (readout.array, None if tare is None else tare.array):
             if own is not None:
                 own._warn_apart(source.array, "the recording")

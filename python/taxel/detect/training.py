@@ -20,7 +20,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_pictures, later_us, silent_windows
 from taxel.detect.alignment import Alignment, align, aligned_to
-from taxel.detect.examples import Example, array_of, called, checked
+from taxel.detect.examples import Example, array_of, called, checked, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, follow, only, silence
 from taxel.detect.loads import clock_of, lacks_noise
 from taxel.detect.readout import SILENCE_MS, Readout
@@ -127,8 +127,9 @@ def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str
     report = (lambda _: None) if progress is None else callback("progress", progress)
     recipe = in_pictures(instance("recipe", recipe, Recipe), sound, clocks)
     possibly = possible(recipe, sound)
+    unit = unit_of(sound)
     made = learn(Encoded(sound, possibly, report), possibly, array_of(sound), report)
-    return made._replace(recipe=recipe._at(made.recipe.neurons))
+    return made._replace(recipe=recipe._at(made.recipe.neurons), readout=made.readout._with(unit=unit))
 
 
 def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
@@ -220,7 +221,7 @@ def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Callab
         if fitting.alignment is not None:
             alignments[label] = fitting.alignment
     made = replace(recipe, neurons=points) if recipe.neurons else recipe
-    return Trained(made, learners, readout_of(learners, delays, made, array)._with_seen(ranges), alignments)
+    return Trained(made, learners, readout_of(learners, delays, made, array)._with(seen=ranges), alignments)
 
 
 class _Fit(NamedTuple):
@@ -443,7 +444,7 @@ class Fitting:
                 cone,
                 start=self._before,
                 progress=lambda n, _rows, _objective, gap: self._report(
-                    f"{self._what}, round {n}: within {gap:.1e} of the least"
+                    f"{self._what}, round {n}: weights at most {gap:.2%} from the best"
                 ),
             )
         begins = [_begin_ms(source) for source in self._sources]

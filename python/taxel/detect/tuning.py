@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +132,7 @@ def best_rules(
     kinds = onsets if len(onsets) == 2 else list(names) if len(names) == 2 else []
     if kinds:
         touches = {age: loads.at_age(age).between(windows) for age in loads.ages_ms(AGES_MS)}
-        found = _for_kinds(touches, kinds, truth, width_us, loads.noise_floor)
+        found = _for_kinds(touches, kinds, truth, width_us, loads.noise_floor, loads.unit)
         if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
             single |= dict(zip(kinds, found, strict=True))
     return {name: one.rule if one.fit.wrong < len(truth[name]) else None for name, one in single.items()}
@@ -170,7 +170,8 @@ def _at_edges(
 
     def rule(name: str, edge: int) -> _Best:
         labels = [name, None] if edge == 0 else [None, name]
-        return _Best(fits[name][edge], PlainRule(*points[name][edge], labels=labels, noise_floor=loads.noise_floor))
+        how: dict[str, Any] = {"labels": labels, "noise_floor": loads.noise_floor, "unit": loads.unit}
+        return _Best(fits[name][edge], PlainRule(*points[name][edge], **how))
 
     return {name: (rule(name, 0), rule(name, 1)) for name in truth}
 
@@ -198,6 +199,7 @@ def _for_kinds(
     truth: Mapping[str, NDArray[np.int64]],
     width_us: int,
     floor: float,
+    unit: str | None,
 ) -> list[_Best] | None:
     """Return the best rule that decides between two kinds by the area at an age, once for each; None without any."""
     every = np.concatenate([truth[name] for name in kinds])
@@ -216,7 +218,7 @@ def _for_kinds(
         fits = {}
         for name, mine in ((below, areas < threshold), (above, areas >= threshold)):
             fits[name] = _fit(Found(t[mine], known[mine], areas[mine]), truth[name], width_us)
-        rule = PlainRule("area", threshold, age_ms=age, labels=(below, above), noise_floor=floor)
+        rule = PlainRule("area", threshold, age_ms=age, labels=(below, above), noise_floor=floor, unit=unit)
         best = [_Best(fit, rule) for name in kinds if (fit := fits[name]) is not None]
         rank = (sum(one.fit.wrong for one in best), max(one.fit.delay_ms for one in best))
         if chosen is None or rank < chosen[0]:

@@ -307,10 +307,7 @@ def _rows(place: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[
     table.has([name for name in _COLUMNS if name not in only])
     rows = []
     for line, cells in table:
-        if cells.get("", "").strip():
-            stray = shown(cells[""])
-            raise FormatError(f"{place}, line {line}: {stray} stands in a column without a name; give it one")
-        rows.append((line, only | {name: cell.strip() for name, cell in cells.items() if name}))
+        rows.append((line, only | {name: cell.strip() for name, cell in cells.items()}))
     if not rows:
         raise FormatError(f"{place}: names no trial")
     return rows

@@ -26,6 +26,7 @@ from taxel.array import Array
 from taxel.detect import load, run
 from taxel.detections import Detection
 from taxel.device import Cable
+from taxel.frames import Frames
 from taxel.labels import Labels, write_labels
 from taxel.live._shown_files import Opening, ReadPictures, ShownFiles
 from taxel.recorded import recorded
@@ -35,6 +36,7 @@ from taxel.recording.cut import cut
 from taxel.recording.health import TaxelStatistics, Touches, judged
 from taxel.recording.lain import without_what_lay
 from taxel.recording.opening import sensors
+from taxel.recording.rest import by_unit
 from taxel.tare import Tare
 from taxel.wire import Command
 
@@ -91,8 +93,10 @@ def _reasons() -> Iterator[None]:
 
 
 def _rest(recording: Recording) -> Tare:
-    """Return the taxels' rest: before the first label and the start marker, or at the recording's beginning."""
+    """Return the taxels' rest: 0 by the unit, or before the first label and the start marker, or at the beginning."""
     source = recorded(recording)
+    if isinstance(source, Frames) and (rest := by_unit(source)) is not None:
+        return rest
     first = int(source.t[0]) if len(source) else 0
     ends = [note.t - _BEFORE_US for note in recording.notes if note.t is not None]
     ends += [t for t, start in getattr(source, "markers", ()) if start]

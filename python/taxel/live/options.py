@@ -96,7 +96,7 @@ class LiveOptions:
             self.readout, self.remote, self.array, self.registers, self.differences,
         )  # fmt: skip
         if readout is not None:
-            detector("readout", readout)
+            detector("readout", readout)._check_unit("ticks", "live values")
         if remote is not None:
             instance("remote", remote, Remote)
             array = remote.array if array is None else array

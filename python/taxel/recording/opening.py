@@ -246,7 +246,10 @@ def _folder(folder: Path, how: How) -> list[Recording]:
             problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
             deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
             hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
-            there = f"there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}"
+            there = (
+                f"there are {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
+                "layout file .npy, .txt and other arrays and tables (docs/files.md)"
+            )
             raise FormatError(f"{folder}: holds {problem}; {hint or there}")
         trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
         pairs = [(Path(trial.name), _of(trial, folder, names[0], how.layout)) for trial in trials]

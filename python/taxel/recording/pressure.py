@@ -20,7 +20,17 @@ from taxel.frames import Frames
 from taxel.recording.contents import UNKNOWN, Contents
 from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
-from taxel.recording.rest import Picture, Rest, flickering, found, loaded_above, of_pictures, ticks_by_unit, tracked
+from taxel.recording.rest import (
+    Picture,
+    Rest,
+    flickering,
+    found,
+    loaded_above,
+    noise_above,
+    of_pictures,
+    ticks_by_unit,
+    tracked,
+)
 from taxel.tare import Tare
 
 __all__ = ["Series", "above_rest", "above_rest_at", "readings", "series"]
@@ -91,8 +101,9 @@ class Series:
             return np.concatenate([of(block) for block in blocks])
 
         def loaded_sum(block: Frames) -> NDArray[np.float64]:
-            # Where no noise is cut off, values below 0 cancel that above.
-            values = np.where(block._loaded(above), block.values, 0.0) if above > 0 else block.values
+            # Where no noise is cut off, values below 0 cancel that above; a sum of forces is that of all taxels.
+            cut = above > 0 and rest.source != "unit"
+            values = np.where(block._loaded(above), block.values, 0.0) if cut else block.values
             return np.asarray(values.sum(axis=(1, 2), dtype=np.float64))
 
         in_mm2 = array.area_mm2 is not None
@@ -370,7 +381,7 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
     (`taxel.encode.LocalLoad`); else it is not known: events are then above each taxel's first value, and pictures as
     they are. A taxel is loaded if it is above its rest by more than the noise floor of the board's fast presets and
     half a tick, as in `taxel.encode.ContactArea`; in another unit the range of a recording's values counts as 150
-    ticks.
+    ticks; in one of force or pressure by more than six times the noise of a quiet stretch, or than 0 without one.
     """
     read = _read(recording, tare)
     if read is None:
@@ -383,7 +394,7 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
         drawn = _Drawn.of(recording)
         shown = drawn.pictures(replace(rest, values=rest.values.reshape(-1)[drawn.taxels]), frames.array)
     elif rest.source in ("unit", "none"):
-        return frames, 0.0, rest
+        return frames, floor, rest
     else:
         pictures = [(frames.t, frames.values.reshape(len(frames), frames.array.rows * frames.array.columns))]
         [(_, shown)] = _above(rest, pictures, frames.array.columns, ticks_by_unit(frames))
@@ -425,6 +436,8 @@ def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float]
     if not recording.has_events:
         frames = recording.frames()
         rest = _rest_of_pictures(recording, frames, tare)
+        if rest.source == "unit":
+            return frames, rest, noise_above(frames)
         return frames, rest, loaded_above(ticks_by_unit(frames)) if rest.source == "quiet" else 0.0
     events = recording.events
     if events.present is None or not events.present.any():

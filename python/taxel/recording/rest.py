@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,14 +14,20 @@ from taxel import _core
 from taxel._base.times import beginning_us
 from taxel.formats.layout import or_given
 from taxel.frames import Frames
+from taxel.tare import Tare
 
 __all__ = [
+    "BY_UNIT",
     "FORCE_UNITS",
+    "SHARE",
+    "TIMES_NOISE",
     "Picture",
     "Rest",
+    "by_unit",
     "flickering",
     "found",
     "loaded_above",
+    "noise_above",
     "of_pictures",
     "of_quiet",
     "ticks_by_unit",
@@ -29,6 +36,11 @@ __all__ = [
 
 #: Units of force and pressure: an unloaded taxel reads 0 in them.
 FORCE_UNITS = ("N", "mN", "kPa", "Pa", "N/cm2")
+#: The note of a tare that was not measured.
+BY_UNIT = "0, by the unit"
+#: Reading: a noise floor is so many standard deviations of the noise, so that two neighbours rarely exceed it together,
+#: and its noise is what this share of the taxels has at most: of the others some may be bad.
+TIMES_NOISE, SHARE = 6.0, 0.9
 #: Reading: the noise floor of the board's fast presets, ticks ...
 NOISE_FLOOR = 3.0
 #: ... in another unit, the range of a recording's values counts as so many ticks.
@@ -118,6 +130,29 @@ class Rest:
 def loaded_above(scale: float) -> float:
     """Return from how much above rest a taxel counts as loaded, in the sensor's unit."""
     return float(_core.touched_above(NOISE_FLOOR)) / scale
+
+
+def by_unit(frames: Frames) -> Tare | None:
+    """Return the tare of pictures in a unit of force or pressure: 0, with the noise of a quiet stretch; None of others.
+
+    The noise of a taxel is 1.4826 times the median distance from the median of what it reads there, the standard
+    deviation of normal noise, as a stretch may hold the begin of a press; 0 where none is quiet.
+    """
+    if frames.unit not in FORCE_UNITS or not len(frames):
+        return None
+    quiet = of_quiet(frames).quiet_us
+    still = np.zeros((1, *frames.array.shape)) if quiet is None else frames.between(*quiet).values
+    middle: NDArray[np.float64] = np.asarray(np.nanmedian(still, axis=0), np.float64)
+    noise = 1.4826 * np.asarray(np.nanmedian(np.abs(still - middle), axis=0), np.float64)
+    nothing = Frames(np.zeros((2, *frames.array.shape)), [0, 1], unit=frames.unit, array=frames.array)
+    made = json.loads(Tare.take(nothing, note=BY_UNIT).to_json())
+    return Tare.from_json(json.dumps(made | {"noise": np.nan_to_num(noise).reshape(-1).tolist()}))
+
+
+def noise_above(frames: Frames) -> float:
+    """Return from how much on a value of force or pressure is no noise: 0 where no quiet stretch shows any."""
+    tare = by_unit(frames)
+    return 0.0 if tare is None else TIMES_NOISE * float(np.quantile(tare.noise, SHARE))
 
 
 def ticks_by_unit(frames: Frames) -> float:

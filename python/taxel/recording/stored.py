@@ -76,7 +76,9 @@ def _csv(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
     """Return the contents of a .csv: events without markers, or pictures without their unit."""
     place = common["path"]
     table, events, frames = of.table, None, None
-    lost = [sensor(of.array)]
+    own = array_in_csv(table)
+    same = of.array._geometry() | {"name": own.name} == own._geometry()
+    lost = [f'the name of the sensor ("{of.array.name}")' if same else sensor(of.array)]
     if isinstance(table, Events):
         lost += [f"{counted(len(table.markers), 'marker')} of start and stop"] * bool(table.markers)
         events = table[:]

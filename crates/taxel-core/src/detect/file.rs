@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{Error, Result, reading};
+use crate::{Error, Result, problem, reading};
 
 /// The version of each format that is written; there is no other so far.
 const VERSION: u64 = 1;
@@ -31,6 +31,18 @@ pub(super) fn parts(what: &str, text: &str, formats: &[&'static str]) -> Result<
         Some(version) if version.as_u64() == Some(VERSION) => Ok((name, value)),
         Some(version) => Err(format(format!("version {version}, this taxel reads version {VERSION} only"))),
         None => Err(format(format!("says no version, must be {VERSION}"))),
+    }
+}
+
+/// Checks the unit of the values that a readout was trained on, or a rule was tuned on.
+///
+/// # Errors
+///
+/// `Problem` if it has no name.
+pub(super) fn check_unit(unit: Option<&str>) -> Result<()> {
+    match unit {
+        Some(name) if name.trim().is_empty() => Err(problem!("unit is empty: must be a name, or left out")),
+        _ => Ok(()),
     }
 }
 

@@ -50,6 +50,9 @@ pub struct PlainRule {
     /// The board's noise floor, 0 or more, in the sensor's unit (ticks); default 3, that of the fast presets.
     #[serde(default = "usual_floor")]
     pub noise_floor: f64,
+    /// The unit of the values on which it was tuned, as of a readout.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
     /// The taxels' rest. It is valid for one board on one day: a saved rule has none and receives one when it is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
@@ -99,6 +102,7 @@ impl PlainRule {
         if !(self.noise_floor >= 0.0 && self.noise_floor.is_finite()) {
             return Err(problem!("noise_floor is {}: must be 0 or more, and finite", self.noise_floor));
         }
+        file::check_unit(self.unit.as_deref())?;
         match &self.labels {
             [None, None] => return Err(problem!("labels are both left out: give one or both")),
             [first, second] if first == second => {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::allowed::above_0;
 use crate::detect::stream::{Inputs, NamedNeuron, Neurons, Ranges};
-use crate::detect::{FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
+use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
@@ -27,6 +27,10 @@ pub struct Readout {
     /// The sensor; `None` admits every array with the right number of trains.
     #[serde(default)]
     pub array: Option<Array>,
+    /// The unit of the values on which it was trained, "ticks" of a board's; `None` if it is not known. It is compared
+    /// where values have a unit: those of a stream have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
     /// Grid or continuous time, as in training; neurons with another setting are refused.
     pub time: Time,
     /// The effect of a spike on earlier inputs, as in training; neurons with another setting are refused.
@@ -72,6 +76,7 @@ impl Readout {
     /// `Problem`, naming the part.
     pub fn check(&self) -> Result<()> {
         self.encoder.check()?;
+        detect::file::check_unit(self.unit.as_deref())?;
         above_0("run_threshold", self.run_threshold, "")?;
         self.check_delays()?;
         if self.neurons.is_empty() {

@@ -155,6 +155,7 @@ mod tests {
         let readout = Readout {
             encoder: Encoder::from_json(r#"{"name": "change_events"}"#).unwrap(),
             array: None,
+            unit: None,
             time: Time::Continuous,
             after_spike: one.neuron.after_spike,
             run_threshold: 1.0,

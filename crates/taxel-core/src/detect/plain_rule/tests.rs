@@ -12,6 +12,7 @@ fn rule() -> PlainRule {
         age_ms: None,
         labels: [Some("contact".to_owned()), None],
         noise_floor: 0.0,
+        unit: Some("kPa".to_owned()),
         tare: None,
     }
 }

@@ -21,6 +21,7 @@ fn readout() -> Readout {
     Readout {
         encoder: Encoder::ContactArea(ContactArea::default()),
         array: Some(Array::thesis()),
+        unit: Some("ticks".to_owned()),
         time: Time::Grid,
         after_spike: AfterSpike::Keep,
         run_threshold: 0.9,
