@@ -552,14 +552,23 @@ impl Verdict {
             pieces.push(format!("{before}{}", verdict.text));
         }
         verdict.text = pieces.join("; ");
-        if let Some(after) = decoded.doubtful_after_us {
-            verdict.status = verdict.status.max(Status::Damaged);
-            for (cause, n) in decoded.damage.iter().filter(|(cause, n)| [JUMPS, BACK].contains(&&***cause) && **n > 0) {
+        if decoded.doubtful_after_us.is_some() {
+            for (cause, n) in
+                decoded.damage.iter().filter(|(cause, n)| [JUMPS, BACK, DRIFTS].contains(&&***cause) && **n > 0)
+            {
                 verdict.damaged.entry(cause.clone()).or_insert(*n);
             }
-            verdict.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain([after]).min());
         }
-        verdict
+        verdict.doubtful(decoded.doubtful_after_us)
+    }
+
+    /// The verdict where times after this one are doubtful too, if any, us.
+    pub(crate) fn doubtful(mut self, after: Option<i64>) -> Self {
+        if after.is_some() {
+            self.status = self.status.max(Status::Damaged);
+            self.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain(after).min());
+        }
+        self
     }
 
     /// The verdict on raw bytes.
@@ -728,10 +737,12 @@ pub(super) const REPEATED: &str = "datagrams_repeated";
 const AGAIN: &str = "datagrams_decoded_again";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
-/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, and stamps that step back.
+/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step back,
+/// and how often the clock left that of arrival little by little.
 pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
 pub(super) const ANEW: &str = "clock_began_anew";
 pub(super) const BACK: &str = "stamps_out_of_order";
+pub(super) const DRIFTS: &str = "drifts_from_arrival";
 /// Datagrams of version 1 without bytes.
 pub(crate) const EMPTY: &str = "empty_datagrams";
 /// How often the sender had another address than before, as a board that got another one has, or another board.
