@@ -112,6 +112,15 @@ pub struct Counts {
     /// Whether datagrams came several a message (`UDP_GRO`), so that the kernel may have dropped several at once.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub several_a_message: bool,
+    /// Of a file without its end: datagrams or lines whose arrival numbers it lacks, but for those dropped by the queue.
+    #[serde(skip)]
+    pub left_out: u64,
+    /// Arrival number of the first datagram or line recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first: Option<u64>,
+    /// Number of the other messages recorded, by channel.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub messages: BTreeMap<Topic, u64>,
     /// What the decoder could not use of the bytes received, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
     /// What was lost between the computer that received the datagrams and this one, if they are different.
@@ -202,6 +211,8 @@ pub struct Condition {
     pub messages: u64,
     /// Arrival numbers that the file lacks between its first and last datagram.
     pub skipped_numbers: u64,
+    /// Those that it lacks before its first one, since the recording began.
+    pub before_first: u64,
     /// The last counts before the end.
     pub so_far: Option<Counts>,
     /// The verdict of the recording that this one was converted from, as the header states it.
@@ -341,6 +352,7 @@ impl Verdict {
         let dropped = [
             (counts.dropped_by_kernel, "dropped_by_kernel", "messages dropped by the kernel"),
             (counts.dropped_by_queue, "dropped_by_queue", "datagrams dropped by taxel's queue"),
+            (counts.left_out, LEFT_OUT, "messages dropped by taxel's queue or left out of the file"),
             (
                 counts.received.saturating_sub(counts.dropped_by_queue + counts.recorded),
                 "not_recorded",
@@ -435,7 +447,7 @@ impl Verdict {
     /// The verdict on a source of a file.
     fn of_file(condition: Condition) -> Self {
         let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { repeated, so_far, converted, decoded, lines, origin_us, .. } = condition;
+        let Condition { before_first, repeated, so_far, converted, decoded, lines, origin_us, .. } = condition;
         let is_converted = converted.is_some();
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
         let mut decoded = decoded.unwrap_or_default();
@@ -461,8 +473,8 @@ impl Verdict {
                 // decoding finds faults that never came.
                 let counts = counts.unwrap_or_else(|| Counts { recorded: messages, ..Counts::default() });
                 let found = if skipped { Found::default() } else { decoded.clone() };
-                let dropped = if skipped { 0 } else { skipped_numbers };
-                (Self::of_counts(&so_far_with(counts, found, dropped), nothing_lost), Some(why))
+                let (inner, before) = if skipped { (0, 0) } else { (skipped_numbers, before_first) };
+                (Self::of_counts(&so_far_with(counts, found, inner, before), nothing_lost), Some(why))
             }
         };
         let came_short = !verdict.lost.is_empty();
@@ -470,7 +482,7 @@ impl Verdict {
             // Numbers that the file skips, and that were not dropped before, or lost in the file that it was converted from.
             let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
             let datagrams = lost.entry(Topic::Datagrams).or_default();
-            *datagrams = skipped_numbers.saturating_sub(before).max(*datagrams);
+            *datagrams = (skipped_numbers + before_first).saturating_sub(before).max(*datagrams);
         }
         if verdict.damaged.contains_key(JUMPED_BEFORE) && !is_converted {
             decoded.doubtful_after_us = Some(origin_us - 1);
@@ -687,19 +699,20 @@ impl Verdict {
     }
 }
 
-/// The last counts of an unfinished recording, with what decoding found since; the arrival numbers that the file skips
-/// were dropped by the queue.
-fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64) -> Counts {
+/// The last counts of an unfinished recording, with what decoding found since. The arrival numbers that the file skips, and
+/// those before its first, were dropped by the queue, or another program left their datagrams out.
+fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64, before_first: u64) -> Counts {
     // If more was received than the file holds, the difference is in its unfinished end.
     counts.received = 0;
-    counts.dropped_by_queue = counts.dropped_by_queue.max(skipped_numbers);
+    counts.left_out = (skipped_numbers + before_first).saturating_sub(counts.dropped_by_queue);
     for (cause, n) in found.damage {
         let known = counts.decoder.entry(cause).or_default();
         *known = n.max(*known);
     }
     // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
     // among the board's numbers too.
-    let missing = found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue);
+    let missing =
+        found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue + counts.left_out);
     let knows = counts.missing.is_some() && !found.unnumbered;
     counts.missing = missing.or(counts.missing).filter(|n| knows || *n > 0);
     counts
@@ -726,6 +739,8 @@ fn numbered(n: u64, plural: &str) -> String {
 
 /// Of a recording that began while its board was received: the jumps of time before it, since which all times are doubtful.
 pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
+/// Of a file without its end: what it lacks by its arrival numbers.
+const LEFT_OUT: &str = "dropped_or_left_out";
 /// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
 pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
 pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
