@@ -58,6 +58,8 @@ pub struct Verdict {
     pub noted: BTreeMap<String, u64>,
     /// The board's time after which times are doubtful, us.
     pub doubtful_after_us: Option<i64>,
+    /// Of a stretch of a recording the name of the whole, whose losses these are: several stretches have them once.
+    pub stretch_of: Option<String>,
     /// The verdicts of the recordings or sources that this one is made of, by name.
     pub parts: Vec<(String, Verdict)>,
 }
@@ -83,6 +85,8 @@ struct Whole {
     #[serde(default)]
     doubtful_after_us: Option<i64>,
     #[serde(default)]
+    stretch_of: Option<String>,
+    #[serde(default)]
     parts: Vec<(String, Verdict)>,
 }
 
@@ -90,8 +94,8 @@ impl From<Stored> for Verdict {
     fn from(stored: Stored) -> Self {
         match stored {
             Stored::Line(line) => Self::of_line(&line),
-            Stored::Whole(Whole { status, text, lost, damaged, noted, doubtful_after_us, parts }) => {
-                Self { status, text, lost, damaged, noted, doubtful_after_us, parts }
+            Stored::Whole(Whole { status, text, lost, damaged, noted, doubtful_after_us, stretch_of, parts }) => {
+                Self { status, text, lost, damaged, noted, doubtful_after_us, stretch_of, parts }
             }
         }
     }
@@ -185,6 +189,8 @@ pub enum Basis {
     Together(Vec<(String, Verdict)>),
     /// The sources of one file.
     Sources(Vec<(String, Verdict)>),
+    /// Stretches of one recording.
+    Stretches(Vec<(String, Verdict)>),
     /// The recording with this verdict, of which all times are later by so many us.
     Later(i64, Verdict),
     /// The line that an earlier version wrote.
@@ -327,6 +333,7 @@ impl Verdict {
             }
             Basis::Together(parts) => Self::together(parts),
             Basis::Sources(parts) => Self::of_sources(parts),
+            Basis::Stretches(parts) => Self::of_stretches(parts),
             Basis::Later(us, verdict) => verdict.later(us),
             Basis::Line(line) => Self::of_line(&line),
         }
@@ -606,6 +613,20 @@ impl Verdict {
     /// As [`Self::together`], of the sources of one file, whose damage each of them has: it counts once.
     fn of_sources(parts: Vec<(String, Self)>) -> Self {
         Self::joined(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
+    }
+
+    /// As [`Self::together`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
+    fn of_stretches(parts: Vec<(String, Self)>) -> Self {
+        let mut whole = Self::together(parts.clone());
+        let all = parts.iter().map(|(_, part)| [&part.lost, &part.damaged, &part.noted]);
+        for (k, sums) in [&mut whole.lost, &mut whole.damaged, &mut whole.noted].into_iter().enumerate() {
+            for (cause, sum) in sums {
+                let least = all.clone().map(|numbers| numbers[k].get(cause).copied().unwrap_or(0)).min();
+                *sum -= least.unwrap_or(0) * (parts.len() as u64).saturating_sub(1);
+            }
+        }
+        whole.stretch_of = parts.into_iter().find_map(|(_, part)| part.stretch_of);
+        whole
     }
 
     fn joined(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
