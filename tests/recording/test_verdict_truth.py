@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import socket
@@ -775,6 +776,8 @@ def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     assert verdict == "nothing lost but for what resets hide; 2 resets of the board"
     assert verdict.status == "complete after arrival"
     assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"
+    lost = Verdict._of({"counts": counts | {"missing": 3}})
+    assert lost == "LOST: 3 datagrams lost or damaged on the way, and what resets hide; 2 resets of the board"
 
 
 def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -> None:
@@ -789,6 +792,44 @@ def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -
     assert recording.verdict.damaged == {"datagrams_of_another_board": 7, "datagrams_damaged": 1}
     assert "7 datagrams of another board" in recording.verdict
     assert len(recording.events) == 3 * 4096
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_second_board_with_the_numbers_of_the_first_is_told(seed: int, tmp_path: Path) -> None:
+    """Two emulated boards have one session: what came under a number that another datagram has is left out."""
+    draw = np.random.default_rng(seed)
+    boards = [Board(Registers(wire_version=2), version_2=Version2(states_us=0)) for _ in range(2)]
+    sent: list[tuple[int, bytes]] = []
+    for k, board in enumerate(boards):
+        held = np.full(4096, 20, np.uint16)
+        for _ in range(30):
+            held[draw.integers(0, 4096, 20)] ^= 64 + k
+            sent += [(k, one) for one in board.frame(held)]
+    # In turn, with pauses, one behind the other: of each board in its own order.
+    which = draw.permutation([k for k, _ in sent])
+    left = [iter([one for k, one in sent if k == board]) for board in range(2)]
+    came = [next(left[k]) for k in which]
+    came = [bytes(bytearray(one)) for one in came for _ in range(1 + (draw.random() < 0.1))]
+    first: dict[bytes, bytes] = {}
+    again = [one for one in came if first.setdefault(one[4:8], one) is not one]
+    other = sum(first[one[4:8]] != one for one in again)
+    assert other > 10
+    with (
+        taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "a.mcap") as live,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        for one in came:
+            link.sendto(one, live.address)
+        until(lambda: live.counters["decoded"] == len(came))
+        told = live.stop().verdict
+    data = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "b.mcap").write_bytes(data[: data.index(b"taxel.end") - 13])
+    for verdict in (told, *(taxel.open(tmp_path / f"{name}.mcap").verdict for name in "ab")):
+        assert verdict.damaged == {"datagrams_of_another_board": other}
+        assert verdict.noted.get("datagrams_repeated", 0) == len(again) - other
+        assert at_least(verdict, "damaged")
+        assert "nothing lost;" not in verdict
+    assert told.startswith("nothing lost but what another board sent; in the bytes that came: ")
 
 
 def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:

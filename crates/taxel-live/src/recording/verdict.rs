@@ -302,7 +302,7 @@ pub fn damage(
     }
     let of_version_2 = [
         ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign - two.other_board),
-        ("datagrams_of_another_board", two.other_board),
+        (OTHER_BOARD, two.other_board),
         ("datagrams_too_late", two.old),
         ("taxels_outside_the_array", two.outside),
         ("datagrams_of_an_unknown_kind", two.unknown_kind),
@@ -401,11 +401,15 @@ impl Verdict {
             ([], false) => Status::CompleteAfterArrival,
             _ => Status::Lost,
         };
+        let hidden = counts.missing.is_some() && !knows;
         let mut pieces = vec![if !words.is_empty() {
-            format!("LOST: {}", words.join(", "))
+            let but = if hidden { ", and what resets hide" } else { "" };
+            format!("LOST: {}{but}", words.join(", "))
+        } else if knows && of_board(OTHER_BOARD) > 0 {
+            "nothing lost but what another board sent".to_owned()
         } else if knows {
             "nothing lost".to_owned()
-        } else if counts.missing.is_some() {
+        } else if hidden {
             "nothing lost but for what resets hide".to_owned()
         } else {
             nothing_lost.to_owned()
@@ -685,7 +689,12 @@ impl Verdict {
         let said = self.parts.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
         let own = self.doubtful_after_us.filter(|_| self.doubtful_after_us != said);
         let parts = self.parts.iter().map(|(name, part)| format!("{name}: {}", part.text));
-        parts.chain(own.map(|after| format!("times after {after} us are doubtful"))).collect::<Vec<_>>().join("; ")
+        let all = self.parts.is_empty() && self.damaged.contains_key(JUMPED_BEFORE);
+        let doubt = own.map(|after| match all {
+            true => "all times are doubtful".to_owned(),
+            false => format!("times after {after} us are doubtful"),
+        });
+        parts.chain(doubt).collect::<Vec<_>>().join("; ")
     }
 
     /// The verdict whose line is all that an earlier version wrote: its status, without numbers.
@@ -769,6 +778,8 @@ pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
 pub(super) const BOARD_RESET: &str = "resets";
 pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
+/// Datagrams that are intact, and of another board than the first.
+const OTHER_BOARD: &str = "datagrams_of_another_board";
 /// Datagrams of version 1 that came again: version 1 does not number them, so that their events are there twice.
 const AGAIN: &str = "datagrams_decoded_again";
 /// Jumps of the times of version 1 ahead of the host's clock.
