@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import socket
@@ -197,8 +198,10 @@ def test_loss_in_a_board_s_own_last_second_is_seen_in_a_file_without_its_end(tmp
     assert (verdict.status, verdict.lost) == ("lost", {"lost_on_the_way": 1})
 
 
-def written_anew(of: Path, path: Path, times: Callable[[int], int], number: Callable[[int], int]) -> list[int]:
-    """Write a recording by the official library; return how many datagrams are there 0 times, once and twice."""
+def written_anew(
+    of: Path, path: Path, times: Callable[[int], int], number: Callable[[int], int], topic: str = "/datagrams"
+) -> list[int]:
+    """Write a recording by the official library; return how many of a topic are there 0 times, once and twice."""
     with of.open("rb") as source, path.open("wb") as file:
         reader, writer, channels, there = make_reader(source), Writer(file), {}, [0, 0, 0]
         writer.start("taxel")
@@ -212,8 +215,8 @@ def written_anew(of: Path, path: Path, times: Callable[[int], int], number: Call
                     channel.topic, channel.message_encoding, known or 0, channel.metadata
                 )
             copies = 1
-            if channel.topic == "/datagrams":
-                copies = times(message.sequence)
+            if channel.topic == topic:
+                copies = times(message.sequence if topic == "/datagrams" else sum(there))
                 there[copies] += 1
             said = message.log_time, message.data, message.publish_time, number(message.sequence)
             for _ in range(copies):
@@ -232,6 +235,118 @@ def test_what_another_program_left_out_of_a_finished_file_is_lost(keeps: Callabl
     verdict = taxel.open(tmp_path / "b.mcap").verdict
     assert verdict.lost == ({"lost_in_file": left_out} if left_out else {})
     assert verdict.status == ("lost" if left_out else "complete after arrival")
+
+
+@pytest.mark.parametrize("cut", [0, 300])
+@pytest.mark.parametrize(
+    ("topic", "keeps", "cause"),
+    [
+        ("/notes", lambda n: n != 0, "notes_lost_in_file"),
+        ("/notes", lambda _: False, "notes_lost_in_file"),
+        ("/markers", lambda n: n != 1, "markers_lost_in_file"),
+        ("/registers", lambda _: False, "registers_lost_in_file"),
+        ("/detections", lambda _: False, "detections_lost_in_file"),
+        ("/pressure", lambda _: False, None),
+    ],
+)
+def test_small_messages_that_another_program_left_out_are_lost(
+    topic: str, keeps: Callable[[int], bool], cause: str | None, cut: int, tmp_path: Path
+) -> None:
+    record(tmp_path / "a.mcap", some_events(), finish=not cut)
+    left_out, *_ = written_anew(tmp_path / "a.mcap", tmp_path / "b.mcap", lambda n: int(keeps(n)), lambda n: n, topic)
+    data = (tmp_path / "b.mcap").read_bytes()
+    (tmp_path / "b.mcap").write_bytes(data[: len(data) - cut])
+    verdict = taxel.open(tmp_path / "b.mcap").verdict
+    assert left_out > 0
+    assert verdict.lost == ({cause: left_out} if cause else {})
+    assert not cut or "not finished" in verdict
+
+
+def test_small_messages_that_another_program_added_are_not_there_twice(tmp_path: Path) -> None:
+    record(tmp_path / "a.mcap", some_events())
+    written_anew(tmp_path / "a.mcap", tmp_path / "b.mcap", lambda _: 2, lambda n: n, "/notes")
+    verdict = taxel.open(tmp_path / "b.mcap").verdict
+    assert (verdict.lost, verdict.damaged) == ({}, {})
+
+
+@pytest.mark.parametrize("lines", [False, True])
+@pytest.mark.parametrize("dropped", [0, 3])
+@pytest.mark.parametrize("begins", [0, 2**32 - 20, 2**33 + 7])
+def test_what_a_file_without_its_end_lacks_is_told_as_dropped_or_left_out(
+    lines: bool, dropped: int, begins: int, tmp_path: Path
+) -> None:
+    """In the middle by the numbers that it skips, at its beginning by the first number that the counts state."""
+    for seed in range(20):
+        draw, path = np.random.default_rng(seed), tmp_path / f"{seed}.mcap"
+        one_by_one = {"rows": 1, "columns": 1, "pitch_mm": 1.0, "name": "numbers"}
+        stream = {"stream": {"columns": ["t_us", "a"], "time": "t_us"}, "array": one_by_one} if lines else {}
+        writer = _core.RecordingWriter(path, json.dumps(HEADER | stream), "none", False)
+        sent = sent_by_a_board()[:100]
+        gone = set(draw.choice(np.arange(10, 80), dropped, replace=False).tolist())
+        for number, one in enumerate(sent):
+            at = START_NS + number * 1_000_000
+            if number in gone:
+                continue
+            if lines:
+                writer.samples(np.array([at]), np.array([begins + number], np.uint64), np.array([number * 1e3, 0.0]))
+            else:
+                writer.datagram(at, begins + number, one)
+            if number in (81, 99):
+                known = {"received": number + 1, "recorded": number + 1 - dropped, "dropped_by_queue": dropped}
+                writer.counts(at, json.dumps(known))
+        del writer
+        first, out = int(draw.integers(0, 9)), set(draw.choice(np.arange(10, 98), 5, replace=False).tolist())
+        topic = "/samples" if lines else "/datagrams"
+        keeps = iter([k >= first and k not in out for k in range(100) if k not in gone])
+        left_out, *_ = written_anew(path, tmp_path / "b.mcap", lambda _: int(next(keeps)), lambda n: n, topic)  # noqa: B023  called at once
+        (tmp_path / "b.mcap").write_bytes((tmp_path / "b.mcap").read_bytes()[:-300])
+        verdict = taxel.open(tmp_path / "b.mcap").verdict
+        expected = {"dropped_by_queue": dropped, "dropped_or_left_out": left_out}
+        assert verdict.lost == {cause: n for cause, n in expected.items() if n}, seed
+        assert left_out == 0 or "dropped by taxel's queue or left out of the file" in verdict
+        assert verdict.status == ("lost" if verdict.lost else "unfinished")
+
+
+@pytest.mark.parametrize("kind", ["mcap", "npz", "h5"])
+@pytest.mark.parametrize("seed", range(4))
+def test_stretches_that_are_merged_have_the_losses_of_the_whole_once(kind: str, seed: int, tmp_path: Path) -> None:
+    draw, told = np.random.default_rng(seed), Told()
+    path, finish = tmp_path / "whole.mcap", bool(seed % 2)
+    write(path, on_the_way(sent_by_a_board(400), draw, told), draw, told, finish=finish)
+    whole = taxel.open(path)
+    bounds = np.sort(draw.integers(int(whole.events.t[0]), int(whole.events.t[-1]), 3)).tolist()
+    stretches = [whole.between(a, b) for a, b in itertools.pairwise([-np.inf, *bounds, np.inf])]
+    files = []
+    for k, stretch in enumerate(stretches):
+        # Some stay in memory, and some are cut again.
+        place = tmp_path / f"{k}.{kind}"
+        taxel.convert(stretch, place)
+        files.append(taxel.open(place))
+        middle = int(files[-1].events.t[len(files[-1].events) // 2]) if len(files[-1].events) else 0
+        if draw.random() < 0.5:
+            files[-1:] = [files[-1].between(-np.inf, middle), files[-1].between(middle, np.inf)]
+    for one in (*stretches, *files):
+        assert (one.verdict, one.verdict.lost) == (whole.verdict, whole.verdict.lost)
+    order = [files[k] for k in draw.permutation(len(files))]
+    for merged in (
+        taxel.merge(order),
+        taxel.merge([*order, *stretches], gap_us=10),
+        taxel.merge([taxel.merge(order[:2]), *order[2:]]),
+    ):
+        assert merged.verdict == whole.verdict
+        assert merged.verdict.to_dict() | {"stretch_of": None} == whole.verdict.to_dict()
+
+
+def test_what_a_stretch_lost_itself_counts_beside_what_the_whole_lost(tmp_path: Path) -> None:
+    whole, lost = {"status": "lost", "text": "LOST: 3 times", "lost": {"dropped_by_board": 3}}, {"lost_in_file": 2}
+    stretch = Verdict.from_dict(whole)._as_stretch_of("whole")
+    hurt = Verdict._of(
+        {"file": {"converted": stretch._held, "ending": {"finished": {"counts": {}}}, "lost": {"datagrams": 2}}}
+    )
+    assert hurt.lost == {"dropped_by_board": 3, **lost}
+    both = Verdict._of_stretches([("a", stretch), ("b", hurt)])
+    assert (both.lost, both.status, both.stretch_of) == ({"dropped_by_board": 3, **lost}, "lost", "whole")
+    assert Verdict.from_dict(both.to_dict()).to_dict() == both.to_dict()
 
 
 @pytest.mark.parametrize(
@@ -661,6 +776,8 @@ def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     assert verdict == "nothing lost but for what resets hide; 2 resets of the board"
     assert verdict.status == "complete after arrival"
     assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"
+    lost = Verdict._of({"counts": counts | {"missing": 3}})
+    assert lost == "LOST: 3 datagrams lost or damaged on the way, and what resets hide; 2 resets of the board"
 
 
 def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -> None:
@@ -675,6 +792,44 @@ def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -
     assert recording.verdict.damaged == {"datagrams_of_another_board": 7, "datagrams_damaged": 1}
     assert "7 datagrams of another board" in recording.verdict
     assert len(recording.events) == 3 * 4096
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_second_board_with_the_numbers_of_the_first_is_told(seed: int, tmp_path: Path) -> None:
+    """Two emulated boards have one session: what came under a number that another datagram has is left out."""
+    draw = np.random.default_rng(seed)
+    boards = [Board(Registers(wire_version=2), version_2=Version2(states_us=0)) for _ in range(2)]
+    sent: list[tuple[int, bytes]] = []
+    for k, board in enumerate(boards):
+        held = np.full(4096, 20, np.uint16)
+        for _ in range(30):
+            held[draw.integers(0, 4096, 20)] ^= 64 + k
+            sent += [(k, one) for one in board.frame(held)]
+    # In turn, with pauses, one behind the other: of each board in its own order.
+    which = draw.permutation([k for k, _ in sent])
+    left = [iter([one for k, one in sent if k == board]) for board in range(2)]
+    came = [next(left[k]) for k in which]
+    came = [bytes(bytearray(one)) for one in came for _ in range(1 + (draw.random() < 0.1))]
+    first: dict[bytes, bytes] = {}
+    again = [one for one in came if first.setdefault(one[4:8], one) is not one]
+    other = sum(first[one[4:8]] != one for one in again)
+    assert other > 10
+    with (
+        taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "a.mcap") as live,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        for one in came:
+            link.sendto(one, live.address)
+        until(lambda: live.counters["decoded"] == len(came))
+        told = live.stop().verdict
+    data = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "b.mcap").write_bytes(data[: data.index(b"taxel.end") - 13])
+    for verdict in (told, *(taxel.open(tmp_path / f"{name}.mcap").verdict for name in "ab")):
+        assert verdict.damaged == {"datagrams_of_another_board": other}
+        assert verdict.noted.get("datagrams_repeated", 0) == len(again) - other
+        assert at_least(verdict, "damaged")
+        assert "nothing lost;" not in verdict
+    assert told.startswith("nothing lost but what another board sent; in the bytes that came: ")
 
 
 def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:

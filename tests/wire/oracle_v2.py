@@ -102,11 +102,10 @@ class Reader:
             self.sessions = [*self.sessions[-3:], session]
             # After the board's reset every taxel's value is 0; a receiver that joins later must be told the values.
             self.held, self.held_at, self.whole = {}, {}, sequence == 0
-            self.seen[session] = set()
-        if sequence in self.seen[session]:
-            self.counts["repeated"] += 1
+            self.seen[session] = {}
+        if (came := self.seen[session].setdefault(sequence, data)) is not data:
+            self.counts["repeated" if came == data else "foreign"] += 1
             return
-        self.seen[session].add(sequence)
         self.counts["intact"] += 1
         self.counts["dropped"] += flags >> 2 & 1
         self.counts["unknown_flags"] += flags > 7

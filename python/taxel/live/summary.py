@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from taxel.recording import open_recording
+from taxel.recording.read_mcap import DOUBTS
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 
@@ -68,8 +69,7 @@ def summary_of(text: str) -> Summary:
     path = None if values["path"] is None else Path(values["path"])
     tare = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
     verdict = Verdict._from(values["verdict"])
-    if {"jumps_of_time", "stamps_out_of_order"} & set(verdict.damaged) and path is not None and path.suffix == ".mcap":
-        # From when on times are doubtful is known by the file's own times alone.
+    if set(DOUBTS) & set(verdict.damaged) and path is not None and path.suffix == ".mcap":
         verdict = open_recording(path).verdict
     return Summary(values["counters"], verdict, path, tare)
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +17,8 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.recording.contents import UNKNOWN, Contents, once, together
 from taxel.recording.fates import after
+from taxel.recording.kinds import verdict_of
+from taxel.recording.verdict import Verdict
 
 __all__ = ["Apart", "between"]
 
@@ -36,8 +42,29 @@ def between(of: Contents, start: float, stop: float) -> Contents:
         samples=once(
             lambda: None if of.samples is None else of.samples.between(start, stop), lambda: of.holds("samples")
         ),
+        verdict=once(lambda: _verdict(of)),
         sources=once(lambda: _sources(of, start, stop)),
     )
+
+
+def _verdict(of: Contents) -> Verdict | None:
+    """Return the verdict of a recording as that of one of its stretches, which names the whole.
+
+    The name follows from the file, or else from what there is, so that stretches that were cut at different times have
+    one; no datagram is read for it.
+    """
+    if of.verdict is None:
+        return None
+    said = verdict_of(of)
+    if said.stretch_of is not None:
+        return said
+    about: list[Any] = [verdict_of(one).to_dict() for one in (of.sources or {of.label: of}).values()]
+    try:
+        file = of.path.stat()
+        about += [file.st_size, file.st_mtime_ns]
+    except OSError:
+        about += [len(of.table), of.table.t[:1].tolist(), of.table.t[-1:].tolist()]
+    return said._as_stretch_of(hashlib.sha256(json.dumps(about).encode()).hexdigest()[:16])
 
 
 def _without_a_time(of: Contents) -> list[str]:
@@ -71,7 +98,8 @@ def _sources(of: Contents, start: float, stop: float) -> Mapping[str, Contents]:
         return Apart(of.path, sources)
     parts: dict[str, Contents] = {}
     for name, one in sources.items():
-        parts[name] = between(one.but(sources={}), start, stop).but(sources=parts)
+        alone = one.but(sources={}, verdict=once(partial(_verdict, one)))
+        parts[name] = between(alone, start, stop).but(sources=parts)
     return parts
 
 

@@ -46,7 +46,7 @@ calibration          =      ~      ~      =         =          ~         =      
 clock                =      =      ~      ~         =          =         =       ~      ~     -    -    -   -
 clock_of             =      =      ~      ~         =          =         =       =      -     -    -    -   -
 counts               =      =      ~      =         =          =         =       ~      ~     -    =    -   =
-verdict              =      =      ~      ~         =          =         =       ~      ~     -    =    -   =
+verdict              ~      =      ~      ~         =          =         =       ~      ~     -    =    -   =
 remarks              =      =      ~      =         =          =         =       ~      ~     -    =    -   =
 datagrams            =      -      -      =         =          =         =       ~      ~     -    -    -   -
 payload              =      -      -      =         =          =         =       ~      ~     ~    -    -   -

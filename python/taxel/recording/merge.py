@@ -121,14 +121,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         lost.append("the calibration (it is of one of the sensors)")
     fields["zeroings"] = _zeroings(parts, shifts, lefts, lost, beside=beside)
     fields["held"] = _beside_held(parts, array, lefts) if beside else _held(parts, tables, shifts, lost)
-    # Parts of one file, or of one merged recording, have the verdict of the whole, which counts once; sources of one
-    # file share its damage.
-    verdicts: dict[Any, dict[Any, tuple[str, Verdict]]] = {}
-    for p, shift in zip(parts, shifts, strict=True):
-        said = verdict_of(p)
-        file, whole = (id(said), None) if p.kind == "merged" else (p.path, (p.name, p.label, said))
-        verdicts.setdefault(file, {}).setdefault(whole, (p.name, said._later(shift)))
-    of_files = [(next(iter(own.values()))[0], Verdict._of_sources(own.values())) for own in verdicts.values()]
+    of_files = _of_files(parts, shifts)
     together = after(
         "merge",
         parts[0].but(lost=tuple(dict.fromkeys(line for part in parts for line in part.lost))),
@@ -150,6 +143,28 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
     )
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
     return together.but(lost=together.lost)
+
+
+def _of_files(parts: Sequence[Contents], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
+    """Return name and verdict of each file or merged recording of which there are parts.
+
+    Stretches of one recording, in memory or in files of their own, have the losses of the whole, which count once;
+    sources of one file share its damage.
+    """
+    files: dict[str, Any] = {}
+    verdicts: dict[Any, dict[Any, dict[Verdict, tuple[str, Verdict]]]] = {}
+    for part, shift in zip(parts, shifts, strict=True):
+        said = verdict_of(part)
+        file = id(said) if part.kind == "merged" else part.path
+        if said.stretch_of is not None:
+            file = files.setdefault(said.stretch_of, said.stretch_of if part.kind == "merged" else file)
+        source = part.label if said.stretch_of is not None else (part.name, part.label)
+        verdicts.setdefault(file, {}).setdefault(source, {}).setdefault(said, (part.name, said._later(shift)))
+    of_files = []
+    for sources in verdicts.values():
+        each = [(next(iter(own.values()))[0], Verdict._of_stretches(own.values())) for own in sources.values()]
+        of_files.append((each[0][0], Verdict._of_sources(each)))
+    return of_files
 
 
 def _at(t: int | None, shift: int, change: Any) -> Any:

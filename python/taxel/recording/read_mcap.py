@@ -23,7 +23,10 @@ from taxel.recording.notes import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
-__all__ = ["ascending", "read_mcap"]
+__all__ = ["DOUBTS", "ascending", "read_mcap"]
+
+#: The damage after which times are doubtful; from when on is known by the file's own times alone.
+DOUBTS = ("jumps_of_time", "stamps_out_of_order", "drifts_from_arrival")
 
 
 def read_mcap(path: Path, pairing: str) -> Contents:
@@ -231,8 +234,7 @@ class _Source:
             return True
         counts = self.ending["finished"]["counts"]
         converted = self.header.get("converted") or counts.get("converted")
-        doubtful = any(counts["decoder"].get(cause, 0) for cause in ("jumps_of_time", "stamps_out_of_order"))
-        return not converted and doubtful
+        return not converted and any(counts["decoder"].get(cause, 0) for cause in DOUBTS)
 
 
 def _clock(decoded: tuple[Any, ...]) -> Clock:

@@ -52,6 +52,8 @@ class Verdict(str):
         What is no loss of its own: repeated datagrams, repaired values, resets of the board and others.
     doubtful_after_us : int, us, or None
         The time after which times are doubtful; of several parts the earliest.
+    stretch_of : str or None
+        Of a stretch of a recording a name of the whole, whose losses these are: `merge` counts them once.
     parts : dict of Verdict
         Of several sources or merged recordings that of each, by name; else empty.
 
@@ -94,6 +96,15 @@ class Verdict(str):
         """Return the verdict on the sources of one file, each with its name; damage of the file counts once."""
         return cls._of({"sources": [(name, Verdict(one)._held) for name, one in parts]})
 
+    @classmethod
+    def _of_stretches(cls, parts: Iterable[tuple[str, str]]) -> Self:
+        """Return the verdict on stretches of one recording, each with its name; what the whole lost counts once."""
+        return cls._of({"stretches": [(name, Verdict(one)._held) for name, one in parts]})
+
+    def _as_stretch_of(self, whole: str) -> Self:
+        """Return the same verdict as that of a stretch of the recording of this name."""
+        return self._from({**self._held, "stretch_of": whole})
+
     def _later(self, shift: int) -> Self:
         """Return the verdict on the recording whose times are later by so many us."""
         return self._of({"later": [shift, self._held]})
@@ -124,6 +135,11 @@ class Verdict(str):
         return self._held["doubtful_after_us"]  # type: ignore[no-any-return]
 
     @property
+    def stretch_of(self) -> str | None:
+        """The name of the whole recording, of a stretch of one."""
+        return self._held["stretch_of"]  # type: ignore[no-any-return]
+
+    @property
     def parts(self) -> dict[str, Verdict]:
         """The verdicts of the sources or merged recordings, by name."""
         return {name: Verdict._from(part) for name, part in self._held["parts"]}
@@ -144,7 +160,8 @@ class Verdict(str):
         numbers = {name: dict(self._held[name]) for name in _NUMBERS}
         parts = {name: part.to_dict() for name, part in self.parts.items()}
         about = {"status": self.status, "text": str(self), **numbers}
-        return about | {"doubtful_after_us": self.doubtful_after_us, "parts": parts}
+        rest = {"doubtful_after_us": self.doubtful_after_us, "stretch_of": self.stretch_of, "parts": parts}
+        return about | rest
 
     @classmethod
     def from_dict(cls, held: Mapping[str, Any]) -> Self:
@@ -178,6 +195,7 @@ def _stated(held: Any) -> dict[str, Any]:
         or not all(isinstance(each, Mapping) for each in (*numbers, parts))
         or not all(type(count) is int and 0 <= count < 2**64 for count in counts)
         or type(own.get(doubtful, None)) not in (int, type(None))
+        or not isinstance(own.get("stretch_of"), str | None)
     ):
         raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
     for name, least in (("lost", "lost"), ("damaged", "damaged")):
@@ -209,5 +227,6 @@ def _stated(held: Any) -> dict[str, Any]:
                     f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be no fewer"
                 )
     made = {"status": own["status"], "text": own["text"], doubtful: own.get(doubtful)}
+    made |= {"stretch_of": own.get("stretch_of")}
     made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
     return made | {"parts": list(stated.items())}

@@ -41,13 +41,14 @@ class Counts:
     datagrams, intact : int
         Version 2: the number of datagrams given to the decoder, and of those that it decoded.
     repeated, old : int
-        Version 2: the number of datagrams received again, and of those whose sequence number is more than 65 536 behind
-        the highest, so that it is unknown whether they were received before.
+        Version 2: the number of datagrams received again, with the same contents, and of those whose sequence number
+        is more than 65 536 behind the highest, so that it is unknown whether they were received before.
     long, foreign, checksum : int
         Version 2: the number of datagrams refused because they are longer than 1400 bytes, are not of version 2 or come
         from another board, or have a wrong checksum.
     other_board : int
-        Version 2: the number of those among `foreign` that are intact, and of another board than the first.
+        Version 2: the number of those among `foreign` that are intact, and of another board than the first: by its
+        number, or as their session and sequence number came before with other contents.
     missing : int
         Version 2: the number of sequence numbers between the first and the last of each session that were never
         received intact.

@@ -219,8 +219,8 @@ impl Header {
         if datagram.len() > DATAGRAM_BYTES {
             return Err(Refused::Long);
         }
-        let (rest, sum) = datagram.split_at(datagram.len() - 4);
-        if checksum::crc32c(rest).to_le_bytes() != sum {
+        let (rest, sum) = checksum::split(datagram);
+        if checksum::crc32c(rest) != sum {
             return Err(Refused::Checksum);
         }
         Ok(Self::fields(datagram))

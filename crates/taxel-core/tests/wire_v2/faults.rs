@@ -1,7 +1,10 @@
 //! Tests of loss, repetition, reordering, damage, resets and unknown datagrams.
 
+use std::collections::BTreeMap;
+
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
 use taxel_core::board::{Board, IntensityWord, Version2};
+use taxel_core::vectors::Instructions;
 use taxel_core::wire::Registers;
 use taxel_core::wire::v2::{Decoder, Header, Outcome};
 use taxel_core::{Array, Events};
@@ -173,6 +176,49 @@ fn a_number_drawn_twice_is_a_reset_once() {
     let counts = decoder.counts();
     assert_eq!((counts.intact, counts.repeated, counts.resets, counts.missing), (7, 5, 1, 0));
     assert!(events.t.is_sorted());
+}
+
+#[test]
+fn what_another_board_sent_under_the_same_number_is_refused_by_every_set_of_instructions() {
+    for seed in 0..60 {
+        let mut random = StdRng::seed_from_u64(seed);
+        let array = Array::thesis();
+        let sent = |random: &mut StdRng, sequence: u32| {
+            let base = 192 * u64::from(sequence) + random.random_range(0..3);
+            let header =
+                Header { kind: 1, board: 1, sequence, base, session: 9, stride: 6, line: 0, flags: 0, span: 192 };
+            let mut datagram = vec![];
+            header.write(&[random.random_range(0..4), 0x80], &mut datagram);
+            datagram
+        };
+        let (mut numbers, mut came) = ([7, random.random_range(0..200)], vec![]);
+        for _ in 0..2000 {
+            let board = random.random_range(0..2);
+            came.push(sent(&mut random, numbers[board]));
+            numbers[board] += 1;
+        }
+        let mut first = BTreeMap::new();
+        let (mut again, mut other) = (0, 0);
+        for datagram in &came {
+            let known: &Vec<u8> = first.entry(Header::read(datagram).unwrap().0.sequence).or_insert(datagram.clone());
+            again += u64::from(known == datagram);
+            other += u64::from(known != datagram);
+        }
+        for set in Instructions::ALL.into_iter().filter(|set| set.present()) {
+            let mut decoder = Decoder::new(array.clone()).instructions(set).unwrap();
+            let mut events = Events::empty(array.clone());
+            for datagram in &came {
+                decoder.push(datagram, None, &mut events);
+            }
+            let counts = decoder.counts();
+            assert_eq!(
+                (counts.intact, counts.repeated),
+                (first.len() as u64, again - first.len() as u64),
+                "{seed}, {set:?}"
+            );
+            assert_eq!((counts.foreign, counts.other_board, counts.resets), (other, other, 0), "seed {seed}, {set:?}");
+        }
+    }
 }
 
 #[test]

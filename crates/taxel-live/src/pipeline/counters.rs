@@ -67,6 +67,9 @@ pub struct DecodingCounts {
     pub wire_late: u64,
     /// Number of times that the times of version 1 jumped ahead of this computer's clock.
     pub wire_jumps: u64,
+    /// The time after which times are doubtful since, us.
+    #[serde(skip)]
+    pub wire_doubtful_after: Option<i64>,
     /// Number of datagrams of version 1 that came again.
     pub wire_repeated: u64,
     /// Number of datagrams of version 1 without bytes.
@@ -217,6 +220,7 @@ impl DecodingCounts {
             wire_changes: self.wire_changes - earlier.wire_changes,
             wire_late: self.wire_late - earlier.wire_late,
             wire_jumps: self.wire_jumps - earlier.wire_jumps,
+            wire_doubtful_after: self.wire_doubtful_after,
             wire_repeated: self.wire_repeated - earlier.wire_repeated,
             wire_empty: self.wire_empty - earlier.wire_empty,
             events: self.events - earlier.events,

@@ -220,6 +220,7 @@ impl DecodeStage {
         counters.decoding.wire_changes = self.decoder.changes();
         counters.decoding.wire_late = self.late;
         counters.decoding.wire_jumps = self.decoder.ahead().jumps;
+        counters.decoding.wire_doubtful_after = self.decoder.ahead().after;
         counters.decoding.wire_repeated = self.decoder.repeated();
         counters.decoding.wire_empty = self.decoder.empty();
         counters.decoding.events += self.events.len() as u64;

@@ -449,7 +449,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         decoder,
         missing: missing.filter(|n| *n > 0 || knows),
         bridged: now.bridged.map(Box::new),
-        converted: None,
+        ..recording::Counts::default()
     }
 }
 

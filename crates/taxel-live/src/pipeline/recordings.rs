@@ -120,12 +120,18 @@ fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
 
 /// What was lost of each source, or that nothing arrived.
 pub(super) fn verdict(name: &str, place: &Origin, counters: &Counters, nothing: bool, lost: &Counts) -> Verdict {
-    let verdict =
-        if nothing { Verdict::nothing_arrived(nothing_arrived(place, counters.seconds)) } else { lost.verdict() };
+    let of_board = |counters: &Counters, lost: &Counts| lost.verdict().doubtful(counters.decoding.wire_doubtful_after);
+    let verdict = if nothing {
+        Verdict::nothing_arrived(nothing_arrived(place, counters.seconds))
+    } else {
+        of_board(counters, lost)
+    };
     let others = counters.sources.iter().map(|(name, counts)| {
         let verdict = match counts {
-            SourceCounts::Board(counts) => losses(counts, None).verdict(),
-            SourceCounts::Numbers { lines, faults, .. } => Verdict::of_lines(&losses_of_lines(*lines, faults)),
+            SourceCounts::Board(counts) => of_board(counts, &losses(counts, None)),
+            SourceCounts::Numbers { lines, faults, .. } => {
+                Verdict::of_lines(&losses_of_lines(*lines, faults)).doubtful(faults.doubtful_after_us)
+            }
         };
         (name.clone(), verdict)
     });

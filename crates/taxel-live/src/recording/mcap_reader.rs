@@ -237,13 +237,15 @@ impl Reader {
         let read = |topic: Topic| remarks.messages.get(&topic).copied().unwrap_or(0);
         let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
         // Another program may have written the file anew without some messages, and a summary that fits: the recorder's own
-        // count says how many there were.
+        // counts say how many there were, the last ones before the end how many at least.
         let total =
             |topic: Topic| totals.and_then(|totals| totals.get(&topic.channel_name(self.source, name)).copied());
         let recorded = |topic: Topic| match &self.ending {
             Some(Ending::Finished { counts }) if topic == data => Some(counts.recorded),
+            Some(Ending::Finished { counts }) => counts.messages.get(&topic).copied(),
             _ => None,
         };
+        let so_far = |topic: Topic| remarks.counts.as_ref().and_then(|counts| counts.messages.get(&topic)).copied();
         let mut unread = unread.clone();
         if let Some((0, indexed)) = self.blocks.skipped.first() {
             unread.add(&self.listed(&Place::default(), indexed.as_ref(), &Indexed::new()));
@@ -254,14 +256,17 @@ impl Reader {
             // Arrival numbers tell which datagrams are there twice, unless who wrote the file gave all of them one number.
             let again = match topic {
                 Topic::Datagrams if !remarks.numbers.are_one() => remarks.numbers.repeated(),
-                _ => recorded(topic).or(total).map_or(0, |whole| read.saturating_sub(whole)),
+                _ if topic == data => recorded(topic).or(total).map_or(0, |whole| read.saturating_sub(whole)),
+                // Another program may have added some.
+                _ => total.map_or(0, |whole| read.saturating_sub(whole)),
             };
             repeated += again;
             let listed = unread.messages.get(&topic).copied().unwrap_or(0);
             // The summary counts what is there twice.
             let missing = total.map(|total| total.saturating_sub(read));
             let not_there = recorded(topic).map(|recorded| recorded.saturating_sub(read - again));
-            lost.insert(topic, missing.max(not_there).unwrap_or(listed));
+            let known = missing.max(not_there).unwrap_or(listed);
+            lost.insert(topic, known.max(so_far(topic).map_or(0, |n| n.saturating_sub(read))));
         }
         Condition {
             ending: self.ending.clone(),
@@ -272,6 +277,7 @@ impl Reader {
             repeated,
             messages: read(data),
             skipped_numbers: remarks.numbers.skipped(),
+            before_first: before_first(remarks),
             so_far: remarks.counts.clone(),
             converted: self.header().converted.clone().map(Box::new),
             decoded: None,
@@ -507,6 +513,17 @@ impl Reader {
         decoded.version_2 = sender.two().counts();
         decoded.found = Found::of(&sender, header.origin_us);
         Ok(decoded)
+    }
+}
+
+/// How many datagrams or lines were recorded before the first one in a file, by its last counts.
+fn before_first(remarks: &Remarks) -> u64 {
+    let Some(counts) = &remarks.counts else { return 0 };
+    #[allow(clippy::cast_possible_truncation)]
+    match (counts.first, remarks.numbers.first()) {
+        (Some(first), Some(there)) => there.saturating_sub(unwrap(there, first as u32)),
+        (Some(_), None) => counts.recorded,
+        _ => 0,
     }
 }
 

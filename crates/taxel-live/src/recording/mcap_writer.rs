@@ -128,7 +128,7 @@ impl Writer {
     /// Whether any source has passed data.
     #[must_use]
     pub fn holds_anything(&self) -> bool {
-        self.track.queue.lock().recorded.iter().any(|&n| n > 0)
+        self.track.queue.lock().written.iter().any(|written| written.data > 0)
     }
 
     /// Ends the recording with the counts of the first source and the verdict; returns the final counts. The other
@@ -143,7 +143,7 @@ impl Writer {
     pub fn finish(self, counts: Counts) -> Result<Counts> {
         self.begin(self.header.origin_us)?;
         self.track.queue.finish(Some(counts.clone()))?;
-        Ok(Counts { recorded: self.track.queue.lock().recorded[0], ..counts })
+        Ok(self.track.queue.lock().written[0].at_end(counts))
     }
 
     /// Ends an empty recording: removes a new file, leaves an earlier one unchanged.
@@ -216,8 +216,8 @@ impl Track {
     /// Ends this source with the counts of what was received and lost; it must not be used afterwards.
     pub fn end(&self, name: &str, counts: Counts) {
         let mut state = self.queue.lock();
-        let recorded = state.recorded[self.source];
-        state.ends.insert(name.to_owned(), Counts { recorded, ..counts });
+        let counts = state.written[self.source].at_end(counts);
+        state.ends.insert(name.to_owned(), counts);
     }
 
     /// Writes a datagram, with its arrival time by the host's clock (ns since 1970), arrival number and bytes.
@@ -326,6 +326,7 @@ impl Track {
     ///
     /// As [`Track::datagram`].
     pub fn counts(&self, at_ns: i64, counts: &Counts) -> Result<()> {
+        let counts = self.queue.lock().written[self.source].so_far(counts.clone());
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 

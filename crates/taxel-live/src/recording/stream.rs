@@ -205,8 +205,9 @@ impl Faults {
 
 #[cfg(test)]
 mod tests {
-    use super::super::verdict::{ANEW, BACK, JUMPS};
+    use super::super::verdict::{ANEW, BACK, DRIFTS, JUMPS};
     use super::*;
+    use rand::{Rng, SeedableRng, rngs::StdRng};
 
     fn stream(columns: &[&str]) -> Stream {
         Stream::of_columns(columns.iter().map(ToString::to_string).collect())
@@ -222,7 +223,10 @@ mod tests {
         let Found { mut damage, doubtful_after_us, .. } = samples.found;
         assert_eq!(damage.remove(STRANGE), Some(0));
         let mut n = |cause: &str| damage.remove(cause).unwrap();
-        (samples.t, Counted { anew: n(ANEW), back: n(BACK), jumps: n(JUMPS), after: doubtful_after_us })
+        (
+            samples.t,
+            Counted { anew: n(ANEW), back: n(BACK), jumps: n(JUMPS), drifts: n(DRIFTS), after: doubtful_after_us },
+        )
     }
 
     /// What a stream's clock was found to have done.
@@ -231,6 +235,7 @@ mod tests {
         anew: u64,
         back: u64,
         jumps: u64,
+        drifts: u64,
         after: Option<i64>,
     }
 
@@ -308,6 +313,56 @@ mod tests {
         assert_eq!(times(&stream, &stamps(0.0, 0, 0)).1, Counted::default());
         assert_eq!(times(&stream, &stamps(0.0, 600_000_000, 0)).1, Counted::default());
         assert_eq!(times(&stream, &stamps(0.0, 0, -60_000_000_000)).1, Counted::default());
+    }
+
+    /// The lines of a source every `period_us` for `seconds`, whose clock runs at a rate, with the delays of their arrival.
+    fn running(rate: f64, period_us: f64, seconds: f64, delay_us: impl Fn(f64) -> f64) -> Vec<(f64, i64)> {
+        let lines = (0..(seconds * 1e6 / period_us) as u32).map(|k| f64::from(k) * period_us);
+        lines.map(|t| ((t * rate).floor(), 1_700_000_000_000_000_000 + ((t + delay_us(t)) * 1e3) as i64)).collect()
+    }
+
+    #[test]
+    fn a_clock_at_another_rate_is_told_once_and_a_drift_packets_and_what_has_waited_are_not() {
+        let stream = stream(&["t_us", "a"]);
+        for seed in 0..90 {
+            let mut draw = StdRng::seed_from_u64(seed);
+            let period_us: f64 = [1e4, 1e5, 7e5, 3e6][draw.random_range(0..4)];
+            let (waited_us, packet_us) = (draw.random_range(0.0..2e7), draw.random_range(1e4..5e6));
+            let jitter_us = draw.random_range(0.0..period_us.min(5e5));
+            let delay = |t: f64| match seed % 3 {
+                // What waits, and what comes in packets, are several lines.
+                0 if period_us < 1e6 => (waited_us - t).max(0.0),
+                1 if period_us < 1e6 => packet_us - t % packet_us,
+                _ => (t * 0.618_034) % 1.0 * jitter_us,
+            };
+            let rate = 1.0 + draw.random_range(-1e-3..1e-3);
+            let sound = running(rate, period_us, 200.0, delay);
+            assert_eq!(times(&stream, &sound).1, Counted::default(), "seed {seed}");
+            let rate = [0.0, 1e-3, 0.5, 0.9, 0.97, 1.03, 1.1, 1.9][draw.random_range(0..8)];
+            let (_, told) = times(&stream, &running(rate, period_us, 600.0, delay));
+            // A clock that is fast by a second from one line to the next jumps.
+            let jumps = if period_us * rate > 1e6 { told.jumps } else { 0 };
+            let drifts = if jumps > 0 { told.drifts } else { 1 };
+            assert_eq!(
+                told,
+                Counted { drifts, jumps, after: told.after, ..Counted::default() },
+                "seed {seed}, rate {rate}"
+            );
+            // In packets of 5 s a clock that is off by 3 % agrees with one arrival or other for 170 s.
+            let latest = if seed % 3 == 1 { 170_000_000 } else { 60_000_000 };
+            assert!(told.after.is_some_and(|after| after <= latest), "seed {seed}, rate {rate}: {told:?}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_stands_still_is_doubtful_from_where_it_stopped() {
+        let stream = stream(&["t_us", "a"]);
+        let mut stamps = running(1.0, 1e4, 60.0, |_| 0.0);
+        stamps.iter_mut().skip(3000).for_each(|(stamp, _)| *stamp = 30e6);
+        let (_, told) = times(&stream, &stamps);
+        assert_eq!((told.drifts, told.anew + told.back + told.jumps), (1, 0));
+        let after = told.after.unwrap();
+        assert!((30_000_000 - 200_000..=30_000_000).contains(&after), "{after}");
     }
 
     #[test]

@@ -98,6 +98,11 @@ impl Topic {
         Some((name, "jsonschema", text.as_bytes()))
     }
 
+    /// Whether the channel holds what a source sends: datagrams, lines or pictures.
+    pub(super) fn is_data(self) -> bool {
+        matches!(self, Self::Datagrams | Self::Samples | Self::Pictures)
+    }
+
     /// How a verdict names messages of the channel that a file has lost: the cause, and what one of them is; none where
     /// nothing is lost by them.
     pub(super) fn lost_in_file(self) -> Option<(&'static str, &'static str)> {

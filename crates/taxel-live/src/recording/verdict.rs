@@ -58,6 +58,8 @@ pub struct Verdict {
     pub noted: BTreeMap<String, u64>,
     /// The board's time after which times are doubtful, us.
     pub doubtful_after_us: Option<i64>,
+    /// Of a stretch of a recording the name of the whole, whose losses these are: several stretches have them once.
+    pub stretch_of: Option<String>,
     /// The verdicts of the recordings or sources that this one is made of, by name.
     pub parts: Vec<(String, Verdict)>,
 }
@@ -83,6 +85,8 @@ struct Whole {
     #[serde(default)]
     doubtful_after_us: Option<i64>,
     #[serde(default)]
+    stretch_of: Option<String>,
+    #[serde(default)]
     parts: Vec<(String, Verdict)>,
 }
 
@@ -90,8 +94,8 @@ impl From<Stored> for Verdict {
     fn from(stored: Stored) -> Self {
         match stored {
             Stored::Line(line) => Self::of_line(&line),
-            Stored::Whole(Whole { status, text, lost, damaged, noted, doubtful_after_us, parts }) => {
-                Self { status, text, lost, damaged, noted, doubtful_after_us, parts }
+            Stored::Whole(Whole { status, text, lost, damaged, noted, doubtful_after_us, stretch_of, parts }) => {
+                Self { status, text, lost, damaged, noted, doubtful_after_us, stretch_of, parts }
             }
         }
     }
@@ -112,6 +116,15 @@ pub struct Counts {
     /// Whether datagrams came several a message (`UDP_GRO`), so that the kernel may have dropped several at once.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub several_a_message: bool,
+    /// Of a file without its end: datagrams or lines whose arrival numbers it lacks, but for those dropped by the queue.
+    #[serde(skip)]
+    pub left_out: u64,
+    /// Arrival number of the first datagram or line recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first: Option<u64>,
+    /// Number of the other messages recorded, by channel.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub messages: BTreeMap<Topic, u64>,
     /// What the decoder could not use of the bytes received, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
     /// What was lost between the computer that received the datagrams and this one, if they are different.
@@ -176,6 +189,8 @@ pub enum Basis {
     Together(Vec<(String, Verdict)>),
     /// The sources of one file.
     Sources(Vec<(String, Verdict)>),
+    /// Stretches of one recording.
+    Stretches(Vec<(String, Verdict)>),
     /// The recording with this verdict, of which all times are later by so many us.
     Later(i64, Verdict),
     /// The line that an earlier version wrote.
@@ -202,6 +217,8 @@ pub struct Condition {
     pub messages: u64,
     /// Arrival numbers that the file lacks between its first and last datagram.
     pub skipped_numbers: u64,
+    /// Those that it lacks before its first one, since the recording began.
+    pub before_first: u64,
     /// The last counts before the end.
     pub so_far: Option<Counts>,
     /// The verdict of the recording that this one was converted from, as the header states it.
@@ -285,7 +302,7 @@ pub fn damage(
     }
     let of_version_2 = [
         ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign - two.other_board),
-        ("datagrams_of_another_board", two.other_board),
+        (OTHER_BOARD, two.other_board),
         ("datagrams_too_late", two.old),
         ("taxels_outside_the_array", two.outside),
         ("datagrams_of_an_unknown_kind", two.unknown_kind),
@@ -316,6 +333,7 @@ impl Verdict {
             }
             Basis::Together(parts) => Self::together(parts),
             Basis::Sources(parts) => Self::of_sources(parts),
+            Basis::Stretches(parts) => Self::of_stretches(parts),
             Basis::Later(us, verdict) => verdict.later(us),
             Basis::Line(line) => Self::of_line(&line),
         }
@@ -341,6 +359,7 @@ impl Verdict {
         let dropped = [
             (counts.dropped_by_kernel, "dropped_by_kernel", "messages dropped by the kernel"),
             (counts.dropped_by_queue, "dropped_by_queue", "datagrams dropped by taxel's queue"),
+            (counts.left_out, LEFT_OUT, "messages dropped by taxel's queue or left out of the file"),
             (
                 counts.received.saturating_sub(counts.dropped_by_queue + counts.recorded),
                 "not_recorded",
@@ -382,11 +401,15 @@ impl Verdict {
             ([], false) => Status::CompleteAfterArrival,
             _ => Status::Lost,
         };
+        let hidden = counts.missing.is_some() && !knows;
         let mut pieces = vec![if !words.is_empty() {
-            format!("LOST: {}", words.join(", "))
+            let but = if hidden { ", and what resets hide" } else { "" };
+            format!("LOST: {}{but}", words.join(", "))
+        } else if knows && of_board(OTHER_BOARD) > 0 {
+            "nothing lost but what another board sent".to_owned()
         } else if knows {
             "nothing lost".to_owned()
-        } else if counts.missing.is_some() {
+        } else if hidden {
             "nothing lost but for what resets hide".to_owned()
         } else {
             nothing_lost.to_owned()
@@ -435,7 +458,7 @@ impl Verdict {
     /// The verdict on a source of a file.
     fn of_file(condition: Condition) -> Self {
         let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { repeated, so_far, converted, decoded, lines, origin_us, .. } = condition;
+        let Condition { before_first, repeated, so_far, converted, decoded, lines, origin_us, .. } = condition;
         let is_converted = converted.is_some();
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
         let mut decoded = decoded.unwrap_or_default();
@@ -461,8 +484,8 @@ impl Verdict {
                 // decoding finds faults that never came.
                 let counts = counts.unwrap_or_else(|| Counts { recorded: messages, ..Counts::default() });
                 let found = if skipped { Found::default() } else { decoded.clone() };
-                let dropped = if skipped { 0 } else { skipped_numbers };
-                (Self::of_counts(&so_far_with(counts, found, dropped), nothing_lost), Some(why))
+                let (inner, before) = if skipped { (0, 0) } else { (skipped_numbers, before_first) };
+                (Self::of_counts(&so_far_with(counts, found, inner, before), nothing_lost), Some(why))
             }
         };
         let came_short = !verdict.lost.is_empty();
@@ -470,7 +493,7 @@ impl Verdict {
             // Numbers that the file skips, and that were not dropped before, or lost in the file that it was converted from.
             let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
             let datagrams = lost.entry(Topic::Datagrams).or_default();
-            *datagrams = skipped_numbers.saturating_sub(before).max(*datagrams);
+            *datagrams = (skipped_numbers + before_first).saturating_sub(before).max(*datagrams);
         }
         if verdict.damaged.contains_key(JUMPED_BEFORE) && !is_converted {
             decoded.doubtful_after_us = Some(origin_us - 1);
@@ -552,14 +575,23 @@ impl Verdict {
             pieces.push(format!("{before}{}", verdict.text));
         }
         verdict.text = pieces.join("; ");
-        if let Some(after) = decoded.doubtful_after_us {
-            verdict.status = verdict.status.max(Status::Damaged);
-            for (cause, n) in decoded.damage.iter().filter(|(cause, n)| [JUMPS, BACK].contains(&&***cause) && **n > 0) {
+        if decoded.doubtful_after_us.is_some() {
+            for (cause, n) in
+                decoded.damage.iter().filter(|(cause, n)| [JUMPS, BACK, DRIFTS].contains(&&***cause) && **n > 0)
+            {
                 verdict.damaged.entry(cause.clone()).or_insert(*n);
             }
-            verdict.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain([after]).min());
         }
-        verdict
+        verdict.doubtful(decoded.doubtful_after_us)
+    }
+
+    /// The verdict where times after this one are doubtful too, if any, us.
+    pub(crate) fn doubtful(mut self, after: Option<i64>) -> Self {
+        if after.is_some() {
+            self.status = self.status.max(Status::Damaged);
+            self.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain(after).min());
+        }
+        self
     }
 
     /// The verdict on raw bytes.
@@ -585,6 +617,20 @@ impl Verdict {
     /// As [`Self::together`], of the sources of one file, whose damage each of them has: it counts once.
     fn of_sources(parts: Vec<(String, Self)>) -> Self {
         Self::joined(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
+    }
+
+    /// As [`Self::together`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
+    fn of_stretches(parts: Vec<(String, Self)>) -> Self {
+        let mut whole = Self::together(parts.clone());
+        let all = parts.iter().map(|(_, part)| [&part.lost, &part.damaged, &part.noted]);
+        for (k, sums) in [&mut whole.lost, &mut whole.damaged, &mut whole.noted].into_iter().enumerate() {
+            for (cause, sum) in sums {
+                let least = all.clone().map(|numbers| numbers[k].get(cause).copied().unwrap_or(0)).min();
+                *sum -= least.unwrap_or(0) * (parts.len() as u64).saturating_sub(1);
+            }
+        }
+        whole.stretch_of = parts.into_iter().find_map(|(_, part)| part.stretch_of);
+        whole
     }
 
     fn joined(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
@@ -643,7 +689,12 @@ impl Verdict {
         let said = self.parts.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
         let own = self.doubtful_after_us.filter(|_| self.doubtful_after_us != said);
         let parts = self.parts.iter().map(|(name, part)| format!("{name}: {}", part.text));
-        parts.chain(own.map(|after| format!("times after {after} us are doubtful"))).collect::<Vec<_>>().join("; ")
+        let all = self.parts.is_empty() && self.damaged.contains_key(JUMPED_BEFORE);
+        let doubt = own.map(|after| match all {
+            true => "all times are doubtful".to_owned(),
+            false => format!("times after {after} us are doubtful"),
+        });
+        parts.chain(doubt).collect::<Vec<_>>().join("; ")
     }
 
     /// The verdict whose line is all that an earlier version wrote: its status, without numbers.
@@ -678,19 +729,20 @@ impl Verdict {
     }
 }
 
-/// The last counts of an unfinished recording, with what decoding found since; the arrival numbers that the file skips
-/// were dropped by the queue.
-fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64) -> Counts {
+/// The last counts of an unfinished recording, with what decoding found since. The arrival numbers that the file skips, and
+/// those before its first, were dropped by the queue, or another program left their datagrams out.
+fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64, before_first: u64) -> Counts {
     // If more was received than the file holds, the difference is in its unfinished end.
     counts.received = 0;
-    counts.dropped_by_queue = counts.dropped_by_queue.max(skipped_numbers);
+    counts.left_out = (skipped_numbers + before_first).saturating_sub(counts.dropped_by_queue);
     for (cause, n) in found.damage {
         let known = counts.decoder.entry(cause).or_default();
         *known = n.max(*known);
     }
     // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
     // among the board's numbers too.
-    let missing = found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue);
+    let missing =
+        found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue + counts.left_out);
     let knows = counts.missing.is_some() && !found.unnumbered;
     counts.missing = missing.or(counts.missing).filter(|n| knows || *n > 0);
     counts
@@ -717,6 +769,8 @@ fn numbered(n: u64, plural: &str) -> String {
 
 /// Of a recording that began while its board was received: the jumps of time before it, since which all times are doubtful.
 pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
+/// Of a file without its end: what it lacks by its arrival numbers.
+const LEFT_OUT: &str = "dropped_or_left_out";
 /// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
 pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
 pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
@@ -724,14 +778,18 @@ pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
 pub(super) const BOARD_RESET: &str = "resets";
 pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
+/// Datagrams that are intact, and of another board than the first.
+const OTHER_BOARD: &str = "datagrams_of_another_board";
 /// Datagrams of version 1 that came again: version 1 does not number them, so that their events are there twice.
 const AGAIN: &str = "datagrams_decoded_again";
 /// Jumps of the times of version 1 ahead of the host's clock.
 pub(crate) const JUMPS: &str = "jumps_of_time";
-/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, and stamps that step back.
+/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step back,
+/// and how often the clock left that of arrival little by little.
 pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
 pub(super) const ANEW: &str = "clock_began_anew";
 pub(super) const BACK: &str = "stamps_out_of_order";
+pub(super) const DRIFTS: &str = "drifts_from_arrival";
 /// Datagrams of version 1 without bytes.
 pub(crate) const EMPTY: &str = "empty_datagrams";
 /// How often the sender had another address than before, as a board that got another one has, or another board.

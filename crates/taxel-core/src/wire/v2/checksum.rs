@@ -12,6 +12,13 @@ const LONG: usize = 192;
 #[cfg(target_arch = "x86_64")]
 pub(super) const EVEN: usize = 64;
 
+/// A datagram's bytes but for its checksum, and that checksum; it must have four bytes.
+#[inline(always)]
+pub(super) fn split(datagram: &[u8]) -> (&[u8], u32) {
+    let (summed, sum) = datagram.split_at(datagram.len() - 4);
+    (summed, u32::from_le_bytes([sum[0], sum[1], sum[2], sum[3]]))
+}
+
 /// The CRC-32C of bytes.
 #[inline]
 pub(super) fn crc32c(bytes: &[u8]) -> u32 {

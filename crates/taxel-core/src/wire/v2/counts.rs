@@ -27,7 +27,7 @@ pub struct Counts {
     pub datagrams: u64,
     /// Number of datagrams that were decoded.
     pub intact: u64,
-    /// Datagrams received before; not decoded again.
+    /// Datagrams received before, with the same contents; not decoded again.
     pub repeated: u64,
     /// Datagrams more than 65 536 numbers late, for which it is unknown whether they were received before; not decoded.
     pub old: u64,
@@ -37,7 +37,8 @@ pub struct Counts {
     pub long: u64,
     /// Refused datagrams: not of version 2, or of another board.
     pub foreign: u64,
-    /// Datagrams among these that are intact, and of another board than the first.
+    /// Datagrams among these that are intact, and of another board than the first: by its number, or as the session and number
+    /// came before with other contents.
     pub other_board: u64,
     /// Refused datagrams: the checksum does not match.
     pub checksum: u64,

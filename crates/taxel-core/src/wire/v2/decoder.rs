@@ -9,6 +9,7 @@ mod session;
 mod taken;
 mod words;
 
+use super::checksum::split;
 use super::counts::{Counts, Status};
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Refused};
 use crate::vectors::Instructions;
@@ -18,7 +19,7 @@ use crate::{Array, Events, Result, problem};
 use held::Held;
 #[cfg(target_arch = "x86_64")]
 use run::Run;
-use session::{Session, WINDOW};
+use session::{Noted, Session, WINDOW};
 use taken::Taken;
 pub use words::stream_rows;
 
@@ -40,7 +41,7 @@ pub enum Outcome {
         /// Whether the board was reset before this datagram.
         reset: bool,
     },
-    /// Received before, or too old to decide.
+    /// Received before with the same contents, or too old to decide.
     Repeated,
     /// Not a datagram of this board.
     Refused(Refused),
@@ -200,7 +201,7 @@ impl Decoder {
 
     fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Outcome {
         match Header::read(datagram) {
-            Ok((header, body)) => self.push_read(&header, body, arrived, out),
+            Ok((header, body)) => self.push_read(datagram, &header, body, arrived, out),
             Err(refused) => {
                 self.counts.datagrams += 1;
                 *match refused {
@@ -217,6 +218,7 @@ impl Decoder {
     /// As [`Self::push`], for a datagram that was already parsed and found intact.
     pub(in crate::wire) fn push_read(
         &mut self,
+        datagram: &[u8],
         header: &Header,
         body: &[u8],
         arrived: Option<i64>,
@@ -224,9 +226,7 @@ impl Decoder {
     ) -> Outcome {
         self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
-            self.counts.foreign += 1;
-            self.counts.other_board += 1;
-            return Outcome::Refused(Refused::Foreign);
+            return self.other_board();
         }
         let (which, reset) = match self.sessions.last() {
             // The usual case.
@@ -234,19 +234,22 @@ impl Decoder {
             _ => self.session(header, arrived),
         };
         let session = &mut self.sessions[which];
-        match session.note(session.number_of(header.sequence)) {
-            None => {
+        let number = session.number_of(header.sequence);
+        match session.note(number, split(datagram).1) {
+            Noted::Old => {
                 self.counts.old += 1;
                 return Outcome::Repeated;
             }
-            Some(false) => {
-                let number = session.number_of(header.sequence);
+            noted @ (Noted::Again | Noted::Unlike) => {
                 let in_turn = if number == self.again.0 { self.again.1 + 1 } else { 1 };
                 self.again = (number + 1, in_turn);
+                if noted == Noted::Unlike {
+                    return self.other_board();
+                }
                 self.counts.repeated += 1;
                 return Outcome::Repeated;
             }
-            Some(true) => self.again.1 = 0,
+            Noted::New => self.again.1 = 0,
         }
         session.latest = session.latest.max(header.base);
         let (base, missing) = (session.offset + header.base as i64, session.missing());
@@ -254,7 +257,6 @@ impl Decoder {
         self.counts.dropped += u64::from(header.flags & DROPPED != 0);
         self.counts.unknown_flags += u64::from(header.flags & !(FRAME_SYNC | DIFFERENCES | DROPPED) != 0);
         self.latest = self.latest.max(base);
-        let number = session.number_of(header.sequence);
         if which + 1 == self.sessions.len() {
             self.body(header, body, base, Some(number), out);
         } else {
@@ -270,6 +272,13 @@ impl Decoder {
         let until = (header.span > 0).then(|| base + i64::from(header.span));
         self.latest = self.latest.max(until.unwrap_or(i64::MIN));
         Outcome::Intact { until, missing, reset }
+    }
+
+    /// Leaves out an intact datagram of another board.
+    fn other_board(&mut self) -> Outcome {
+        self.counts.foreign += 1;
+        self.counts.other_board += 1;
+        Outcome::Refused(Refused::Foreign)
     }
 
     /// Decodes datagrams while they are plain and short, if the machine has the instructions; `out` has room for `most`

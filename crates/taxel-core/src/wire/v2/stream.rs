@@ -116,8 +116,8 @@ impl Sink for Filling<'_> {
         taken.bytes + LENGTH_BYTES * taken.datagrams
     }
 
-    fn take(&mut self, _: &[u8], header: &Header, body: &[u8]) {
-        self.0.push_read(header, body, None, &mut self.1);
+    fn take(&mut self, datagram: &[u8], header: &Header, body: &[u8]) {
+        self.0.push_read(datagram, header, body, None, &mut self.1);
     }
 }
 

@@ -34,7 +34,7 @@ pub struct Remarks {
     pub datagram_bytes: u64,
     /// Times of the first and the last arrival, ns since 1970.
     pub arrivals: Option<(i64, i64)>,
-    /// Arrival numbers of the datagrams.
+    /// Arrival numbers of the datagrams or lines.
     pub numbers: Numbers,
     /// Number of messages of each channel.
     pub messages: BTreeMap<Topic, u64>,
@@ -73,16 +73,22 @@ impl Numbers {
         }
     }
 
-    /// Number of datagrams whose arrival number another one before them has.
+    /// Number of messages whose arrival number another one before them has.
     #[must_use]
     pub fn repeated(&self) -> u64 {
         self.repeated
     }
 
-    /// Whether there are several datagrams, all with one arrival number.
+    /// Whether there are several messages, all with one arrival number.
     #[must_use]
     pub fn are_one(&self) -> bool {
         self.repeated > 0 && self.runs.len() == 1 && self.runs.iter().all(|(first, last)| first == last)
+    }
+
+    /// The least arrival number.
+    #[must_use]
+    pub fn first(&self) -> Option<u64> {
+        self.runs.keys().next().copied()
     }
 
     /// Number of arrival numbers that are missing between the first and the last.
@@ -151,7 +157,10 @@ impl Remarks {
                     self.board.push(BoardChange { at_ns: message.at_ns, ..value });
                 }
             }
-            Topic::Samples => self.samples += 1,
+            Topic::Samples => {
+                self.samples += 1;
+                self.numbers.add(message.number);
+            }
             Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
         }
     }

@@ -59,14 +59,46 @@ pub(super) struct Pending {
     pub(super) begun: bool,
     /// Whether the file waits for the board's clock ([`Writer::begin`](super::Writer::begin)), not only for the first data.
     for_clock: bool,
-    /// Number of datagrams and samples of each source.
-    pub(super) recorded: Vec<u64>,
+    /// What was written of each source.
+    pub(super) written: Vec<Written>,
     /// The final counts of each source except the first.
     pub(super) ends: BTreeMap<String, Counts>,
     /// How the recording ends; set once. The inner `None` is an end without finishing.
     end: Option<Option<Counts>>,
     /// Why writing failed; nothing is queued after it.
     failure: Option<WriteFailure>,
+}
+
+/// What was written of a source.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Written {
+    /// Number of datagrams, lines and pictures.
+    pub(super) data: u64,
+    /// Arrival number of the first of them.
+    first: Option<u64>,
+    /// Number of other messages whose loss a verdict tells.
+    others: BTreeMap<Topic, u64>,
+}
+
+impl Written {
+    fn add(&mut self, topic: Topic, number: u64) {
+        if topic.is_data() {
+            self.data += 1;
+            self.first.get_or_insert(number);
+        } else if topic.lost_in_file().is_some() {
+            *self.others.entry(topic).or_default() += 1;
+        }
+    }
+
+    /// Counts that state what a reader must find: all but the number of datagrams, which a caller counts while it records.
+    pub(super) fn so_far(&self, counts: Counts) -> Counts {
+        Counts { first: self.first, messages: self.others.clone(), ..counts }
+    }
+
+    /// The same at the end.
+    pub(super) fn at_end(&self, counts: Counts) -> Counts {
+        Counts { recorded: self.data, ..self.so_far(counts) }
+    }
 }
 
 /// The operating system's error of a failed write, which every later call returns; `io::Error` itself cannot be copied.
@@ -78,14 +110,14 @@ struct WriteFailure {
 
 impl WriteQueue {
     pub(super) fn new(plan: Plan, for_clock: bool) -> Self {
-        let recorded = vec![0; plan.header.sources.len() + 1];
+        let written = vec![Written::default(); plan.header.sources.len() + 1];
         Self {
             path: plan.file.path().to_owned(),
             plan: Mutex::new(Some(plan)),
             writer: Mutex::default(),
             thread: Mutex::default(),
             at_disk: Arc::new(AtomicBool::new(false)),
-            state: Mutex::new(Pending { recorded, for_clock, ..Pending::default() }),
+            state: Mutex::new(Pending { written, for_clock, ..Pending::default() }),
             work: Condvar::new(),
             room: Condvar::new(),
         }
@@ -120,16 +152,15 @@ impl WriteQueue {
         if state.begun && before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
             self.work.notify_all();
         }
+        state.written[source].add(topic, number);
         // The number in the format has 32 bits; the reader unwraps it.
         #[allow(clippy::cast_possible_truncation)]
         let number = number as u32;
         let at_ns = u64::try_from(at_ns).unwrap_or(0);
         state.queue.messages.push(Queued { channel: topic.channel(source), number, at_ns, bytes: bytes.len() });
         state.queue.since.get_or_insert_with(Instant::now);
-        let data = matches!(topic, Topic::Datagrams | Topic::Samples | Topic::Pictures);
-        state.recorded[source] += u64::from(data);
         if !state.begun {
-            if data && (!state.for_clock || state.queue.bytes.len() > WAITING_BYTES) {
+            if topic.is_data() && (!state.for_clock || state.queue.bytes.len() > WAITING_BYTES) {
                 drop(state);
                 self.begin(None)?;
             }
@@ -185,8 +216,8 @@ impl WriteQueue {
     pub(super) fn finish(&self, counts: Option<Counts>) -> Result<()> {
         {
             let mut state = self.lock();
-            let recorded = state.recorded[0];
-            state.end.get_or_insert(counts.map(|counts| Counts { recorded, ..counts }));
+            let counts = counts.map(|counts| state.written[0].at_end(counts));
+            state.end.get_or_insert(counts);
         }
         self.work.notify_all();
         let thread = lock(&self.thread).take();
@@ -254,7 +285,7 @@ impl WriteQueue {
             return Err(self.fail(error.into(), Some(file)));
         }
         file.file.check(|| {
-            let recorded: u64 = self.lock().recorded.iter().sum();
+            let recorded: u64 = self.lock().written.iter().map(|written| written.data).sum();
             format!("{recorded} datagrams and lines")
         })
     }

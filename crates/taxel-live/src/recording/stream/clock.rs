@@ -2,13 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::super::verdict::{ANEW, BACK, Found, JUMPS};
+use super::super::verdict::{ANEW, BACK, DRIFTS, Found, JUMPS};
 
 /// Range of a counter: whole numbers are assumed to have 32 bits.
 const TURN: f64 = 4_294_967_296.0;
 
 /// A clock that steps back by more than this against arrival has restarted, one that steps ahead by more has jumped, us.
 const STEP_US: f64 = 1e6;
+
+/// The part of what has passed by which the clock may be off, as no oscillator is.
+const DRIFT: f64 = 1e-2;
 
 /// Times are held in 64 bits: a stamp beyond this is no time, us.
 const FARTHEST_US: f64 = 4.6e18;
@@ -24,6 +27,7 @@ pub struct StreamClock {
     resets: u64,
     back: u64,
     jumps: u64,
+    drifts: u64,
     /// The time after which times are doubtful, us.
     after: Option<i64>,
 }
@@ -36,6 +40,52 @@ struct State {
     added: f64,
     /// The last time, with this addition, us, and its arrival time, ns.
     last: Option<(f64, i64)>,
+    anchor: Option<Anchor>,
+}
+
+/// With what later times are compared: the line that was the least late of the first second, as a source that has waited
+/// sends what it has at once.
+#[derive(Debug, Clone, Copy)]
+struct Anchor {
+    /// Its time, us, and its arrival time, ns.
+    at: (f64, i64),
+    /// The arrival time of the first line, ns.
+    first_ns: i64,
+    /// The largest time by which arrival went ahead from one line to the next, us: lines that come in packets are late
+    /// by up to this.
+    late: f64,
+    /// The last time that agreed with arrival, us.
+    sound: f64,
+    /// Whether it was told that a later one does not.
+    told: bool,
+}
+
+impl Anchor {
+    fn new(at: (f64, i64)) -> Self {
+        Self { at, first_ns: at.1, late: 0.0, sound: at.0, told: false }
+    }
+
+    /// Compares the next time, which `late` us more than by the clock have passed before; whether the clock is now off for
+    /// the first time.
+    #[allow(clippy::cast_precision_loss)]
+    fn is_left(&mut self, (t, at_ns): (f64, i64), late: f64) -> bool {
+        let passed = at_ns.saturating_sub(self.at.1) as f64 * 1e-3;
+        let off = passed - (t - self.at.0);
+        if (at_ns.saturating_sub(self.first_ns) as f64) < STEP_US * 1e3 {
+            if off < 0.0 {
+                self.at = (t, at_ns);
+            }
+            return false;
+        }
+        self.late = self.late.max(late);
+        let allowed = self.late + STEP_US.max(passed * DRIFT);
+        if off.abs() <= allowed * 0.1 {
+            self.sound = t;
+        }
+        let left = off.abs() > allowed && !self.told;
+        self.told |= left;
+        left
+    }
 }
 
 /// How a stamp follows the one before.
@@ -61,7 +111,7 @@ impl State {
         let turn = TURN * unit_us;
         let turns = (lacks / turn).round();
         // Arrival times determine the elapsed time within a second, or within a hundredth of a pause if that is longer.
-        let near = STEP_US.max(passed.abs() * 1e-2);
+        let near = STEP_US.max(passed.abs() * DRIFT);
         if self.whole && turns >= 1.0 && (lacks - turns * turn).abs() <= near {
             Step::Fits(turns * turn)
         } else if t < last - STEP_US && lacks > near {
@@ -84,8 +134,8 @@ impl State {
 impl StreamClock {
     /// The clock of stamps in this unit, us.
     pub fn new(unit_us: f64) -> Self {
-        let state = State { whole: true, added: 0.0, last: None };
-        Self { unit_us, state, before: None, resets: 0, back: 0, jumps: 0, after: None }
+        let state = State { whole: true, added: 0.0, last: None, anchor: None };
+        Self { unit_us, state, before: None, resets: 0, back: 0, jumps: 0, drifts: 0, after: None }
     }
 
     /// Converts a stamp to a time, us; none if it is no time.
@@ -110,6 +160,7 @@ impl StreamClock {
             self.state = state;
         }
         let state = self.state;
+        let anew = matches!(step, Step::Anew(_) | Step::Ahead);
         match step {
             Step::Fits(turns) => self.state.added += turns,
             Step::Back => {
@@ -128,8 +179,25 @@ impl StreamClock {
         }
         self.state.whole &= stamp.fract() == 0.0 && (0.0..TURN).contains(&stamp);
         let t = own + self.state.added;
+        self.compare(state.last, (t, at_ns), anew);
         self.state.last = Some((t, at_ns));
         Some(t.round() as i64)
+    }
+
+    /// Compares a time with arrival since the clock began, or began `anew`.
+    #[allow(clippy::cast_precision_loss)]
+    fn compare(&mut self, last: Option<(f64, i64)>, now: (f64, i64), anew: bool) {
+        let (before, at_ns) = last.unwrap_or(now);
+        let passed = now.1.saturating_sub(at_ns) as f64 * 1e-3;
+        let anchor = self.state.anchor.get_or_insert(Anchor::new(now));
+        if anew || passed < -STEP_US {
+            // The host's clock was set back where a line arrives before the one before it.
+            *anchor = Anchor::new(now);
+        } else if anchor.is_left(now, passed - (now.0 - before)) {
+            let sound = anchor.sound;
+            self.drifts += 1;
+            self.doubt(sound);
+        }
     }
 
     fn jumped(&mut self, last: Option<(f64, i64)>) {
@@ -145,7 +213,7 @@ impl StreamClock {
 
     /// What is wrong with the stamps so far.
     pub fn found(&self) -> Found {
-        let damage = [(ANEW, self.resets), (BACK, self.back), (JUMPS, self.jumps)];
+        let damage = [(ANEW, self.resets), (BACK, self.back), (JUMPS, self.jumps), (DRIFTS, self.drifts)];
         let damage: BTreeMap<String, u64> = damage.into_iter().map(|(cause, n)| (cause.to_owned(), n)).collect();
         Found { damage, doubtful_after_us: self.after, ..Found::default() }
     }

@@ -5,6 +5,19 @@ use crate::wire::v2::Header;
 /// How far a datagram may be behind the highest sequence number and still be distinguished from a repeated one.
 pub(super) const WINDOW: usize = 65_536;
 
+/// How a number follows those that came before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Noted {
+    /// It is new.
+    New,
+    /// It came before, with the same contents.
+    Again,
+    /// It came before, with other contents: another board sent one of the two.
+    Unlike,
+    /// It is too old to decide.
+    Old,
+}
+
 /// The state of one session: the datagrams between two resets.
 #[derive(Debug, Clone)]
 pub(super) struct Session {
@@ -17,6 +30,10 @@ pub(super) struct Session {
     pub(super) filled: i64,
     /// A bit for each number modulo the window: whether its datagram has arrived.
     seen: Vec<u64>,
+    /// Half of the checksum of the datagram that came under each number, counted from the first one modulo the window; as
+    /// many as were needed so far, as most streams are short.
+    sums: Vec<u16>,
+    first: i64,
     /// Added to the board's times, us.
     pub(super) offset: i64,
     /// The latest base time.
@@ -37,6 +54,8 @@ impl Session {
             from: i64::MIN,
             filled: 0,
             seen: vec![0; WINDOW / 64],
+            sums: vec![],
+            first,
             offset,
             latest: header.base,
         }
@@ -57,21 +76,21 @@ impl Session {
         (self.highest - self.lowest + 1) as u64 - self.received
     }
 
-    /// Records a number; none if it is too old, otherwise whether it is new.
+    /// Records a number, and the checksum of its datagram.
     #[inline(always)]
-    pub(super) fn note(&mut self, number: i64) -> Option<bool> {
+    pub(super) fn note(&mut self, number: i64, sum: u32) -> Noted {
         if (1..=64).contains(&(number - self.highest)) {
-            self.note_ahead(number);
-            return Some(true);
+            self.note_ahead(number, sum);
+            return Noted::New;
         }
-        self.note_out_of_turn(number)
+        self.note_out_of_turn(number, sum)
     }
 
     /// Records a number at most 64 ahead, the usual case, and clears the bits of the numbers between, which still
     /// describe numbers one window earlier. Branch-free, because a processor cannot predict after which datagrams
     /// numbers are missing.
     #[inline(always)]
-    fn note_ahead(&mut self, number: i64) {
+    fn note_ahead(&mut self, number: i64, sum: u32) {
         let (word, bit) = place(number);
         let between = (number - self.highest - 1) as u32;
         let here = between.min(bit.trailing_zeros());
@@ -80,13 +99,14 @@ impl Session {
         let before = (u64::MAX << 1) << (63 - (between - here));
         self.seen[(word + WINDOW / 64 - 1) % (WINDOW / 64)] &= !before;
         self.seen[word] = self.seen[word] & !below | bit;
+        self.store(number, sum);
         (self.highest, self.received) = (number, self.received + 1);
     }
 
     #[cold]
-    fn note_out_of_turn(&mut self, number: i64) -> Option<bool> {
+    fn note_out_of_turn(&mut self, number: i64, sum: u32) -> Noted {
         if number <= self.highest - WINDOW as i64 {
-            return None;
+            return Noted::Old;
         }
         if number > self.highest {
             self.clear((self.highest + 1).max(number + 1 - WINDOW as i64), number);
@@ -95,13 +115,37 @@ impl Session {
         let missing = self.missing();
         self.lowest = self.lowest.min(number);
         let (word, bit) = place(number);
-        let new = self.seen[word] & bit == 0;
+        if self.seen[word] & bit != 0 {
+            let same = self.sums.get(self.place_of_sum(number)) == Some(&(sum as u16));
+            return if same { Noted::Again } else { Noted::Unlike };
+        }
+        self.store(number, sum);
         self.seen[word] |= bit;
-        self.received += u64::from(new);
+        self.received += 1;
         if number < self.from {
             self.filled += missing as i64 - self.missing() as i64;
         }
-        Some(new)
+        Noted::New
+    }
+
+    #[inline(always)]
+    fn place_of_sum(&self, number: i64) -> usize {
+        (number - self.first) as usize % WINDOW
+    }
+
+    /// Stores half of a checksum: two contents that differ have one in 65 536 times.
+    #[inline(always)]
+    fn store(&mut self, number: i64, sum: u32) {
+        let place = self.place_of_sum(number);
+        if place >= self.sums.len() {
+            self.make_room(place);
+        }
+        self.sums[place] = sum as u16;
+    }
+
+    #[cold]
+    fn make_room(&mut self, place: usize) {
+        self.sums.resize((place + 1).next_power_of_two().max(1024), 0);
     }
 
     /// Clears the bits from `first` to `last`, at most a window of them, a word at a time because many may be missing.
@@ -122,14 +166,14 @@ fn place(number: i64) -> (usize, u64) {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
+    use std::collections::{BTreeMap, BTreeSet};
 
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
     use super::*;
 
     #[test]
-    fn a_number_is_new_once_however_far_apart_they_come() {
+    fn a_number_is_new_once_however_far_apart_they_come_and_then_its_contents_are_known() {
         let mut random = StdRng::seed_from_u64(1);
         for begin in [0, 7, u32::MAX - 40_000] {
             let mut bytes = vec![];
@@ -147,12 +191,22 @@ mod tests {
             header.write(&[], &mut bytes);
             let mut session = Session::new(&header, 0, false);
             let (mut seen, mut highest) = (BTreeSet::from([i64::from(begin)]), i64::from(begin));
-            assert_eq!(session.note(highest), Some(true));
+            let mut sums = BTreeMap::from([(highest, 7)]);
+            assert_eq!(session.note(highest, 7), Noted::New);
             for _ in 0..20_000 {
                 let far = [1, 3, 63, 64, 65, 700, 65_535, 65_536, 65_537, 200_000][random.random_range(0..10)];
                 let number = highest + if random.random() { 1 } else { random.random_range(-far..=far) };
-                let expected = (number > highest - WINDOW as i64).then(|| seen.insert(number));
-                assert_eq!(session.note(number), expected, "{number} of {highest}");
+                let sum = random.random_range(0..3);
+                let expected = match number > highest - WINDOW as i64 {
+                    false => Noted::Old,
+                    true if seen.insert(number) => Noted::New,
+                    true if sums[&number] == sum => Noted::Again,
+                    true => Noted::Unlike,
+                };
+                assert_eq!(session.note(number, sum), expected, "{number} of {highest}");
+                if expected == Noted::New {
+                    sums.insert(number, sum);
+                }
                 highest = highest.max(number);
             }
             assert_eq!(session.missing(), (highest + 1 - seen.first().unwrap()) as u64 - seen.len() as u64);
