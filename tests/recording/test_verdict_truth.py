@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import re
+import shutil
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -314,8 +316,12 @@ def test_stretches_that_are_merged_have_the_losses_of_the_whole_once(kind: str, 
     path, finish = tmp_path / "whole.mcap", bool(seed % 2)
     write(path, on_the_way(sent_by_a_board(400), draw, told), draw, told, finish=finish)
     whole = taxel.open(path)
+    # A copy of the file has another date.
+    copy = taxel.open(shutil.copy(path, tmp_path / "copy.mcap"))
+    os.utime(copy.path, (1e9, 1e9))
     bounds = np.sort(draw.integers(int(whole.events.t[0]), int(whole.events.t[-1]), 3)).tolist()
-    stretches = [whole.between(a, b) for a, b in itertools.pairwise([-np.inf, *bounds, np.inf])]
+    spans = itertools.pairwise([-np.inf, *bounds, np.inf])
+    stretches = [of.between(a, b) for of, (a, b) in zip(itertools.cycle((whole, copy)), spans, strict=False)]
     files = []
     for k, stretch in enumerate(stretches):
         # Some stay in memory, and some are cut again.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from taxel.recording.kinds import verdict_of
 from taxel.recording.verdict import Verdict
 
 __all__ = ["Apart", "between"]
+
+#: So many bytes at either end of a file name a recording.
+_END = 1 << 16
 
 
 def between(of: Contents, start: float, stop: float) -> Contents:
@@ -50,21 +53,30 @@ def between(of: Contents, start: float, stop: float) -> Contents:
 def _verdict(of: Contents) -> Verdict | None:
     """Return the verdict of a recording as that of one of its stretches, which names the whole.
 
-    The name follows from the file, or else from what there is, so that stretches that were cut at different times have
-    one; no datagram is read for it.
+    The name follows from the file's ends, or else from what there is, so that stretches that were cut at different
+    times or of a copy have one; no datagram is read for it.
     """
     if of.verdict is None:
         return None
     said = verdict_of(of)
     if said.stretch_of is not None:
         return said
-    about: list[Any] = [verdict_of(one).to_dict() for one in (of.sources or {of.label: of}).values()]
+    verdicts = [verdict_of(one).to_dict() for one in (of.sources or {of.label: of}).values()]
     try:
-        file = of.path.stat()
-        about += [file.st_size, file.st_mtime_ns]
+        about = _ends(of.path)
     except OSError:
-        about += [len(of.table), of.table.t[:1].tolist(), of.table.t[-1:].tolist()]
-    return said._as_stretch_of(hashlib.sha256(json.dumps(about).encode()).hexdigest()[:16])
+        about = json.dumps([len(of.table), of.table.t[:1].tolist(), of.table.t[-1:].tolist()]).encode()
+    return said._as_stretch_of(hashlib.sha256(json.dumps(verdicts).encode() + about).hexdigest()[:16])
+
+
+def _ends(path: Path) -> bytes:
+    """Return a file's size and its first and last bytes, in which times and checksums stand: a copy has the same."""
+    with path.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(size - _END, 0))
+        last = file.read(_END)
+        file.seek(0)
+        return b"%d " % size + file.read(_END) + last
 
 
 def _without_a_time(of: Contents) -> list[str]:
