@@ -179,6 +179,7 @@ def pairwise(
 def live_defaults() -> str: ...
 
 UNKNOWN: Final = 65_535
+LOADED_TICKS: Final = 8.0
 
 @final
 class HeldValues:
@@ -202,6 +203,9 @@ class TrackedRest:
     @property
     def begins(self) -> NDArray[np.float64]: ...
 
+def lain(
+    less: NDArray[np.float64], columns: int, above: float, corner: tuple[int, int]
+) -> tuple[NDArray[np.float64], str]: ...
 def touched_above(noise_floor: float) -> float: ...
 
 @final

@@ -62,7 +62,15 @@ SOUND: dict[str, Sound] = {
     "taxel.health": plain(taxel.health, recorded=EVENTS),
     "taxel.Note": lambda: (
         lambda **given: taxel.open("here_events.npz").with_notes([taxel.Note(**given)]),
-        {"text": "heel", "t": 100, "at_ns": 0, "recording": "", "source": "", "replaces": 50},
+        {
+            "text": "heel",
+            "t": 100,
+            "at_ns": 0,
+            "recording": "",
+            "source": "",
+            "replaces": 50,
+            "others": (("comment", "slow"),),
+        },
     ),
     "taxel.Recording": lambda: (taxel.Recording, {"contents": taxel.open("here_events.npz")._contents}),
     "taxel.Recording.on_clock": lambda: (taxel.open("here_clock.mcap").on_clock, {"name": "host"}),

@@ -23,6 +23,7 @@ pub mod baseline;
 pub mod events;
 pub mod frames;
 pub mod held;
+pub mod lain;
 pub mod rest;
 pub mod spikes;
 pub mod touch_counts;

@@ -17,7 +17,6 @@ mod hub;
 mod indexed;
 mod keyframe_index;
 mod labels;
-mod lain;
 mod limits;
 mod live_source;
 mod messages;

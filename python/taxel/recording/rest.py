@@ -48,7 +48,7 @@ RANGE_TICKS = 150.0
 
 #: Reading: what a taxel reads in a quiet stretch is not its rest, but a load that stood still, if in more than this
 #: share of all pictures it reads less by so many ticks.
-LOADED_SHARE, LOADED_TICKS = 0.1, 8.0
+LOADED_SHARE, LOADED_TICKS = 0.1, _core.LOADED_TICKS
 #: Values fall from a rest if they go so many times as far below it as above it, in the taxel that does so third most:
 #: bad taxels move alone or in pairs. In ...
 _FALLS, _THIRD = 3.0, 3
@@ -256,29 +256,8 @@ def found(
     if np.isnan(begins).all():
         return Rest("none", unknown)
     lay = quiet / np.maximum(in_quiet, 1) + np.where(loaded, less / np.maximum(released, 1), 0.0)
-    lay = _together(np.where(lay > LOADED_TICKS / scale, lay, 0.0), columns, int(np.count_nonzero(known)))
-    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, lay=lay, on=_where(lay, columns, corner))
-
-
-def _together(lay: NDArray[np.float64], columns: int, known: int) -> NDArray[np.float64]:
-    """Return a load without the taxels that are alone; 0 of channels, and where so many are loaded that it is drift."""
-    on = lay.reshape(-1, columns) > 0
-    if min(on.shape) < _THIRD:
-        return np.zeros_like(lay)
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(on, 1), (3, 3)).sum(axis=(2, 3))
-    lay = np.where((on & (around >= _THIRD)).reshape(-1), lay, 0.0)
-    return lay if np.count_nonzero(lay) <= known / 2 else np.zeros_like(lay)
-
-
-def _where(lay: NDArray[np.float64], columns: int, corner: tuple[int, int]) -> str:
-    """Return the rows and columns of a load, and how large it is at most; "" of none."""
-    if not lay.any():
-        return ""
-    sides = []
-    for name, places, first in zip(("row", "column"), np.divmod(np.flatnonzero(lay), columns), corner, strict=True):
-        least, most = int(places.min()) + first, int(places.max()) + first
-        sides.append(f"{name} {least}" if least == most else f"{name}s {least} to {most}")
-    return f"{', '.join(sides)} (up to {lay.max():.3g} above rest)"
+    lay, on = _core.lain(np.where(known > 0, lay, np.nan), columns, LOADED_TICKS / scale, corner)
+    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, lay=lay, on=on)
 
 
 def of_pictures(frames: Frames) -> Rest:

@@ -15,9 +15,9 @@ use taxel_core::{Array, Events, problem};
 use super::event_rate::EventRate;
 use super::{Activity, ChangeReader, KeyframeIndex, Read};
 use crate::array_state::{ArrayState, Keyframe};
-use crate::lain::lain;
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
+use taxel_core::lain::{LOADED_TICKS, lain, place};
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::Change;
 use taxel_live::recording::{
@@ -284,7 +284,8 @@ impl RecordingIndex {
         self.remarks = contents.remarks;
         self.verdict = contents.verdict;
         self.pace = contents.clock.pace();
-        self.on = lain(&state.rests_less(), &self.header.array);
+        let columns = usize::from(self.header.array.columns);
+        self.on = place(&lain(&state.rests_less(), columns, LOADED_TICKS), columns, (0, 0));
         state.update_curve();
         let columns = state.time_columns().clone();
         let whole =
