@@ -21,7 +21,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["rest"],
             &["baseline", "circuit"],
             &["tracked_rest"],
-            &["touch_counts"],
+            &["lain", "touch_counts"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],

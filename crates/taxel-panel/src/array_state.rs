@@ -6,7 +6,6 @@
 use std::sync::Arc;
 
 use super::centre::Coordinates;
-use super::keyframe_index::Pictures;
 use super::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, TimeColumns, column_of};
 use super::weights::Weights;
 use taxel_core::Array;
@@ -180,12 +179,17 @@ impl ArrayState {
         state
     }
 
-    /// The state where these pictures are shown: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change
+    /// The state where pictures are shown, whose taxels have these weights, and columns these sources: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change
     /// without a value is a value that is missing from then on, and pictures are counted as events are.
     #[must_use]
-    pub(crate) fn of_pictures(mut self, from: &Keyframe, pictures: &dyn Pictures) -> Self {
-        (self.pictures, self.weights) = (Some(pictures.rest_source()), pictures.weights().clone());
-        self.source_of = pictures.source_of();
+    pub(crate) fn of_pictures(
+        mut self,
+        from: &Keyframe,
+        rest: RestSource,
+        weights: Weights,
+        source_of: Arc<[usize]>,
+    ) -> Self {
+        (self.pictures, self.weights, self.source_of) = (Some(rest), weights, source_of);
         self.sums = vec![(0, 0); self.source_of.last().map_or(0, |last| last + 1)];
         self.time_columns = self.time_columns.with_sources(self.sums.len());
         (self.tracked, self.track_at) = (None, None);
