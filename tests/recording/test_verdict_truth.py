@@ -201,7 +201,12 @@ def test_loss_in_a_board_s_own_last_second_is_seen_in_a_file_without_its_end(tmp
 
 
 def written_anew(
-    of: Path, path: Path, times: Callable[[int], int], number: Callable[[int], int], topic: str = "/datagrams"
+    of: Path,
+    path: Path,
+    times: Callable[[int], int],
+    number: Callable[[int], int],
+    topic: str = "/datagrams",
+    data: Callable[[int, bytes], bytes] = lambda _, data: data,
 ) -> list[int]:
     """Write a recording by the official library; return how many of a topic are there 0 times, once and twice."""
     with of.open("rb") as source, path.open("wb") as file:
@@ -220,7 +225,8 @@ def written_anew(
             if channel.topic == topic:
                 copies = times(message.sequence if topic == "/datagrams" else sum(there))
                 there[copies] += 1
-            said = message.log_time, message.data, message.publish_time, number(message.sequence)
+            held = data(message.sequence, message.data) if channel.topic == topic else message.data
+            said = message.log_time, held, message.publish_time, number(message.sequence)
             for _ in range(copies):
                 writer.add_message(channels[channel.topic], *said)
         for one in metadata[1:]:
@@ -237,6 +243,64 @@ def test_what_another_program_left_out_of_a_finished_file_is_lost(keeps: Callabl
     verdict = taxel.open(tmp_path / "b.mcap").verdict
     assert verdict.lost == ({"lost_in_file": left_out} if left_out else {})
     assert verdict.status == ("lost" if left_out else "complete after arrival")
+
+
+@pytest.mark.parametrize("change", ["nothing", "a bit", "emptied", "halved", "its neighbour", "all of one number"])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_another_program_changed_in_a_finished_file_is_damage(change: str, seed: int, tmp_path: Path) -> None:
+    """Its checksums fit what it wrote; the recorder's own sum says what there was."""
+    draw, told = np.random.default_rng(seed), Told()
+    path = tmp_path / "a.mcap"
+    write(path, on_the_way(sent_by_a_board(120), draw, told), draw, told, finish=True)
+    whole, which = taxel.open(path), set(draw.choice(np.arange(20, 100), 3, replace=False).tolist())
+    before = b""
+
+    def data(number: int, held: bytes) -> bytes:
+        nonlocal before
+        before, neighbour = held, before
+        if number not in which or change == "nothing":
+            return held
+        if change == "a bit":
+            at = int(draw.integers(0, len(held)))
+            return held[:at] + bytes([held[at] ^ 1 << int(draw.integers(0, 8))]) + held[at + 1 :]
+        return {"emptied": b"", "halved": held[: len(held) // 2], "its neighbour": neighbour}.get(change, held)
+
+    number = (lambda _: 7) if change == "all of one number" else (lambda n: n)
+    written_anew(path, tmp_path / "b.mcap", lambda _: 1, number, data=data)
+    anew = taxel.open(tmp_path / "b.mcap")
+    if change in ("nothing", "all of one number"):
+        assert anew.verdict == whole.verdict
+        return
+    assert anew.verdict.damaged.get("changed_since_recorded") == 1, anew.verdict.to_dict()
+    assert anew.verdict.status in ("damaged", "lost")
+    assert "what it holds is not what was recorded" in anew.verdict
+    if change == "its neighbour":
+        assert anew.verdict.lost.get("lost_in_file", 0) > 0
+    for ending in ("npz", "h5", "mcap"):
+        taxel.convert(anew, tmp_path / f"c.{ending}")
+        assert taxel.open(tmp_path / f"c.{ending}").verdict.to_dict() == anew.verdict.to_dict()
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_a_verdict_on_any_counts_reads_back_from_its_dict(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    causes = [
+        *("bytes_skipped", "short_events", "contradictory_kinds", "outside_the_array", "unpaired_intensities"),
+        *("events_out_of_order", "jumps_of_time", "datagrams_decoded_again", "datagrams_repeated", "datagrams_damaged"),
+        *("datagrams_of_another_board", "datagrams_too_late", "taxels_outside_the_array", "malformed_bodies"),
+        *("datagrams_of_an_unknown_kind", "datagrams_with_unknown_flags", "markers_with_an_unknown_code"),
+        *("board_dropped", "events_dropped_by_board", "resets", "events_repaired", "restarts_of_its_clock"),
+        *("changes_of_address", "differences_from_an_unknown_value"),
+    ]
+    chosen = [causes[seed]] if seed < len(causes) else draw.choice(causes, int(draw.integers(2, 5)), replace=False)
+    counts = {
+        "received": 100,
+        "recorded": 100,
+        "decoder": {str(cause): int(draw.integers(1, 9)) for cause in chosen},
+        "missing": None if draw.random() < 0.5 else int(draw.integers(0, 4)),
+    }
+    verdict = Verdict._of({"file": {"messages": 100, "ending": {"finished": {"counts": counts}}}})
+    assert Verdict.from_dict(json.loads(json.dumps(verdict.to_dict()))).to_dict() == verdict.to_dict()
 
 
 @pytest.mark.parametrize("cut", [0, 300])

@@ -224,7 +224,7 @@ class _Source:
     def verdict(self, found: Callable[[], str] | None = None) -> Verdict:
         """Return what was lost at which stage; `found` decodes a board or a stream, and returns what it found."""
         condition = self.remarks()["condition"]
-        if found is not None and condition["messages"] and self.must_decode():
+        if found is not None and condition["messages"] and (condition["changed"] or self.must_decode()):
             condition = condition | {"decoded": json.loads(found())}
         return Verdict._of({"file": condition})
 

@@ -268,7 +268,13 @@ impl Reader {
             let known = missing.max(not_there).unwrap_or(listed);
             lost.insert(topic, known.max(so_far(topic).map_or(0, |n| n.saturating_sub(read))));
         }
+        let of_what_came = match &self.ending {
+            Some(Ending::Finished { counts }) => counts.sum,
+            _ => None,
+        };
+        let all_there = repeated == 0 && lost.values().all(|n| *n == 0);
         Condition {
+            changed: all_there && of_what_came.is_some_and(|sum| sum != remarks.sum),
             ending: self.ending.clone(),
             rebuilt: self.rebuilt,
             bad_chunks: unread.chunks,

@@ -125,6 +125,11 @@ pub struct Counts {
     /// Number of the other messages recorded, by channel.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub messages: BTreeMap<Topic, u64>,
+    /// At the end, the sum of the CRC-32 of the datagrams or lines recorded, modulo 2^32: whether what a file holds is what
+    /// was recorded, whoever wrote it since, in whatever order. That of CRC-32C is one number for all intact datagrams of
+    /// version 2, which end with theirs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sum: Option<u32>,
     /// What the decoder could not use of the bytes received, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
     /// What was lost between the computer that received the datagrams and this one, if they are different.
@@ -219,6 +224,8 @@ pub struct Condition {
     pub skipped_numbers: u64,
     /// Those that it lacks before its first one, since the recording began.
     pub before_first: u64,
+    /// Whether the datagrams or lines, of which none is missing, are not those that were recorded.
+    pub changed: bool,
     /// The last counts before the end.
     pub so_far: Option<Counts>,
     /// The verdict of the recording that this one was converted from, as the header states it.
@@ -264,6 +271,16 @@ impl Found {
 }
 
 impl Counts {
+    /// What the decoder could not use, by cause, with what reading the file found.
+    fn decoder_with(&self, found: &BTreeMap<String, u64>) -> BTreeMap<String, u64> {
+        let mut all = self.decoder.clone();
+        for (cause, n) in found {
+            let known = all.entry(cause.clone()).or_default();
+            *known = (*known).max(*n);
+        }
+        all
+    }
+
     /// The verdict: nothing lost after arrival, or what was lost where.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
@@ -458,7 +475,7 @@ impl Verdict {
     /// The verdict on a source of a file.
     fn of_file(condition: Condition) -> Self {
         let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { before_first, repeated, so_far, converted, decoded, lines, origin_us, .. } = condition;
+        let Condition { before_first, repeated, changed, so_far, converted, decoded, lines, origin_us, .. } = condition;
         let is_converted = converted.is_some();
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
         let mut decoded = decoded.unwrap_or_default();
@@ -466,8 +483,16 @@ impl Verdict {
         let mut no_counts = false;
         let (mut verdict, why) = match ending {
             Some(Ending::Finished { counts }) => {
-                let converted = converted.or(counts.converted);
-                (Self::of_counts(&Counts { converted, ..counts }, nothing_lost), None)
+                let converted = converted.or(counts.converted.clone());
+                let mut counts = Counts { converted, ..counts };
+                if changed && !skipped {
+                    // What reading lacks beside what had been missing when it was recorded was lost with the change.
+                    let before = counts.missing.unwrap_or(0);
+                    let since = decoded.missing.map_or(0, |missing| missing.saturating_sub(before));
+                    *lost.entry(Topic::Datagrams).or_default() += since;
+                    counts.decoder = counts.decoder_with(&decoded.damage);
+                }
+                (Self::of_counts(&counts, nothing_lost), None)
             }
             ending => {
                 let why = match ending {
@@ -521,6 +546,7 @@ impl Verdict {
                 "bytes_after_end",
                 format!("{} behind its end not read", counted(rebuilt.bytes_after_end, "byte")),
             ),
+            (changed.into(), "changed_since_recorded", "what it holds is not what was recorded".to_owned()),
             (repeated, "repeated_in_file", format!("{} there twice", counted(repeated, "message"))),
             (rebuilt.no_summary.into(), "no_summary", "the summary at the end missing or damaged".to_owned()),
         ] {
@@ -701,7 +727,12 @@ impl Verdict {
     fn of_line(line: &str) -> Self {
         // Versions before wrote from what a recording was converted into its verdict.
         let text = line.rsplit("a recording that says: ").next().unwrap_or(line).to_owned();
-        let has = |words: &[&str]| words.iter().any(|words| text.contains(words));
+        // Datagrams that came again are no damage.
+        let repeated = |piece: &&str| {
+            piece.contains("in the bytes that came: ") && !piece.contains(", ") && piece.ends_with(" repeated")
+        };
+        let told: Vec<&str> = text.split("; ").filter(|piece| !repeated(piece)).collect();
+        let has = |words: &[&str]| words.iter().any(|words| told.iter().any(|piece| piece.contains(words)));
         let status = if has(&["nothing arrived"]) {
             Status::NothingArrived
         } else if has(&["LOST"]) {
@@ -735,10 +766,7 @@ fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64, before_fi
     // If more was received than the file holds, the difference is in its unfinished end.
     counts.received = 0;
     counts.left_out = (skipped_numbers + before_first).saturating_sub(counts.dropped_by_queue);
-    for (cause, n) in found.damage {
-        let known = counts.decoder.entry(cause).or_default();
-        *known = n.max(*known);
-    }
+    counts.decoder = counts.decoder_with(&found.damage);
     // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
     // among the board's numbers too.
     let missing =

@@ -36,6 +36,8 @@ pub struct Remarks {
     pub arrivals: Option<(i64, i64)>,
     /// Arrival numbers of the datagrams or lines.
     pub numbers: Numbers,
+    /// Sum of the CRC-32 of the datagrams or lines, modulo 2^32.
+    pub sum: u32,
     /// Number of messages of each channel.
     pub messages: BTreeMap<Topic, u64>,
     /// Number of pictures.
@@ -103,6 +105,9 @@ impl Remarks {
     /// Adds a message; datagrams and pictures are only counted.
     pub fn add(&mut self, message: &Message<'_>) {
         *self.messages.entry(message.topic).or_default() += 1;
+        if message.topic.is_data() {
+            self.sum = self.sum.wrapping_add(crc32fast::hash(message.data));
+        }
         match message.topic {
             Topic::Datagrams => {
                 self.datagrams += 1;

@@ -78,12 +78,15 @@ pub(super) struct Written {
     first: Option<u64>,
     /// Number of other messages whose loss a verdict tells.
     others: BTreeMap<Topic, u64>,
+    /// Sum of the checksums of the datagrams and lines.
+    sum: u32,
 }
 
 impl Written {
-    fn add(&mut self, topic: Topic, number: u64) {
+    fn add(&mut self, topic: Topic, number: u64, checksum: u32) {
         if topic.is_data() {
             self.data += 1;
+            self.sum = self.sum.wrapping_add(checksum);
             self.first.get_or_insert(number);
         } else if topic.lost_in_file().is_some() {
             *self.others.entry(topic).or_default() += 1;
@@ -97,7 +100,7 @@ impl Written {
 
     /// The same at the end.
     pub(super) fn at_end(&self, counts: Counts) -> Counts {
-        Counts { recorded: self.data, ..self.so_far(counts) }
+        Counts { recorded: self.data, sum: Some(self.sum), ..self.so_far(counts) }
     }
 }
 
@@ -136,6 +139,7 @@ impl WriteQueue {
         bytes: &[u8],
         most: usize,
     ) -> Result<()> {
+        let checksum = if topic.is_data() { crc32fast::hash(bytes) } else { 0 };
         let mut state = self.lock();
         while state.begun && state.queue.bytes.len() >= most && state.failure.is_none() {
             self.work.notify_all();
@@ -152,7 +156,7 @@ impl WriteQueue {
         if state.begun && before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
             self.work.notify_all();
         }
-        state.written[source].add(topic, number);
+        state.written[source].add(topic, number, checksum);
         // The number in the format has 32 bits; the reader unwraps it.
         #[allow(clippy::cast_possible_truncation)]
         let number = number as u32;
