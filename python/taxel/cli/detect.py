@@ -131,11 +131,15 @@ def _warn_of_losses(recording: Recording) -> None:
 
 @contextmanager
 def _naming(recording: str, readout: Path) -> Iterator[None]:
-    """Name the recording and the readout that an error is about."""
+    """Name the recording and the readout that an error is about; of a missing tare not the part that needs it."""
     try:
         yield
     except ProblemError as error:
-        raise ProblemError(f"{recording}, by {readout}: {error}") from None
+        lacks_tare = " without a tare: " in str(error)
+        said = (
+            "the readout needs the taxels' rest: give --tare SECONDS at rest, or --tare FILE" if lacks_tare else error
+        )
+        raise ProblemError(f"{recording}, by {readout}: {said}") from None
 
 
 def _result(
@@ -177,7 +181,7 @@ def _result(
 
 
 def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
-    """Return what may have kept detections away: values that fall from their rest, or a rest that drifted off."""
+    """Return what may keep detections away or make false ones: values that fall from their rest, or a drifted rest."""
     from taxel.detect import PlainRule, Readout  # noqa: PLC0415  the command line starts quickly
     from taxel.detect.advice import drifted  # noqa: PLC0415
     from taxel.encode import ContactArea, Moments  # noqa: PLC0415
@@ -186,8 +190,8 @@ def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
     from taxel.recording.rest import of_pictures  # noqa: PLC0415
 
     source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
-    if not len(outcome.found) and isinstance(source, Frames) and (rest := of_pictures(source)).falls:
-        return f"rest: {rest}"
+    if isinstance(source, Frames) and (rest := of_pictures(source)).falls:
+        return f"rest: {rest.text(getattr(outcome.example.source, 'path', None))}"
     # The local load tracks the rest.
     floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []
     for part in readout.encoder._each() if isinstance(readout, Readout) else ():
