@@ -17,7 +17,15 @@ from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_or_by_unit, try_report
+from taxel.cli._recordings import (
+    READ_HELP,
+    TARE_HELP,
+    end_of_rest_us,
+    progress,
+    references,
+    tare_or_by_unit,
+    try_report,
+)
 from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
@@ -37,9 +45,7 @@ _ROWS = 40
 @app.command()
 @with_file_options
 def detect(
-    recording: Annotated[
-        Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5, or a folder of them.")
-    ],
+    recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}, or a folder of them.")],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     files: FileOptions,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,

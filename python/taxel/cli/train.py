@@ -18,6 +18,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import (
+    READ_HELP,
     SET_HELP,
     TARE_HELP,
     assignments,
@@ -42,9 +43,7 @@ __all__ = ["train"]
 @app.command()
 @with_file_options
 def train(
-    recordings: Annotated[
-        list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5, or folders of them.")
-    ],
+    recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
     files: FileOptions,
     labels: Annotated[
         str, typer.Option(help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own notes.")
