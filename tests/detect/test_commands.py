@@ -82,6 +82,7 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
     code, out, _ = call(capsys, *arguments, "--truth", folder / "labels.csv", "--window-ms", 10)
     assert (code, out.count("contact")) == (0, 6 + 4)
     assert "known (ms)" in out
+    assert "slope (mV/ms)" in out
     assert "not scored" not in out
     # Labels that the readout does not have do not count as missed; they are named.
     more = folder / "more.csv"

@@ -281,3 +281,18 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     (tmp_path / "palm.layout.toml").write_text("falls = true\n")
     assert json.loads(call(capsys, *command, "--json")[1])["hint"] is None
     assert "falls" not in call(capsys, "train", tmp_path / "palm.npz", "-o", tmp_path / "b.json")[2]
+
+
+def test_a_slope_that_all_detections_have_is_no_column(tmp_path, capsys) -> None:
+    """Levels of pictures come in steps, so presses have one slope; the file has it."""
+    taxel.convert(palm(5, 1, 0.4), tmp_path / "palm.npz")
+    rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
+    (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
+    assert call(capsys, "train", tmp_path / "palm.npz", "-o", tmp_path / "a.json")[0] == 0
+    command = ("detect", tmp_path / "palm.npz", "--readout", tmp_path / "a.json", "--tare", "0.9")
+    slopes = [one["slope_mv_per_ms"] for one in json.loads(call(capsys, *command, "--json")[1])["detections"]]
+    assert len(slopes) == 12
+    assert slopes == pytest.approx([slopes[0]] * 12)
+    shown = call(capsys, *command)[1]
+    assert shown.count("press") == 13
+    assert "slope" not in shown

@@ -246,8 +246,8 @@ def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:
         typer.echo(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
     first = detections[:_ROWS]
-    # A plain rule has no slope.
-    sloped = not np.isnan(first.slope).all()
+    # A plain rule has no slope; levels of pictures come in steps, and may give one for all.
+    sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1
     typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
         typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped)
