@@ -368,6 +368,19 @@ def test_the_command_that_follows_a_training_is_said_and_runs(
     assert (code, found.count("contact")) == (0, 6 + 1)
 
 
+@pytest.mark.parametrize("first", [1_000_000, 2_500_000, 3_700_000])
+def test_the_tare_that_is_said_is_no_more_than_half_of_the_recording(tmp_path: Path, capsys, first: int) -> None:
+    values = np.random.default_rng(1).normal(100.0, 1.0, (400, 4, 4))
+    values[first // 10_000 : first // 10_000 + 10, 1:3, 1:3] += 300.0
+    taxel.convert(taxel.Frames(values, np.arange(400) * 10_000, unit="counts"), tmp_path / "a.npz")
+    (tmp_path / "a.notes.csv").write_text(f"label,t_us\ncontact,{first}\n")
+    code, said, _ = call(capsys, "train", tmp_path / "a.npz", "-o", tmp_path / "a.json")
+    assert code == 0
+    [tare] = re.findall(r"--tare ([\d.]+)$", said, re.MULTILINE)
+    assert float(tare) == pytest.approx(min(first / 1e6 - 0.02, 1.995))
+    assert call(capsys, "detect", tmp_path / "a.npz", "--readout", tmp_path / "a.json", "--tare", tare)[0] == 0
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_too_few_labels_are_said_before_parameters(folder: Path, capsys, tmp_path: Path, count: int) -> None:
     """Below four, other parameters are no remedy, though events are out of reach."""

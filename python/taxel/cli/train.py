@@ -183,36 +183,41 @@ def _of_label(place: Path, label: str) -> Path:
     return place.with_name(f"{place.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{place.suffix}")
 
 
-def _taken(examples: Sequence[Example]) -> list[tuple[float, float]]:
-    """Return from when to when each recording's tare was taken, ms; of those whose rest is 0 by their unit nothing."""
+def _taken(examples: Sequence[Example]) -> list[tuple[int, int, int]]:
+    """Return from when to when each recording's tare was taken, and how long it lasts, us.
+
+    Of those whose rest is 0 by their unit nothing.
+    """
     from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
     from taxel.recording.rest import BY_UNIT  # noqa: PLC0415
-    from taxel.spikes import SpikeTrains, to_ms  # noqa: PLC0415
+    from taxel.spikes import SpikeTrains  # noqa: PLC0415
 
     spans = []
     for one in examples:
         source = recorded(one.source)
         if one.tare is not None and one.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
-            begin, end = (to_ms(us - int(source.t[0])) for us in (one.tare.start_us, one.tare.stop_us))
-            spans.append((begin, end))
+            first = int(source.t[0])
+            spans.append((one.tare.start_us - first, one.tare.stop_us - first, int(source.t[-1]) - first))
     return spans
 
 
-def _tares(spans: Sequence[tuple[float, float]]) -> str:
+def _tares(spans: Sequence[tuple[int, int, int]]) -> str:
     """Return the line of which tares were taken from the recordings."""
-    lengths = [end - begin for begin, end in spans]
+    from taxel.spikes import to_ms  # noqa: PLC0415  the command line starts quickly
+
+    lengths = [to_ms(end - begin) for begin, end, _ in spans]
     said = f"of each of {len(spans)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long" if spans else ""
     if len(spans) == 1:
-        said = "what the recording holds from {:g} to {:g} ms".format(*spans[0])
+        said = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, spans[0][:2]))
     return f"tare: {said}; --tare gives another" if said else ""
 
 
-def _tare_again(spans: Sequence[tuple[float, float]]) -> str:
-    """Return the --tare that has a rest in each recording: the seconds at its beginning that all rested."""
-    if not spans:
-        return ""
-    # Rounded down, as a touch may follow.
-    return "SECONDS" if any(begin > 0 for begin, _ in spans) else f"{int(min(end for _, end in spans)) / 1e3:g}"
+def _tare_again(spans: Sequence[tuple[int, int, int]]) -> str:
+    """Return the --tare of the seconds that each recording begins with at rest; "" where none needs one."""
+    if not spans or any(begin > 0 for begin, *_ in spans):
+        return "SECONDS" if spans else ""
+    # More than half of a recording is refused.
+    return f"{min(min(end, lasts // 2) for _, end, lasts in spans) / 1e6:g}"
 
 
 def _planned(
