@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -81,6 +82,7 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
     code, out, _ = call(capsys, *arguments, "--truth", folder / "labels.csv", "--window-ms", 10)
     assert (code, out.count("contact")) == (0, 6 + 4)
     assert "known (ms)" in out
+    assert "slope (mV/ms)" in out
     assert "not scored" not in out
     # Labels that the readout does not have do not count as missed; they are named.
     more = folder / "more.csv"
@@ -279,7 +281,10 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         (("detect", "none.npz", "--readout", "touch.json"), "none.npz: no such file"),
         (("detect", "9.npz", "--readout", "none.json"), "none.json: no such file"),
         (("detect", "9.npz", "--readout", "labels.csv"), "labels.csv: readout: not JSON"),
-        (("detect", "9.npz", "--readout", "touch.json"), "tare"),
+        (
+            ("detect", "9.npz", "--readout", "touch.json"),
+            "touch.json: the readout needs the taxels' rest: give --tare SECONDS at rest, or --tare FILE",
+        ),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "-1"), "--tare -1: must be seconds above 0"),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "none.json"), "none.json: no such file"),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "tare.json", "--frame-us", "0"), "--frame-us is 0"),
@@ -343,6 +348,52 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     assert (code, error.count("\n")) == (2, 1)
     assert "before its first label" in error
     assert "--tare SECONDS" in error
+
+
+@pytest.mark.parametrize("given", [None, "tare.json", "0.05"])
+def test_the_command_that_follows_a_training_is_said_and_runs(
+    folder: Path, monkeypatch, capsys, tmp_path: Path, given: str | None
+) -> None:
+    monkeypatch.chdir(folder)
+    out = tmp_path / "a readout.json"
+    command = ("train", "9.npz", "--labels", "truth.csv", "--recipe", "recipe.toml", "-o", out)
+    code, said, _ = call(capsys, *command, *(() if given is None else ("--tare", given)))
+    assert code == 0
+    [following] = re.findall(r"^written to .*; next: taxel (.*)$", said, re.MULTILINE)
+    detect = ["9.npz" if word == "RECORDING" else word for word in shlex.split(following)]
+    assert detect[:4] == ["detect", "9.npz", "--readout", str(out)]
+    if given is not None:
+        assert detect[-1] == given
+    code, found, _ = call(capsys, *detect)
+    assert (code, found.count("contact")) == (0, 6 + 1)
+
+
+@pytest.mark.parametrize("first", [1_000_000, 2_500_000, 3_700_000])
+def test_the_tare_that_is_said_is_no_more_than_half_of_the_recording(tmp_path: Path, capsys, first: int) -> None:
+    values = np.random.default_rng(1).normal(100.0, 1.0, (400, 4, 4))
+    values[first // 10_000 : first // 10_000 + 10, 1:3, 1:3] += 300.0
+    taxel.convert(taxel.Frames(values, np.arange(400) * 10_000, unit="counts"), tmp_path / "a.npz")
+    (tmp_path / "a.notes.csv").write_text(f"label,t_us\ncontact,{first}\n")
+    code, said, _ = call(capsys, "train", tmp_path / "a.npz", "-o", tmp_path / "a.json")
+    assert code == 0
+    [tare] = re.findall(r"--tare ([\d.]+)$", said, re.MULTILINE)
+    assert float(tare) == pytest.approx(min(first / 1e6 - 0.02, 1.995))
+    assert call(capsys, "detect", tmp_path / "a.npz", "--readout", tmp_path / "a.json", "--tare", tare)[0] == 0
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_too_few_labels_are_said_before_parameters(folder: Path, capsys, tmp_path: Path, count: int) -> None:
+    """Below four, other parameters are no remedy, though events are out of reach."""
+    rows = (folder / "truth.csv").read_text().splitlines()[1:]
+    few = [line for label in ("contact", "lift") for line in [one for one in rows if one.startswith(label)][:count]]
+    (tmp_path / "few.csv").write_text("\n".join(["label,t_us", *few]) + "\n")
+    command = ("train", folder / "9.npz", "--labels", tmp_path / "few.csv", "--recipe", folder / "recipe.toml")
+    low = ("--set", "learner.ub=1e-6", "--tare", folder / "tare.json")
+    code, _, warned = call(capsys, *command, *low, "-o", tmp_path / "few.json")
+    assert code == 0
+    there = "is 1 event" if count == 1 else f"are {count} events"
+    assert warned.startswith(f"taxel: warning: contact: there {there} to learn from; 4 are the least")
+    assert "tau" not in warned
 
 
 def test_labels_that_lie_outside_are_left_out_and_said(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:

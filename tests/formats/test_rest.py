@@ -73,15 +73,20 @@ def test_a_channel_that_begins_with_somebody_standing_on_it_has_no_rest() -> Non
 PRESSED = (("contact", 40_000), ("lift", 220_000))
 
 
-def palm(seed: int, sign: int, share: float) -> taxel.Frames:
-    """Pictures of a noisy palm with offsets that is pressed twelve times, so long a share of the time."""
+def palm(seed: int, sign: int, share: float, rebound: float = 0.0) -> taxel.Frames:
+    """Pictures of a noisy palm with offsets that is pressed twelve times, so long a share of the time.
+
+    After each press it goes so far beyond its rest, as a share of the press.
+    """
     random = np.random.default_rng(seed)
     values = random.uniform(2800, 3200, (24, 32)) + random.normal(0, random.uniform(0, 8), (900, 24, 32))
     y, x = np.mgrid[:24, :32]
     for k in range(12):
         long = round(65 * share)
         bump = np.exp(-((y - random.uniform(4, 20)) ** 2 + (x - random.uniform(4, 28)) ** 2) / 18)
-        values[100 + 65 * k :][:long] += sign * 800 * np.sin(np.linspace(0, np.pi, long))[:, None, None] * bump
+        for begin, lasts, size in ((100 + 65 * k, long, 800), (100 + 65 * k + long, 8, -800 * rebound)):
+            curve = np.sin(np.linspace(0, np.pi, lasts))[:, None, None]
+            values[begin : begin + lasts] += sign * size * curve * bump
     return taxel.Frames(np.round(values), np.arange(900) * 10_000, unit="counts", array=taxel.Array(24, 32))
 
 
@@ -228,6 +233,8 @@ def test_training_on_values_that_fall_says_what_turns_them(tmp_path, capsys) -> 
     assert code == 2
     assert "nothing was felt in the recording up to" in said
     assert "falls = true" in said
+    assert "palm.layout.toml" in said
+    assert "tare" not in said
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -251,3 +258,41 @@ def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_
         else:
             assert hint is None
             assert "falls" not in shown
+
+
+def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_them_is_said(tmp_path, capsys) -> None:
+    """A palm goes a quarter beyond its rest after each press: that is felt and detected, and is no press."""
+    taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz")
+    rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
+    (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
+    turns = "say falls = true in a layout file beside it, palm.layout.toml"
+    code, _, said = call(capsys, "train", tmp_path / "palm.npz", "-o", tmp_path / "a.json")
+    assert code == 0
+    (line,) = said.splitlines()
+    assert line.startswith("taxel: warning: ")
+    assert turns in line
+    rule = tmp_path / "rule.json"
+    taxel.detect.PlainRule("area", 5, noise_floor=100.0).save(rule)
+    command = ("detect", tmp_path / "palm.npz", "--readout", rule, "--tare", "0.9")
+    hint, found = (json.loads(call(capsys, *command, "--json")[1])[name] for name in ("hint", "detections"))
+    assert found
+    assert turns in hint
+    assert hint in call(capsys, *command)[1]
+    (tmp_path / "palm.layout.toml").write_text("falls = true\n")
+    assert json.loads(call(capsys, *command, "--json")[1])["hint"] is None
+    assert "falls" not in call(capsys, "train", tmp_path / "palm.npz", "-o", tmp_path / "b.json")[2]
+
+
+def test_a_slope_that_all_detections_have_is_no_column(tmp_path, capsys) -> None:
+    """Levels of pictures come in steps, so presses have one slope; the file has it."""
+    taxel.convert(palm(5, 1, 0.4), tmp_path / "palm.npz")
+    rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
+    (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
+    assert call(capsys, "train", tmp_path / "palm.npz", "-o", tmp_path / "a.json")[0] == 0
+    command = ("detect", tmp_path / "palm.npz", "--readout", tmp_path / "a.json", "--tare", "0.9")
+    slopes = [one["slope_mv_per_ms"] for one in json.loads(call(capsys, *command, "--json")[1])["detections"]]
+    assert len(slopes) == 12
+    assert slopes == pytest.approx([slopes[0]] * 12)
+    shown = call(capsys, *command)[1]
+    assert shown.count("press") == 13
+    assert "slope" not in shown

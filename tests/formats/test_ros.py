@@ -412,6 +412,8 @@ def test_from_a_bag_to_a_detection_on_the_command_line(tmp_path: Path, monkeypat
     assert call(capsys, "cut", "grasp", "part.npz", *finger, "--rows", "0:1")[0] == 0
     assert taxel.open("part.npz").array.shape == (1, 3)
     assert call(capsys, "merge", "grasp", "grasp", *finger, "--gap", 1, "-o", "both.npz")[0] == 0
+    for command in ("train", "detect", "cut", "merge"):
+        assert "a ROS bag" in " ".join(call(capsys, command, "--help")[1].split()), command
 
 
 @pytest.mark.parametrize(

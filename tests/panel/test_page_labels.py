@@ -138,6 +138,21 @@ def test_what_is_typed_after_a_refusal_is_no_longer_marked_as_wrong(replay: Any,
     assert (field.input_value(), field.get_attribute("aria-invalid")) == ("2.250", None)
 
 
+def test_the_name_of_the_last_label_is_offered_until_another_is_typed(replay: Any, table: Path) -> None:
+    name = replay.locator("#label-name")
+    labelled(replay, table, "label,t_us\nrelease,4000000\npress,3000000\n")
+    assert name.input_value() == "release"
+    # The name that was typed last stays where a label of the file has it, and while labels are added.
+    name.fill("press")
+    replay.reload()
+    shows(replay, "label-count", "^2 labels$")
+    assert name.input_value() == "press"
+    name.fill("slip")
+    replay.locator("#label-list li").first.locator("button").last.click()
+    shows(replay, "label-count", "^1 label$")
+    assert name.input_value() == "slip"
+
+
 def test_where_labels_will_be_saved_is_not_called_saved(replay: Any, table: Path) -> None:
     replay.reload()
     shows(replay, "label-place", r"^To be saved in walk\.notes\.csv$")

@@ -44,12 +44,27 @@ def test_info_as_json_holds_rates_by_both_clocks_losses_and_taxels(walk: Path) -
     assert said["events_per_s_board"] == pytest.approx(400 / seconds)
     assert said["events_per_s_host"] == pytest.approx(400 / said["seconds_host"])
     assert said["peak_events_per_s_board"] >= said["events_per_s_board"]
+    assert not said["peak_before_start"]
     assert set(said["taxels"]) == {"dead", "stuck", "noisy"}
     assert said["counts"]["decoder"]["skipped"] == 0
     assert said["registers"]["ramp"] == 150
     assert said["notes"][0] == {"t_us": 5000, "text": "left heel"}
     assert said["detections"] == {"contact": 1}
     assert not said["truncated"]
+
+
+@pytest.mark.parametrize("start", [None, 0, 20_000, 500_000])
+def test_a_rate_before_the_start_marker_is_said_to_be_that(tmp_path: Path, start: int | None) -> None:
+    """Each of 16 taxels sends its rest every 100 us for 20 ms, and one of them an event every ms from then on."""
+    t = np.concatenate([np.repeat(np.arange(0, 20_000, 100), 16), np.arange(20_000, 1_000_000, 1000)])
+    place = np.concatenate([np.tile(np.arange(16), 200), np.zeros(980, np.int64)])
+    markers = [] if start is None else [(start, True)]
+    events = taxel.Events(t, place % 4, place // 4, t * 0 + 1, array=taxel.Array(4, 4), markers=markers)
+    taxel.convert(events, tmp_path / "a.npz")
+    said = run("info", tmp_path / "a.npz").stdout
+    before = start is not None and start > 10_000
+    assert "160000 events/s in the busiest 10 ms" in said
+    assert (", before the start marker, where a board sends the rest of every taxel" in said) == before
 
 
 def test_info_writes_its_picture_once(walk: Path, tmp_path: Path) -> None:

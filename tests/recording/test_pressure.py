@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 import taxel
+from taxel.recording.contents import Contents
+from taxel.recording.pressure import series
+from taxel.recording.recording import Recording
 
 from .test_commands import run
 
@@ -95,6 +98,28 @@ def test_the_noise_of_taxels_without_a_load_is_no_sum(tmp_path: Path) -> None:
     assert run("info", tmp_path / "n.npz", "--table", tmp_path / "n.csv").returncode == 0
     row = list(csv.DictReader((tmp_path / "n.csv").open()))[7]
     assert float(row["sum_N"]) == pytest.approx((values[7] - 500.0).sum(), abs=0.01)
+
+
+@pytest.mark.parametrize("spread", [0.0, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_noise_has_no_centre_and_each_press_has_one(spread: float, share: float) -> None:
+    """Presses of 100 counts at random places, so long a share of the time; noise that goes above the floor."""
+    random = np.random.default_rng(round(10 * spread))
+    values, during = random.normal(500.0, spread, (1200, 12, 16)), np.zeros(1200, bool)
+    for begin in range(150, 1150, 100):
+        y, x, press = random.integers(3, 7), random.integers(3, 10), slice(begin, begin + round(100 * share))
+        values[press, y : y + 3, x : x + 3] += 100.0
+        during[press] = True
+    frames = taxel.Frames(np.round(values), np.arange(1200) * 10_000, unit="counts")
+    of = series(Recording(Contents(Path("a.npz"), "", "npz", frames.array, frames=frames)))
+    assert of.rest.source == "quiet"
+    has = ~np.isnan(of.centre).any(axis=1)
+    assert has[during].all()
+    # Where few taxels are above the floor, their number is now and then more than twice that of the quietest stretch.
+    assert np.count_nonzero(has & ~during) <= 1
+    found = of.centre[during]
+    assert found.min() >= 3.0
+    assert (found <= (12.0, 9.0)).all()
 
 
 def test_what_is_largest_between_two_pictures_of_events_is_said(tmp_path: Path) -> None:

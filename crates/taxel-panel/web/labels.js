@@ -62,7 +62,12 @@ export class Labels {
     this.dragged = null;
     this.name = part("label-name", HTMLInputElement);
     this.name.value = settings.values.label;
-    this.name.oninput = () => settings.set("label", this.name.value);
+    /** Whether the name is one for the recording that is shown: offered by its labels, or typed. */
+    this.named = false;
+    this.name.oninput = () => {
+      this.named = true;
+      settings.set("label", this.name.value);
+    };
     this.lane = part("label-lane", HTMLElement);
     let from = 0;
     this.lane.addEventListener("pointerdown", (event) => (from = event.clientX));
@@ -101,7 +106,16 @@ export class Labels {
     if (this.file === file && this.trial === trial) return;
     [this.file, this.trial] = [file, trial];
     this.chosen = this.waiting_us = null;
+    this.named = false;
     this.show();
+  }
+
+  /** Offers the name of the last label, where none has the name that was typed for another recording. */
+  offerName() {
+    const last = this.labels.at(-1);
+    if (this.named || !last) return;
+    this.named = true;
+    if (!this.labels.some(({ label }) => label === this.name.value.trim())) this.name.value = last.label;
   }
 
   /** @param {string[]} names to offer: the readout's, and those used */
@@ -189,6 +203,7 @@ export class Labels {
   /** Writes the list and puts up the flags. */
   show() {
     const { labels } = this;
+    this.offerName();
     const table = this.file ? this.files.get(this.file) : undefined;
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
     this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";

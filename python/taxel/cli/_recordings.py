@@ -43,6 +43,8 @@ _LATE_US, _NEAR_US = 1_000_000, 50_000
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
+#: What every command that works on recordings reads.
+READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of another maker"
 TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest at the beginning of the recording."
 SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from taxel._base.messages import counted
@@ -78,10 +79,11 @@ class Result:
             result["neurons"] = {label: dict(self.made.recipe.neurons[label]) for label in self.made.readout.labels}
         return result
 
-    def page(self, out: Path, recipe: str | None, report: Path | None, tares: str = "") -> str:
+    def page(self, out: Path, recipe: str | None, report: Path | None, tares: str, tare: str) -> str:
         """Return the result as lines for people; the first says whether the scores are held out.
 
-        One line of them, if any, is `tares`: which were taken from the recordings.
+        One line of them, if any, is `tares`: which were taken from the recordings. Another names the command that
+        detects by the readout, with the --tare, if any, that fits.
         """
         window = f"(window {self.window_ms:g} ms)"
         lines = [f"not held out, on its own training data {window}: {self.why}"]
@@ -101,7 +103,9 @@ class Result:
         lines += [f"\n{one.title}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
         if len(self.scored.scores) > 1:
             lines.append(f"\nall recordings:\n{self.scored.together!r}")
-        lines.append(f"\nwritten to {out}")
+        needed = [one.tare is None for one in self.made.readout.encoder._each() if hasattr(one, "tare")]
+        option = f" --tare {quote(tare)}" if tare and any(needed) else ""
+        lines.append(f"\nwritten to {out}; next: taxel detect RECORDING --readout {quote(str(out))}{option}")
         lines += [f"plain rule of {' and '.join(labels)}: written to {path}" for path, labels in self.rules.items()]
         if report is not None:
             lines.append(f"report: {report / 'report.html'}")

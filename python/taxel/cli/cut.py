@@ -14,7 +14,7 @@ from taxel._base.messages import plain
 from taxel._core import ProblemError
 from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import of_source, span_us
+from taxel.cli._recordings import READ_HELP, of_source, span_us
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
@@ -26,7 +26,7 @@ __all__ = ["cut"]
 @with_out("out")
 @with_file_options
 def cut(
-    recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
+    recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}.")],
     out: Annotated[
         Path,
         typer.Argument(

@@ -17,7 +17,15 @@ from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, end_of_rest_us, progress, references, tare_or_by_unit, try_report
+from taxel.cli._recordings import (
+    READ_HELP,
+    TARE_HELP,
+    end_of_rest_us,
+    progress,
+    references,
+    tare_or_by_unit,
+    try_report,
+)
 from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
@@ -37,9 +45,7 @@ _ROWS = 40
 @app.command()
 @with_file_options
 def detect(
-    recording: Annotated[
-        Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5, or a folder of them.")
-    ],
+    recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}, or a folder of them.")],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     files: FileOptions,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
@@ -131,11 +137,15 @@ def _warn_of_losses(recording: Recording) -> None:
 
 @contextmanager
 def _naming(recording: str, readout: Path) -> Iterator[None]:
-    """Name the recording and the readout that an error is about."""
+    """Name the recording and the readout that an error is about; of a missing tare not the part that needs it."""
     try:
         yield
     except ProblemError as error:
-        raise ProblemError(f"{recording}, by {readout}: {error}") from None
+        lacks_tare = " without a tare: " in str(error)
+        said = (
+            "the readout needs the taxels' rest: give --tare SECONDS at rest, or --tare FILE" if lacks_tare else error
+        )
+        raise ProblemError(f"{recording}, by {readout}: {said}") from None
 
 
 def _result(
@@ -177,7 +187,7 @@ def _result(
 
 
 def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
-    """Return what may have kept detections away: values that fall from their rest, or a rest that drifted off."""
+    """Return what may keep detections away or make false ones: values that fall from their rest, or a drifted rest."""
     from taxel.detect import PlainRule, Readout  # noqa: PLC0415  the command line starts quickly
     from taxel.detect.advice import drifted  # noqa: PLC0415
     from taxel.encode import ContactArea, Moments  # noqa: PLC0415
@@ -186,8 +196,8 @@ def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
     from taxel.recording.rest import of_pictures  # noqa: PLC0415
 
     source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
-    if not len(outcome.found) and isinstance(source, Frames) and (rest := of_pictures(source)).falls:
-        return f"rest: {rest}"
+    if isinstance(source, Frames) and (rest := of_pictures(source)).falls:
+        return f"rest: {rest.text(getattr(outcome.example.source, 'path', None))}"
     # The local load tracks the rest.
     floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []
     for part in readout.encoder._each() if isinstance(readout, Readout) else ():
@@ -236,8 +246,8 @@ def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:
         typer.echo(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
     first = detections[:_ROWS]
-    # A plain rule has no slope.
-    sloped = not np.isnan(first.slope).all()
+    # A plain rule has no slope; levels of pictures come in steps, and may give one for all.
+    sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1
     typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
         typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped)

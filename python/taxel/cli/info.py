@@ -326,8 +326,9 @@ def _pressure(pressed: dict[str, Any], begin_us: int, *, timed: bool) -> Iterato
 
 def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if facts.get("events_per_s_board") is not None:
-        peak = facts["peak_events_per_s_board"]
-        yield "rate, board", f"{facts['events_per_s_board']:.0f} events/s; {peak:.0f} events/s in the busiest 10 ms"
+        peak = f"{facts['peak_events_per_s_board']:.0f} events/s in the busiest 10 ms"
+        before = ", before the start marker, where a board sends the rest of every taxel" * facts["peak_before_start"]
+        yield "rate, board", f"{facts['events_per_s_board']:.0f} events/s; {peak}{before}"
     if facts.get("pictures_per_s") is not None:
         yield "rate", f"{facts['pictures_per_s']:.1f} pictures/s"
     if facts.get("events_per_s_host") is not None:

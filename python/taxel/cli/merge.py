@@ -10,6 +10,7 @@ import typer
 
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._recordings import READ_HELP
 
 __all__ = ["merge"]
 
@@ -17,7 +18,7 @@ __all__ = ["merge"]
 @app.command()
 @with_file_options
 def merge(
-    recordings: Annotated[list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5.")],
+    recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The new file; its extension gives the format.")],
     files: FileOptions,
     gap: Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import (
+    READ_HELP,
     SET_HELP,
     TARE_HELP,
     assignments,
@@ -41,9 +43,7 @@ __all__ = ["train"]
 @app.command()
 @with_file_options
 def train(
-    recordings: Annotated[
-        list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5, or folders of them.")
-    ],
+    recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
     files: FileOptions,
     labels: Annotated[
         str, typer.Option(help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own notes.")
@@ -111,10 +111,7 @@ def train(
     """
     from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import recipes  # noqa: PLC0415
-    from taxel.detect.examples import checked  # noqa: PLC0415
     from taxel.detect.floors import measured_floor  # noqa: PLC0415
-    from taxel.detect.label_times import off_by  # noqa: PLC0415
-    from taxel.detect.plain_score import floor_of  # noqa: PLC0415
     from taxel.recorded import recorded  # noqa: PLC0415
 
     try_whole(out, overwrite=overwrite)
@@ -145,13 +142,7 @@ def train(
         examples = _examples(opened, labelled, tare, plan)
         plan = _planned(recipe, changes, names, measured_floor(examples))
         assert plan is not None
-        training = _Training(opened, examples, search, window_ms, update)
-        try:
-            result, outcomes = training.result(plan, folds)
-        except ProblemError as error:
-            off = off_by(checked(examples), names, floor_of(plan.encoder))
-            said = (f"{label}: {one}" for label, one in off.items())
-            raise ProblemError("; ".join([str(error), *said])) from None
+        result, outcomes = _Training(opened, examples, search, window_ms, update).result(plan, folds)
     result.made.readout.save(out, overwrite=overwrite)
     result = replace(result, rules=_write_rules(result.scored.plain, rule, overwrite=overwrite))
     if report is not None:
@@ -160,8 +151,9 @@ def train(
         title, held_out = f"Training of {out}", () if result.why else result.scored.scores
         more: dict[str, Any] = {"held_out": held_out, "alignments": result.made.alignments, "scored": result.scored}
         write_listening(report, result.made.readout, outcomes, title=title, judged=result.how, **more)
-    tares = _tares(examples) if tare is None else ""
-    typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else result.page(out, recipe, report, tares))
+    taken = _taken(examples) if tare is None else []
+    page = result.page(out, recipe, report, _tares(taken), _tare_again(taken) if tare is None else tare)
+    typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else page)
 
 
 def _try_rules(place: Path | None, labels: Sequence[str], *, overwrite: bool) -> None:
@@ -191,22 +183,41 @@ def _of_label(place: Path, label: str) -> Path:
     return place.with_name(f"{place.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{place.suffix}")
 
 
-def _tares(examples: Sequence[Example]) -> str:
-    """Return the line of which tares were taken from the recordings; of those whose rest is 0 by their unit nothing."""
+def _taken(examples: Sequence[Example]) -> list[tuple[int, int, int]]:
+    """Return from when to when each recording's tare was taken, and how long it lasts, us.
+
+    Of those whose rest is 0 by their unit nothing.
+    """
     from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
     from taxel.recording.rest import BY_UNIT  # noqa: PLC0415
-    from taxel.spikes import SpikeTrains, to_ms  # noqa: PLC0415
+    from taxel.spikes import SpikeTrains  # noqa: PLC0415
 
     spans = []
     for one in examples:
         source = recorded(one.source)
         if one.tare is not None and one.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
-            spans.append([to_ms(us - int(source.t[0])) for us in (one.tare.start_us, one.tare.stop_us)])
-    lengths = [end - begin for begin, end in spans]
+            first = int(source.t[0])
+            spans.append((one.tare.start_us - first, one.tare.stop_us - first, int(source.t[-1]) - first))
+    return spans
+
+
+def _tares(spans: Sequence[tuple[int, int, int]]) -> str:
+    """Return the line of which tares were taken from the recordings."""
+    from taxel.spikes import to_ms  # noqa: PLC0415  the command line starts quickly
+
+    lengths = [to_ms(end - begin) for begin, end, _ in spans]
     said = f"of each of {len(spans)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long" if spans else ""
     if len(spans) == 1:
-        said = "what the recording holds from {:g} to {:g} ms".format(*spans[0])
+        said = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, spans[0][:2]))
     return f"tare: {said}; --tare gives another" if said else ""
+
+
+def _tare_again(spans: Sequence[tuple[int, int, int]]) -> str:
+    """Return the --tare of the seconds that each recording begins with at rest; "" where none needs one."""
+    if not spans or any(begin > 0 for begin, *_ in spans):
+        return "SECONDS" if spans else ""
+    # More than half of a recording is refused.
+    return f"{min(min(end, lasts // 2) for _, end, lasts in spans) / 1e6:g}"
 
 
 def _planned(
@@ -256,7 +267,29 @@ class _Training:
     update: Callable[[str], None]
 
     def result(self, plan: Recipe, folds: int | None) -> tuple[Result, list[Outcome]]:
-        """Return the readout with its scores, held out where that can be, and its outcomes on the training data."""
+        """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
+
+        Say first where values fall from their rest. An error says that too, or by how much labels are off.
+        """
+        from taxel.detect.advice import fallen  # noqa: PLC0415  the command line starts quickly
+        from taxel.detect.examples import checked  # noqa: PLC0415
+        from taxel.detect.label_times import off_by  # noqa: PLC0415
+        from taxel.detect.plain_score import floor_of  # noqa: PLC0415
+        from taxel.detect.training import UNFELT  # noqa: PLC0415
+
+        if fall := fallen(self.examples):
+            warnings.warn(fall, stacklevel=2)
+        try:
+            return self._result(plan, folds)
+        except ProblemError as error:
+            if fall and str(error).endswith(UNFELT):
+                raise ProblemError(f"{str(error).removesuffix(UNFELT)}: {fall}") from None
+            names = sorted({label for one in self.examples for label in one.labels})
+            off = off_by(checked(self.examples), names, floor_of(plan.encoder))
+            said = (f"{label}: {one}" for label, one in off.items())
+            raise ProblemError("; ".join([str(error), *said])) from None
+
+    def _result(self, plan: Recipe, folds: int | None) -> tuple[Result, list[Outcome]]:
         from taxel.cli._trained import Result  # noqa: PLC0415  the command line starts quickly
         from taxel.detect import choose, judge  # noqa: PLC0415
         from taxel.detect.advice import advised  # noqa: PLC0415

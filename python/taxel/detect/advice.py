@@ -17,15 +17,16 @@ from taxel.detect.label_times import TOUCH, Off, held_by_tare, off_by, unlabelle
 from taxel.detect.loads import lacks_neighbours
 from taxel.detect.plain_score import PlainScore, floor_of
 from taxel.detect.scoring import Score
-from taxel.detect.training import Trained
+from taxel.detect.training import TWO_FOLDS, Trained
 from taxel.encode import ContactArea, Encoder, Moments
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
+from taxel.recording.rest import of_pictures
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 
-__all__ = ["Advice", "advised", "drifted", "loaded_at_rest"]
+__all__ = ["Advice", "advised", "drifted", "fallen", "loaded_at_rest"]
 
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
@@ -33,8 +34,8 @@ _MANY = 0.05
 _BEFORE_US = 20_000
 #: How many labels at either end of a recording are looked at.
 _LABELS = 4
-#: Of fewer labels than the first no two folds can be made, and of the second five.
-_TWO_FOLDS, _FIVE_FOLDS = 4, 10
+#: Of fewer labels no five folds can be made.
+_FIVE_FOLDS = 10
 #: Into so many parts a recording is divided to see a drift, at so many pictures of each.
 _PARTS, _LOOKS = 8, 40
 #: A touched taxel reads so many times its drift.
@@ -62,17 +63,18 @@ def advised(
 ) -> dict[str, Advice]:
     """Return what may help each label of which more than 5 % are missed or false.
 
-    Other times of the labels where most of them lie at one distance of more than 50 ms from what the sensor felt. More
-    labels where there are fewer than four. Labels of all events where more are false than missed or less than half is
-    found, and a quarter of the time or more lies before the first label or behind the last. Another name where none is
-    found of a label that no input follows, as it was learnt as a kind of touch. The recipe that fits recording and
-    labels, if a named one was taken that does not. Another tare where it holds a touch, where taxels read above their
-    rest before touches begin, or where nothing was felt of most labels that are missed. Else the plain rule, where it
-    makes at most half the mistakes on the same labels; or the recipe that learns from the same quantities, if this one
-    does not. For contact and lift of channels, and kinds of touch that they do not tell, their distance. Other kinds of
-    touch where neither neuron nor rule tells more of them than chance would. Else more labels, where on its own
-    training data the readout makes at most half the mistakes, as it learnt by heart what these data have. Else a search
-    of other parameters, if the recipe lists any.
+    A layout file that turns values which fall from their rest, and nothing else then. Other times of the labels where
+    most of them lie at one distance of more than 50 ms from what the sensor felt. More labels where there are fewer
+    than four. Labels of all events where more are false than missed or less than half is found, and a quarter of the
+    time or more lies before the first label or behind the last. Another name where none is found of a label that no
+    input follows, as it was learnt as a kind of touch. The recipe that fits recording and labels, if a named one was
+    taken that does not. Another tare where it holds a touch, where taxels read above their rest before touches begin,
+    or where nothing was felt of most labels that are missed. Else the plain rule, where it makes at most half the
+    mistakes on the same labels; or the recipe that learns from the same quantities, if this one does not. For contact
+    and lift of channels, and kinds of touch that they do not tell, their distance. Other kinds of touch where neither
+    neuron nor rule tells more of them than chance would. Else more labels, where on its own training data the readout
+    makes at most half the mistakes, as it learnt by heart what these data have. Else a search of other parameters, if
+    the recipe lists any.
 
     Parameters
     ----------
@@ -100,7 +102,9 @@ def advised(
     better = (
         {} if plain is None or plain.together is None else {one: plain.together[one] for one in plain.better(scored)}
     )
-    channels, recipe = lacks_neighbours(examples), _other_recipe(made, examples)
+    channels, recipe, fall = lacks_neighbours(examples), _other_recipe(made, examples), fallen(examples)
+    if fall:
+        return dict.fromkeys(many, Advice("falls = true in a layout file", fall))
     return {
         label: _of_labels(label, scored[label], times, recipe)
         or _of_time(label, scored[label], sound)
@@ -133,10 +137,10 @@ def _of_labels(label: str, scored: Score, times: _OfTimes, recipe: Advice | None
     if label in times.off:
         because = f"{times.off[label]}, and are aligned within {WINDOW_MS:.0f} ms only"
         return Advice("other times of the labels", because)
-    if scored.events < _TWO_FOLDS:
+    if scored.events < TWO_FOLDS:
         there = f"there {'is' if scored.events == 1 else 'are'} {scored.events}"
         return Advice(
-            "more labels", f"{there}; {_TWO_FOLDS} are the least to score it held out, {_FIVE_FOLDS} for five folds"
+            "more labels", f"{there}; {TWO_FOLDS} are the least to score it held out, {_FIVE_FOLDS} for five folds"
         )
     return recipe
 
@@ -263,6 +267,15 @@ def _by_rule(made: Trained, left: int, wrong: int) -> Advice:
     if _for_touch(made) and not any(isinstance(one, ContactArea) for one in made.recipe.encoder._each()):
         return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}")
     return Advice("the plain rule", f"it {because}; taxel train --rule FILE writes it, and taxel detect runs it")
+
+
+def fallen(examples: Sequence[Example]) -> str:
+    """Return that the values of an example fall from their rest, and what turns them; "" where none do."""
+    for one in examples:
+        source = recorded(one.source, hold=False)
+        if isinstance(source, Frames) and (rest := of_pictures(source)).falls:
+            return f"{one.name}: " * bool(one.name) + rest.fall(getattr(one.source, "path", None))
+    return ""
 
 
 def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:

@@ -48,6 +48,14 @@ _NOT_OF_ROWS = (
 _FEWER = 3
 #: ... and that share of the labels: of many labels some were never felt.
 _FEWER_SHARE = 0.05
+#: Of fewer labels no two folds can be made.
+TWO_FOLDS = 4
+#: What may be the cause where nothing was felt.
+UNFELT = (
+    "; either the tare holds a touch, as it ends before the first label, which may be late (give --tare SECONDS), or "
+    "readings fall with pressure (falls = true in a layout file), or another source felt it (a column source in the "
+    "labels); taxel info shows what was touched"
+)
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
 
@@ -404,10 +412,8 @@ class Fitting:
             if len(times) and not len(train.times):
                 where = name if len(trains) > 1 else "the recording"
                 raise ProblemError(
-                    f"{self._label}: nothing was felt in {where} up to the last of its {counted(len(times), 'event')}; "
-                    "either the tare holds a touch, as it ends before the first label, which may be late (give --tare "
-                    "SECONDS), or readings fall with pressure (falls = true in a layout file), or another source felt "
-                    "it (a column source in the labels); taxel info shows what was touched"
+                    f"{self._label}: nothing was felt in {where} up to the last of its "
+                    f"{counted(len(times), 'event')}{UNFELT}"
                 )
 
     def fits(self, recipe: Recipe) -> bool:
@@ -507,16 +513,22 @@ def _remarks(
     caught: Sequence[warnings.WarningMessage],
 ) -> Iterator[str]:
     """Yield the warnings of a fit, which name events and examples."""
-    missed = cone.unreachable_
+    missed, count = cone.unreachable_, sum(map(len, targets))
     if missed:
         at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
         places = [f"{ms:.10g} ms{name}" for ms, name in at]
         listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
-        yield (
-            f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too few input spikes come before "
-            f"them ({listed}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
-            "recipe's points (taxel train --search) may reach them"
-        )
+        if count < TWO_FOLDS:
+            yield (
+                f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from; {TWO_FOLDS} are the "
+                f"least to score it held out: label more. {len(missed)} out of reach of the inputs ({listed})"
+            )
+        else:
+            yield (
+                f"{len(missed)} of {count} events are out of reach, as too few input spikes come before "
+                f"them ({listed}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
+                "recipe's points (taxel train --search) may reach them"
+            )
     # The learner names unreachable targets, if any, first.
     yield from (str(one.message) for one in caught[bool(missed) :])
 

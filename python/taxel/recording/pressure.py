@@ -45,6 +45,9 @@ _BLOCK = 1 << 21
 _EVENTS, _MOMENTS = 1 << 16, 32
 #: The rest of events is tracked this often, us.
 _TRACKED_US = 50_000
+#: *Reading*: noise adds up to at most so many times the greatest sum of the stretch of this length, us, in which it is
+#: least, and so many taxels just above the floor (crates/taxel-panel/src/keyframe_index/pictures.rs has the same).
+_TIMES_LEAST, _STRETCH_US, _NOISY_TAXELS = 1.5, 250_000, 4
 #: Largest rectangle around the taxels with events whose rest is tracked with regard to neighbours.
 _MOST_PLACES = 1 << 18
 
@@ -65,7 +68,7 @@ class Series:
     peak, total : float64, shape (n,), in `unit`
         The largest value, and the sum of the loaded taxels, 0 without one; of all where `above` is 0.
     centre : float64, shape (n, 2), in `centre_unit`; None of channels
-        As of `Frames.centre`.
+        As of `Frames.centre`; NaN in pictures above the rest of a quiet stretch whose sum is one that noise adds up to.
     centre_unit : {"mm", "taxels", "places"}
         As of `Array.centre_unit`.
     rest : Rest
@@ -108,11 +111,21 @@ class Series:
 
         in_mm2 = array.area_mm2 is not None
         area = over(lambda block: block.area(above) if in_mm2 else block.loaded(above).astype(np.float64))
-        centre = None if array.is_channels else over(lambda block: block.centre(above))
+        centre, total = None if array.is_channels else over(lambda block: block.centre(above)), over(loaded_sum)
+        if centre is not None and rest.source == "quiet" and len(frames):
+            centre[total <= _of_noise(frames.t, total, above)] = np.nan
         return cls(
-            frames.t, frames.unit, above, None if array.is_channels else area, over(Frames.peak), over(loaded_sum),
+            frames.t, frames.unit, above, None if array.is_channels else area, over(Frames.peak), total,
             centre, "mm2" if in_mm2 else "taxels", array.centre_unit or "", rest, force_n(frames),
         )  # fmt: skip
+
+
+def _of_noise(t: NDArray[np.int64], total: NDArray[np.float64], above: float) -> float:
+    """Return the most that the noise of pictures adds up to, as on the page: by the stretch in which it is least."""
+    begins = np.flatnonzero(np.diff((t - t[0]) // _STRETCH_US, prepend=-1))
+    greatest = np.maximum.reduceat(total, begins)
+    # The last one may be short.
+    return float(_TIMES_LEAST * greatest[: max(1, len(greatest) - 1)].min() + _NOISY_TAXELS * above)
 
 
 def force_n(frames: Frames) -> NDArray[np.float64] | None:

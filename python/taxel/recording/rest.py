@@ -118,9 +118,14 @@ class Rest:
             text = f"a quiet stretch, {first:.3f} to {end:.3f} s, tracked from there"
             text += f"; something lay on {self.on} in it" * bool(self.on)
         if self.falls:
-            text += "; values fall from it: if less means more pressure, say falls = true in a layout file"
-            text += "" if path is None else f" {or_given(path)}"
+            text += f"; {self.fall(path)}"
         return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
+
+    @staticmethod
+    def fall(path: Path | None = None) -> str:
+        """Return what to do of values that fall; of the recording of a path it names the layout file."""
+        where = "" if path is None else f" {or_given(path)}"
+        return f"values fall from their rest: if less means more pressure, say falls = true in a layout file{where}"
 
     def described(self) -> dict[str, object]:
         """Return source, quiet stretch, number of zeroed taxels and whether values fall, as JSON values."""
@@ -275,8 +280,8 @@ def of_quiet(frames: Frames) -> Rest:
     if rest.quiet_us is None or not _fall(frames, rest.quiet_us, scale):
         return rest
     fallen = found(lambda: pictures, taxels, frames.array.columns, scale, falls=True)
-    # Without a rest of their own the values are tracked from their first ones on.
-    return replace(rest, values=fallen.values, falls=True)
+    # Without a rest of their own the values are tracked from their first ones on. What they rise by is no load.
+    return replace(rest, values=fallen.values, falls=True, lay=None, on="")
 
 
 def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:

@@ -61,7 +61,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         facts["intensities"] = 0 if events.present is None else int(events.present.sum())
         facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
         facts["events_per_s_board"] = len(events) / seconds if seconds else None
-        facts["peak_events_per_s_board"] = _peak(events.t)
+        facts["peak_events_per_s_board"], facts["peak_before_start"] = _peak(events)
     else:
         facts["pictures"], facts["unit"] = len(table), table.unit
         facts["pictures_per_s"] = (len(table) - 1) / seconds if seconds else None
@@ -161,9 +161,12 @@ def _gaps(t: NDArray[np.int64]) -> dict[str, int] | None:
     return {"count": len(gaps), "longest_us": int(apart[longest]), "t_us": int(t[longest])}
 
 
-def _peak(t: NDArray[np.int64]) -> float | None:
-    """Return the highest rate in an interval of 10 ms of board time, events/s."""
-    if not len(t):
-        return None
-    _, counts = np.unique(t // _PEAK_US, return_counts=True)
-    return float(counts.max() / (_PEAK_US / 1e6))
+def _peak(events: Events) -> tuple[float | None, bool]:
+    """Return the highest rate in 10 ms of board time, events/s, and whether most of it is before the start marker."""
+    if not len(events):
+        return None, False
+    of = events.t // _PEAK_US
+    intervals, counts = np.unique(of, return_counts=True)
+    busiest = events.t[of == intervals[counts.argmax()]]
+    start_us = min((t for t, start in events.markers if start), default=int(busiest.min()))
+    return len(busiest) / (_PEAK_US / 1e6), bool(np.median(busiest) < start_us)
