@@ -11,6 +11,7 @@ import pytest
 
 import taxel
 from taxel.recording.pressure import above_rest, series
+from taxel.recording.rest import by_unit
 
 from .test_commands import run
 
@@ -178,3 +179,24 @@ def test_the_page_takes_its_tare_of_the_same_time_as_train(tmp_path: Path) -> No
     tare = _rest(taxel.open(tmp_path / "a.npz"))
     assert (tare.start_us, tare.stop_us > 1_900_000) == (800_000, True)
     assert np.abs(tare.rest - 50).max() < 1
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("sigma", [0.02, 0.3, 5.0])
+@pytest.mark.parametrize("cut_off", [False, True])
+@pytest.mark.parametrize("press", [False, True])
+def test_the_noise_of_pressures_is_their_deviation_also_where_a_sensor_cuts_off_what_is_below_0(
+    sigma: float, cut_off: bool, press: bool
+) -> None:
+    values = np.random.default_rng(1).normal(0, sigma, (400, 12, 12))
+    values[200:250, 4:7, 4:7] += 100 * sigma
+    if press:
+        # The first quiet stretch, half a second, ends as it begins.
+        values[47:60, 8:11, 8:11] += 100 * sigma
+    values = np.maximum(values, 0) if cut_off else values
+    values[:, 0, 0] = np.nan
+    tare = by_unit(taxel.Frames(values.astype(np.float32), np.arange(400) * 10_000, unit="kPa"))
+    assert tare is not None
+    assert not tare.rest.any()
+    assert tare.noise[0, 0] == 0
+    assert np.quantile(tare.noise, 0.5) == pytest.approx(sigma, rel=0.2)

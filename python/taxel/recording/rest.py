@@ -140,18 +140,19 @@ def loaded_above(scale: float) -> float:
 def by_unit(frames: Frames) -> Tare | None:
     """Return the tare of pictures in a unit of force or pressure: 0, with the noise of a quiet stretch; None of others.
 
-    The noise of a taxel is 1.4826 times the median distance from the median of what it reads there, the standard
-    deviation of normal noise, as a stretch may hold the begin of a press; 0 where none is quiet.
+    The noise of a taxel is 1.4826 times how much the third quartile of what it reads there is above the median: the
+    standard deviation of normal noise, also where a sensor cuts off what is below 0, and in a stretch of which less
+    than a quarter is a press. 0 where none is quiet, and of a taxel without a value.
     """
     if frames.unit not in FORCE_UNITS or not len(frames):
         return None
     quiet = of_quiet(frames).quiet_us
     still = np.zeros((1, *frames.array.shape)) if quiet is None else frames.between(*quiet).values
-    middle: NDArray[np.float64] = np.asarray(np.nanmedian(still, axis=0), np.float64)
-    noise = 1.4826 * np.asarray(np.nanmedian(np.abs(still - middle), axis=0), np.float64)
+    middle, above = np.nanquantile(np.where(np.isnan(still).all(axis=0), 0.0, still), (0.5, 0.75), axis=0)
+    noise = 1.4826 * np.asarray(above - middle, np.float64)
     nothing = Frames(np.zeros((2, *frames.array.shape)), [0, 1], unit=frames.unit, array=frames.array)
     made = json.loads(Tare.take(nothing, note=BY_UNIT).to_json())
-    return Tare.from_json(json.dumps(made | {"noise": np.nan_to_num(noise).reshape(-1).tolist()}))
+    return Tare.from_json(json.dumps(made | {"noise": noise.reshape(-1).tolist()}))
 
 
 def noise_above(frames: Frames) -> float:
