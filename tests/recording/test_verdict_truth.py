@@ -289,8 +289,8 @@ def test_a_verdict_on_any_counts_reads_back_from_its_dict(seed: int) -> None:
         *("events_out_of_order", "jumps_of_time", "datagrams_decoded_again", "datagrams_repeated", "datagrams_damaged"),
         *("datagrams_of_another_board", "datagrams_too_late", "taxels_outside_the_array", "malformed_bodies"),
         *("datagrams_of_an_unknown_kind", "datagrams_with_unknown_flags", "markers_with_an_unknown_code"),
-        *("board_dropped", "events_dropped_by_board", "resets", "events_repaired", "restarts_of_its_clock"),
-        *("changes_of_address", "differences_from_an_unknown_value"),
+        *("times_that_the_board_dropped_events", "events_dropped_by_board", "resets", "events_repaired"),
+        *("clock_began_anew", "changes_of_address", "differences_from_an_unknown_value"),
     ]
     chosen = [causes[seed]] if seed < len(causes) else draw.choice(causes, int(draw.integers(2, 5)), replace=False)
     counts = {

@@ -8,6 +8,7 @@
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
 mod base64;
+mod damage;
 mod event_pictures;
 mod grey_picture;
 mod limits;
@@ -27,6 +28,8 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
+pub(crate) use damage::{ADDRESS, EMPTY, REFUSED};
+pub use damage::{Found, damage, damage_of_version_1};
 pub use event_pictures::EventPictures;
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Message, Numbers, Place, Reader, Remarks, Unread, begin_with};
@@ -35,10 +38,8 @@ pub use output::OutputFile;
 pub use pictures::{Encoding, PictureSource, Pictures};
 pub use stream::{Faults, Samples, Stream, fields};
 pub use topic::Topic;
-pub(crate) use verdict::{ADDRESS, EMPTY, JUMPED_BEFORE, REFUSED};
-pub use verdict::{
-    Basis, Condition, Counts, Ending, Found, NOTHING_LOST, Rebuilt, Status, Verdict, damage, damage_of_version_1,
-};
+pub(crate) use verdict::JUMPED_BEFORE;
+pub use verdict::{Basis, Condition, Counts, Ending, NOTHING_LOST, Rebuilt, Status, Verdict};
 
 /// Longest time that a datagram waits until its chunk is closed and passed to the operating system.
 ///

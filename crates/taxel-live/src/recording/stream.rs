@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
+use super::damage::{Found, STRANGE};
 use super::limits;
-use super::verdict::{Found, STRANGE};
 use clock::StreamClock;
 
 /// The columns of a source's lines.
@@ -205,7 +205,7 @@ impl Faults {
 
 #[cfg(test)]
 mod tests {
-    use super::super::verdict::{ANEW, BACK, DRIFTS, JUMPS};
+    use super::super::damage::{ANEW, BACK, DRIFTS, JUMPS};
     use super::*;
     use rand::{Rng, SeedableRng, rngs::StdRng};
 

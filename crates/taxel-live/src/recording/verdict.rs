@@ -2,12 +2,15 @@
 //!
 //! All wordings of verdicts are made here; `docs/outputs.md` lists them.
 
+mod of_file;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use taxel_core::wire::{self, SenderDecoder};
-
+use super::damage::{
+    ADDRESS, ANEW, BOARD_DROPPED, BOARD_RESET, EVENTS_DROPPED, Found, OTHER_BOARD, REPAIRED, REPEATED,
+};
 use super::topic::Topic;
 use crate::bridged::Bridged;
 
@@ -238,102 +241,12 @@ pub struct Condition {
     pub origin_us: i64,
 }
 
-/// What decoding a file found.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Found {
-    /// What the decoder could not use, by cause.
-    pub damage: BTreeMap<String, u64>,
-    /// For version 2: sequence numbers that are missing.
-    pub missing: Option<u64>,
-    /// Whether some of it was of version 1, which numbers nothing.
-    pub unnumbered: bool,
-    /// The time after which times are doubtful, us.
-    pub doubtful_after_us: Option<i64>,
-}
-
-impl Found {
-    /// What a decoder found; `origin_us` is added to its times.
-    #[must_use]
-    pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
-        let (mut causes, missing) =
-            damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.two().counts());
-        causes.extend([(REFUSED.to_owned(), sender.refused()), (EMPTY.to_owned(), sender.empty())]);
-        let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);
-        Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us }
-    }
-
-    /// Number of lines that could not be read.
-    #[must_use]
-    pub fn strange(&self) -> u64 {
-        self.damage.get(STRANGE).copied().unwrap_or(0)
-    }
-}
-
 impl Counts {
-    /// What the decoder could not use, by cause, with what reading the file found.
-    fn decoder_with(&self, found: &BTreeMap<String, u64>) -> BTreeMap<String, u64> {
-        let mut all = self.decoder.clone();
-        for (cause, n) in found {
-            let known = all.entry(cause.clone()).or_default();
-            *known = (*known).max(*n);
-        }
-        all
-    }
-
     /// The verdict: nothing lost after arrival, or what was lost where.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         Verdict::of_counts(self, NOTHING_LOST)
     }
-}
-
-/// What a decoder of version 1 could not use, by cause, as recordings store it.
-#[must_use]
-pub fn damage_of_version_1(counts: &wire::Counts) -> BTreeMap<String, u64> {
-    [
-        ("bytes_skipped", counts.skipped),
-        ("short_events", counts.short),
-        ("contradictory_kinds", counts.contradictory),
-        ("outside_the_array", counts.outside),
-        ("unpaired_intensities", counts.unpaired),
-        ("events_out_of_order", counts.back),
-    ]
-    .map(|(cause, n)| (cause.to_owned(), n))
-    .into()
-}
-
-/// The same of both versions, with the jumps of [`wire::Ahead`] and the datagrams of version 1 that came `again`; and the
-/// number of missing datagrams of version 2, if the board sends it.
-#[must_use]
-pub fn damage(
-    counts: &wire::Counts,
-    jumps: u64,
-    again: u64,
-    two: &wire::v2::Counts,
-) -> (BTreeMap<String, u64>, Option<u64>) {
-    let mut causes = damage_of_version_1(counts);
-    causes.extend([(JUMPS.to_owned(), jumps), (AGAIN.to_owned(), again), (REPEATED.to_owned(), two.repeated)]);
-    if two.datagrams == 0 {
-        return (causes, None);
-    }
-    let of_version_2 = [
-        ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign - two.other_board),
-        (OTHER_BOARD, two.other_board),
-        ("datagrams_too_late", two.old),
-        ("taxels_outside_the_array", two.outside),
-        ("datagrams_of_an_unknown_kind", two.unknown_kind),
-        ("datagrams_with_unknown_flags", two.unknown_flags),
-        ("markers_with_an_unknown_code", two.unknown_marker),
-        ("malformed_bodies", two.malformed),
-        (BOARD_DROPPED, two.dropped),
-        (EVENTS_DROPPED, two.events_dropped),
-        (BOARD_RESET, two.resets),
-        (REPAIRED, two.repaired),
-        ("differences_from_an_unknown_value", two.unknown_value),
-    ];
-    causes.extend(of_version_2.map(|(cause, n)| (cause.to_owned(), n)));
-    (causes, Some(two.missing))
 }
 
 impl Verdict {
@@ -470,145 +383,6 @@ impl Verdict {
         }
         let words: Vec<String> = found().map(|(cause, n)| numbered(*n, &cause.replace('_', " "))).collect();
         (!words.is_empty()).then(|| format!("in the bytes that came: {}", words.join(", ")))
-    }
-
-    /// The verdict on a source of a file.
-    fn of_file(condition: Condition) -> Self {
-        let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { before_first, repeated, changed, so_far, converted, decoded, lines, origin_us, .. } = condition;
-        let is_converted = converted.is_some();
-        let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
-        let mut decoded = decoded.unwrap_or_default();
-        let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
-        let mut no_counts = false;
-        let (mut verdict, why) = match ending {
-            Some(Ending::Finished { counts }) => {
-                let converted = converted.or(counts.converted.clone());
-                let mut counts = Counts { converted, ..counts };
-                if changed && !skipped {
-                    // What reading lacks beside what had been missing when it was recorded was lost with the change.
-                    let before = counts.missing.unwrap_or(0);
-                    let since = decoded.missing.map_or(0, |missing| missing.saturating_sub(before));
-                    *lost.entry(Topic::Datagrams).or_default() += since;
-                    counts.decoder = counts.decoder_with(&decoded.damage);
-                }
-                (Self::of_counts(&counts, nothing_lost), None)
-            }
-            ending => {
-                let why = match ending {
-                    Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
-                    _ if rebuilt.no_end => NO_END.to_owned(),
-                    _ => "not finished: what came last is missing".to_owned(),
-                };
-                let counts = match converted {
-                    Some(_) => Some(Counts { converted, ..so_far.unwrap_or_default() }),
-                    None => so_far.filter(|counts| counts.received > 0),
-                };
-                no_counts = counts.is_none();
-                // The file may hold more than its counts, which are saved now and then; where parts were skipped,
-                // decoding finds faults that never came.
-                let counts = counts.unwrap_or_else(|| Counts { recorded: messages, ..Counts::default() });
-                let found = if skipped { Found::default() } else { decoded.clone() };
-                let (inner, before) = if skipped { (0, 0) } else { (skipped_numbers, before_first) };
-                (Self::of_counts(&so_far_with(counts, found, inner, before), nothing_lost), Some(why))
-            }
-        };
-        let came_short = !verdict.lost.is_empty();
-        if unknown && why.is_some() {
-            // Numbers that the file skips, and that were not dropped before, or lost in the file that it was converted from.
-            let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
-            let datagrams = lost.entry(Topic::Datagrams).or_default();
-            *datagrams = (skipped_numbers + before_first).saturating_sub(before).max(*datagrams);
-        }
-        if verdict.damaged.contains_key(JUMPED_BEFORE) && !is_converted {
-            decoded.doubtful_after_us = Some(origin_us - 1);
-        }
-        let mut bad = vec![];
-        for (n, cause, text) in [
-            (
-                rebuilt.large_chunks,
-                "large_chunks",
-                format!("{} skipped, stated to unpack to more than 64 MiB", counted(rebuilt.large_chunks, "chunk")),
-            ),
-            (bad_chunks, "bad_chunks", format!("{} skipped", counted(bad_chunks, "bad chunk"))),
-            (
-                rebuilt.skipped_bytes,
-                "skipped_bytes",
-                format!(
-                    "{} of the file skipped in {}",
-                    counted(rebuilt.skipped_bytes, "byte"),
-                    counted(rebuilt.gaps, "place")
-                ),
-            ),
-            (rebuilt.torn_bytes, "torn_bytes", format!("{} at the end", counted(rebuilt.torn_bytes, "torn byte"))),
-            (
-                rebuilt.bytes_after_end,
-                "bytes_after_end",
-                format!("{} behind its end not read", counted(rebuilt.bytes_after_end, "byte")),
-            ),
-            (changed.into(), "changed_since_recorded", "what it holds is not what was recorded".to_owned()),
-            (repeated, "repeated_in_file", format!("{} there twice", counted(repeated, "message"))),
-            (rebuilt.no_summary.into(), "no_summary", "the summary at the end missing or damaged".to_owned()),
-        ] {
-            if n > 0 {
-                // What it was converted from may have been damaged too.
-                *verdict.damaged.entry(cause.to_owned()).or_default() += n;
-                bad.push(text);
-            }
-        }
-        if rebuilt.no_end {
-            verdict.damaged.insert("no_final_counts".to_owned(), 1);
-        }
-        lost.retain(|_, n| *n > 0);
-        for (topic, n) in &lost {
-            if let Some((cause, what)) = topic.lost_in_file() {
-                *verdict.lost.entry(cause.to_owned()).or_default() += *n;
-                bad.push(format!("{} lost", counted(*n, what)));
-            }
-        }
-        let lost_here = !lost.is_empty();
-        if unknown {
-            bad.push("what else was there is not known".to_owned());
-        }
-        let whole = why.is_none() || rebuilt.no_end;
-        if (why.is_some() || lost_here) && verdict.status == Status::NothingArrived {
-            // It may have come after what is left of the file, or is lost there.
-            verdict.status = Status::Complete;
-        }
-        if !bad.is_empty() || rebuilt.no_end {
-            verdict.status = verdict.status.max(Status::Damaged);
-        }
-        if !whole || rebuilt.torn_bytes > 0 {
-            verdict.status = verdict.status.max(Status::Unfinished);
-        }
-        if lost_here {
-            verdict.status = verdict.status.max(Status::Lost);
-        }
-        let damage = if lost_here { "LOST" } else { "damage" };
-        let damaged_file = (!bad.is_empty()).then(|| format!("{damage} in the file: {}", bad.join(", ")));
-        let before = match (&why, &damaged_file) {
-            (Some(_), _) => "until then: ",
-            (None, Some(_)) => "while recording: ",
-            (None, None) => "",
-        };
-        let mut pieces: Vec<String> = why.into_iter().chain(damaged_file).collect();
-        if no_counts {
-            pieces.push(format!("{before}no counts were saved yet"));
-            // That nothing was lost is not known then.
-            let known = verdict.text.split_once("; ").map(|(_, damage)| damage);
-            pieces.extend(if came_short { Some(&*verdict.text) } else { known }.map(str::to_owned));
-        } else {
-            pieces.push(format!("{before}{}", verdict.text));
-        }
-        verdict.text = pieces.join("; ");
-        if decoded.doubtful_after_us.is_some() {
-            for (cause, n) in
-                decoded.damage.iter().filter(|(cause, n)| [JUMPS, BACK, DRIFTS].contains(&&***cause) && **n > 0)
-            {
-                verdict.damaged.entry(cause.clone()).or_insert(*n);
-            }
-        }
-        verdict.doubtful(decoded.doubtful_after_us)
     }
 
     /// The verdict where times after this one are doubtful too, if any, us.
@@ -760,22 +534,6 @@ impl Verdict {
     }
 }
 
-/// The last counts of an unfinished recording, with what decoding found since. The arrival numbers that the file skips, and
-/// those before its first, were dropped by the queue, or another program left their datagrams out.
-fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64, before_first: u64) -> Counts {
-    // If more was received than the file holds, the difference is in its unfinished end.
-    counts.received = 0;
-    counts.left_out = (skipped_numbers + before_first).saturating_sub(counts.dropped_by_queue);
-    counts.decoder = counts.decoder_with(&found.damage);
-    // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
-    // among the board's numbers too.
-    let missing =
-        found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue + counts.left_out);
-    let knows = counts.missing.is_some() && !found.unnumbered;
-    counts.missing = missing.or(counts.missing).filter(|n| knows || *n > 0);
-    counts
-}
-
 /// A number and what it counts, in the plural unless it is 1.
 fn counted(n: u64, what: &str) -> String {
     numbered(n, &format!("{what}s"))
@@ -799,31 +557,6 @@ fn numbered(n: u64, plural: &str) -> String {
 pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
 /// Of a file without its end: what it lacks by its arrival numbers.
 const LEFT_OUT: &str = "dropped_or_left_out";
-/// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
-pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
-pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
-/// ... resets, values that differed from the board's own, as their events were lost, and datagrams that came again.
-pub(super) const BOARD_RESET: &str = "resets";
-pub(super) const REPAIRED: &str = "events_repaired";
-pub(super) const REPEATED: &str = "datagrams_repeated";
-/// Datagrams that are intact, and of another board than the first.
-const OTHER_BOARD: &str = "datagrams_of_another_board";
-/// Datagrams of version 1 that came again: version 1 does not number them, so that their events are there twice.
-const AGAIN: &str = "datagrams_decoded_again";
-/// Jumps of the times of version 1 ahead of the host's clock.
-pub(crate) const JUMPS: &str = "jumps_of_time";
-/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step back,
-/// and how often the clock left that of arrival little by little.
-pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
-pub(super) const ANEW: &str = "clock_began_anew";
-pub(super) const BACK: &str = "stamps_out_of_order";
-pub(super) const DRIFTS: &str = "drifts_from_arrival";
-/// Datagrams of version 1 without bytes.
-pub(crate) const EMPTY: &str = "empty_datagrams";
-/// How often the sender had another address than before, as a board that got another one has, or another board.
-pub(crate) const ADDRESS: &str = "changes_of_address";
-/// Bytes of version 1 from a board that sends version 2.
-pub(crate) const REFUSED: &str = "bytes_of_version_1_refused";
 /// Damage that is of a file as a whole, and that each of its sources has.
 const OF_THE_FILE: [&str; 7] =
     ["bad_chunks", "large_chunks", "skipped_bytes", "torn_bytes", "bytes_after_end", "no_summary", "no_final_counts"];

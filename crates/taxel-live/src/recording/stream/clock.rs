@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::verdict::{ANEW, BACK, DRIFTS, Found, JUMPS};
+use super::super::damage::{ANEW, BACK, DRIFTS, Found, JUMPS};
 
 /// Range of a counter: whole numbers are assumed to have 32 bits.
 const TURN: f64 = 4_294_967_296.0;

@@ -1,0 +1,112 @@
+//! What a decoder could not use, by cause, as recordings store it.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use taxel_core::wire::{self, SenderDecoder};
+
+/// What decoding a file found.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Found {
+    /// What the decoder could not use, by cause.
+    pub damage: BTreeMap<String, u64>,
+    /// For version 2: sequence numbers that are missing.
+    pub missing: Option<u64>,
+    /// Whether some of it was of version 1, which numbers nothing.
+    pub unnumbered: bool,
+    /// The time after which times are doubtful, us.
+    pub doubtful_after_us: Option<i64>,
+}
+
+impl Found {
+    /// What a decoder found; `origin_us` is added to its times.
+    #[must_use]
+    pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
+        let (mut causes, missing) =
+            damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.two().counts());
+        causes.extend([(REFUSED.to_owned(), sender.refused()), (EMPTY.to_owned(), sender.empty())]);
+        let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);
+        Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us }
+    }
+
+    /// Number of lines that could not be read.
+    #[must_use]
+    pub fn strange(&self) -> u64 {
+        self.damage.get(STRANGE).copied().unwrap_or(0)
+    }
+}
+
+/// What a decoder of version 1 could not use, by cause.
+#[must_use]
+pub fn damage_of_version_1(counts: &wire::Counts) -> BTreeMap<String, u64> {
+    [
+        ("bytes_skipped", counts.skipped),
+        ("short_events", counts.short),
+        ("contradictory_kinds", counts.contradictory),
+        ("outside_the_array", counts.outside),
+        ("unpaired_intensities", counts.unpaired),
+        ("events_out_of_order", counts.back),
+    ]
+    .map(|(cause, n)| (cause.to_owned(), n))
+    .into()
+}
+
+/// The same of both versions, with the jumps of [`wire::Ahead`] and the datagrams of version 1 that came `again`; and the
+/// number of missing datagrams of version 2, if the board sends it.
+#[must_use]
+pub fn damage(
+    counts: &wire::Counts,
+    jumps: u64,
+    again: u64,
+    two: &wire::v2::Counts,
+) -> (BTreeMap<String, u64>, Option<u64>) {
+    let mut causes = damage_of_version_1(counts);
+    causes.extend([(JUMPS.to_owned(), jumps), (AGAIN.to_owned(), again), (REPEATED.to_owned(), two.repeated)]);
+    if two.datagrams == 0 {
+        return (causes, None);
+    }
+    let of_version_2 = [
+        ("datagrams_damaged", two.checksum + two.short + two.long + two.foreign - two.other_board),
+        (OTHER_BOARD, two.other_board),
+        ("datagrams_too_late", two.old),
+        ("taxels_outside_the_array", two.outside),
+        ("datagrams_of_an_unknown_kind", two.unknown_kind),
+        ("datagrams_with_unknown_flags", two.unknown_flags),
+        ("markers_with_an_unknown_code", two.unknown_marker),
+        ("malformed_bodies", two.malformed),
+        (BOARD_DROPPED, two.dropped),
+        (EVENTS_DROPPED, two.events_dropped),
+        (BOARD_RESET, two.resets),
+        (REPAIRED, two.repaired),
+        ("differences_from_an_unknown_value", two.unknown_value),
+    ];
+    causes.extend(of_version_2.map(|(cause, n)| (cause.to_owned(), n)));
+    (causes, Some(two.missing))
+}
+
+/// What a decoder of version 2 counts that is no damage of bytes: losses in the board itself, ...
+pub(super) const BOARD_DROPPED: &str = "times_that_the_board_dropped_events";
+pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
+/// ... resets, values that differed from the board's own, as their events were lost, and datagrams that came again.
+pub(super) const BOARD_RESET: &str = "resets";
+pub(super) const REPAIRED: &str = "events_repaired";
+pub(super) const REPEATED: &str = "datagrams_repeated";
+/// Datagrams that are intact, and of another board than the first.
+pub(super) const OTHER_BOARD: &str = "datagrams_of_another_board";
+/// Datagrams of version 1 that came again: version 1 does not number them, so that their events are there twice.
+pub(super) const AGAIN: &str = "datagrams_decoded_again";
+/// Jumps of the times of version 1 ahead of the host's clock.
+pub(crate) const JUMPS: &str = "jumps_of_time";
+/// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step back,
+/// and how often the clock left that of arrival little by little.
+pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
+pub(super) const ANEW: &str = "clock_began_anew";
+pub(super) const BACK: &str = "stamps_out_of_order";
+pub(super) const DRIFTS: &str = "drifts_from_arrival";
+/// Datagrams of version 1 without bytes.
+pub(crate) const EMPTY: &str = "empty_datagrams";
+/// How often the sender had another address than before, as a board that got another one has, or another board.
+pub(crate) const ADDRESS: &str = "changes_of_address";
+/// Bytes of version 1 from a board that sends version 2.
+pub(crate) const REFUSED: &str = "bytes_of_version_1_refused";

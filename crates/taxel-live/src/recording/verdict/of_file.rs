@@ -1,0 +1,178 @@
+//! The verdict on a source of a file: how it ended, what reading it found, and what its counts say.
+
+use std::collections::BTreeMap;
+
+use super::{
+    Condition, Counts, Ending, Found, JUMPED_BEFORE, NO_END, NO_LINE_LOST, NOTHING_LOST, Status, Verdict, counted,
+};
+use crate::recording::Topic;
+use crate::recording::damage::{BACK, DRIFTS, JUMPS};
+
+impl Counts {
+    /// What the decoder could not use, by cause, with what reading the file found.
+    fn decoder_with(&self, found: &BTreeMap<String, u64>) -> BTreeMap<String, u64> {
+        let mut all = self.decoder.clone();
+        for (cause, n) in found {
+            let known = all.entry(cause.clone()).or_default();
+            *known = (*known).max(*n);
+        }
+        all
+    }
+}
+
+impl Verdict {
+    /// The verdict on a source of a file.
+    pub(super) fn of_file(condition: Condition) -> Self {
+        let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
+        let Condition { before_first, repeated, changed, so_far, converted, decoded, lines, origin_us, .. } = condition;
+        let is_converted = converted.is_some();
+        let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
+        let mut decoded = decoded.unwrap_or_default();
+        let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
+        let mut no_counts = false;
+        let (mut verdict, why) = match ending {
+            Some(Ending::Finished { counts }) => {
+                let converted = converted.or(counts.converted.clone());
+                let mut counts = Counts { converted, ..counts };
+                if changed && !skipped {
+                    // What reading lacks beside what had been missing when it was recorded was lost with the change.
+                    let before = counts.missing.unwrap_or(0);
+                    let since = decoded.missing.map_or(0, |missing| missing.saturating_sub(before));
+                    *lost.entry(Topic::Datagrams).or_default() += since;
+                    counts.decoder = counts.decoder_with(&decoded.damage);
+                }
+                (Self::of_counts(&counts, nothing_lost), None)
+            }
+            ending => {
+                let why = match ending {
+                    Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
+                    _ if rebuilt.no_end => NO_END.to_owned(),
+                    _ => "not finished: what came last is missing".to_owned(),
+                };
+                let counts = match converted {
+                    Some(_) => Some(Counts { converted, ..so_far.unwrap_or_default() }),
+                    None => so_far.filter(|counts| counts.received > 0),
+                };
+                no_counts = counts.is_none();
+                // The file may hold more than its counts, which are saved now and then; where parts were skipped,
+                // decoding finds faults that never came.
+                let counts = counts.unwrap_or_else(|| Counts { recorded: messages, ..Counts::default() });
+                let found = if skipped { Found::default() } else { decoded.clone() };
+                let (inner, before) = if skipped { (0, 0) } else { (skipped_numbers, before_first) };
+                (Self::of_counts(&so_far_with(counts, found, inner, before), nothing_lost), Some(why))
+            }
+        };
+        let came_short = !verdict.lost.is_empty();
+        if unknown && why.is_some() {
+            // Numbers that the file skips, and that were not dropped before, or lost in the file that it was converted from.
+            let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
+            let datagrams = lost.entry(Topic::Datagrams).or_default();
+            *datagrams = (skipped_numbers + before_first).saturating_sub(before).max(*datagrams);
+        }
+        if verdict.damaged.contains_key(JUMPED_BEFORE) && !is_converted {
+            decoded.doubtful_after_us = Some(origin_us - 1);
+        }
+        let mut bad = vec![];
+        for (n, cause, text) in [
+            (
+                rebuilt.large_chunks,
+                "large_chunks",
+                format!("{} skipped, stated to unpack to more than 64 MiB", counted(rebuilt.large_chunks, "chunk")),
+            ),
+            (bad_chunks, "bad_chunks", format!("{} skipped", counted(bad_chunks, "bad chunk"))),
+            (
+                rebuilt.skipped_bytes,
+                "skipped_bytes",
+                format!(
+                    "{} of the file skipped in {}",
+                    counted(rebuilt.skipped_bytes, "byte"),
+                    counted(rebuilt.gaps, "place")
+                ),
+            ),
+            (rebuilt.torn_bytes, "torn_bytes", format!("{} at the end", counted(rebuilt.torn_bytes, "torn byte"))),
+            (
+                rebuilt.bytes_after_end,
+                "bytes_after_end",
+                format!("{} behind its end not read", counted(rebuilt.bytes_after_end, "byte")),
+            ),
+            (changed.into(), "changed_since_recorded", "what it holds is not what was recorded".to_owned()),
+            (repeated, "repeated_in_file", format!("{} there twice", counted(repeated, "message"))),
+            (rebuilt.no_summary.into(), "no_summary", "the summary at the end missing or damaged".to_owned()),
+        ] {
+            if n > 0 {
+                // What it was converted from may have been damaged too.
+                *verdict.damaged.entry(cause.to_owned()).or_default() += n;
+                bad.push(text);
+            }
+        }
+        if rebuilt.no_end {
+            verdict.damaged.insert("no_final_counts".to_owned(), 1);
+        }
+        lost.retain(|_, n| *n > 0);
+        for (topic, n) in &lost {
+            if let Some((cause, what)) = topic.lost_in_file() {
+                *verdict.lost.entry(cause.to_owned()).or_default() += *n;
+                bad.push(format!("{} lost", counted(*n, what)));
+            }
+        }
+        let lost_here = !lost.is_empty();
+        if unknown {
+            bad.push("what else was there is not known".to_owned());
+        }
+        let whole = why.is_none() || rebuilt.no_end;
+        if (why.is_some() || lost_here) && verdict.status == Status::NothingArrived {
+            // It may have come after what is left of the file, or is lost there.
+            verdict.status = Status::Complete;
+        }
+        if !bad.is_empty() || rebuilt.no_end {
+            verdict.status = verdict.status.max(Status::Damaged);
+        }
+        if !whole || rebuilt.torn_bytes > 0 {
+            verdict.status = verdict.status.max(Status::Unfinished);
+        }
+        if lost_here {
+            verdict.status = verdict.status.max(Status::Lost);
+        }
+        let damage = if lost_here { "LOST" } else { "damage" };
+        let damaged_file = (!bad.is_empty()).then(|| format!("{damage} in the file: {}", bad.join(", ")));
+        let before = match (&why, &damaged_file) {
+            (Some(_), _) => "until then: ",
+            (None, Some(_)) => "while recording: ",
+            (None, None) => "",
+        };
+        let mut pieces: Vec<String> = why.into_iter().chain(damaged_file).collect();
+        if no_counts {
+            pieces.push(format!("{before}no counts were saved yet"));
+            // That nothing was lost is not known then.
+            let known = verdict.text.split_once("; ").map(|(_, damage)| damage);
+            pieces.extend(if came_short { Some(&*verdict.text) } else { known }.map(str::to_owned));
+        } else {
+            pieces.push(format!("{before}{}", verdict.text));
+        }
+        verdict.text = pieces.join("; ");
+        if decoded.doubtful_after_us.is_some() {
+            for (cause, n) in
+                decoded.damage.iter().filter(|(cause, n)| [JUMPS, BACK, DRIFTS].contains(&&***cause) && **n > 0)
+            {
+                verdict.damaged.entry(cause.clone()).or_insert(*n);
+            }
+        }
+        verdict.doubtful(decoded.doubtful_after_us)
+    }
+}
+
+/// The last counts of an unfinished recording, with what decoding found since. The arrival numbers that the file skips, and
+/// those before its first, were dropped by the queue, or another program left their datagrams out.
+fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64, before_first: u64) -> Counts {
+    // If more was received than the file holds, the difference is in its unfinished end.
+    counts.received = 0;
+    counts.left_out = (skipped_numbers + before_first).saturating_sub(counts.dropped_by_queue);
+    counts.decoder = counts.decoder_with(&found.damage);
+    // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
+    // among the board's numbers too.
+    let missing =
+        found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue + counts.left_out);
+    let knows = counts.missing.is_some() && !found.unnumbered;
+    counts.missing = missing.or(counts.missing).filter(|n| knows || *n > 0);
+    counts
+}
