@@ -1,8 +1,11 @@
 """Settings of all tests: random examples are the same each time, and a slow machine is no failure."""
 
+import fcntl
 import os
 import signal
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -31,3 +34,13 @@ def no_progress_on_a_slow_machine() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("taxel.cli._recordings._REPORT_S", (600.0,))
         yield
+
+
+@pytest.fixture
+def full_device() -> Iterator[Path]:
+    """Give a disk that is always full to one test at a time, as a recording locks its file."""
+    if not Path("/dev/full").exists():
+        pytest.skip("needs /dev/full, a disk that is always full")
+    with (Path(tempfile.gettempdir()) / "taxel-tests-of-dev-full").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield Path("/dev/full")

@@ -15,10 +15,9 @@ from taxel.live import Live
 from .boards import LOOPBACK, SMALL, listening, play, presses, recording, wait_for, wait_until
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is always full")
 @pytest.mark.parametrize("name", ["full.mcap", "full.lsa"])
-def test_a_full_disk_is_one_clear_error(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).symlink_to("/dev/full")
+def test_a_full_disk_is_one_clear_error(tmp_path: Path, full_device: Path, name: str) -> None:
+    (tmp_path / name).symlink_to(full_device)
 
     def record() -> None:
         with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / name, overwrite=True) as live:
