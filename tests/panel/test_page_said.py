@@ -30,7 +30,11 @@ pytestmark = pytest.mark.timeout(600)
 
 @contextmanager
 def answered(chromium: Any, file: Path, answers: dict[str, list[dict[str, Any]]]) -> Iterator[Any]:
-    """Show a recording; for requests of the kinds in `answers` these messages come instead of the server's."""
+    """Show a recording; for requests of the kinds in `answers` these messages come instead of the server's.
+
+    The server sends its list of recordings by itself too, which must not replace theirs.
+    """
+    given = {answer["type"] for each in answers.values() for answer in each} - {"done"}
     with Panel(file) as panel:
         page = chromium.new_context().new_page()
 
@@ -46,8 +50,12 @@ def answered(chromium: Any, file: Path, answers: dict[str, list[dict[str, Any]]]
                 if message["type"] not in answers:
                     server.send(text)
 
+            def pass_back(message: Any) -> None:
+                if isinstance(message, bytes) or json.loads(message)["type"] not in given:
+                    socket.send(message)
+
             socket.on_message(pass_on)
-            server.on_message(socket.send)
+            server.on_message(pass_back)
 
         page.route_web_socket("**/socket", between)
         page.goto(panel.url)
