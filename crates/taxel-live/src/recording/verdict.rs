@@ -133,7 +133,7 @@ pub struct Counts {
     /// version 2, which end with theirs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sum: Option<u32>,
-    /// What the decoder could not use of the bytes received, by cause; see [`damage`].
+    /// What the decoder could not use of the bytes received, by cause; see [`damage`](super::damage::damage).
     pub decoder: BTreeMap<String, u64>,
     /// What was lost between the computer that received the datagrams and this one, if they are different.
     #[serde(skip_serializing_if = "Option::is_none")]
