@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from formats.making import write_gaitpdb
 from shell import call
 from test_readout import ARRAY, recipe, tare, touches
 
@@ -491,6 +492,20 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     assert page.count("9.npz</td>", held, own) == page.count("9.npz</td>", own, page.index("The worst")) == 2
     assert out.startswith("held out: whole recordings, 3 folds (window 50 ms)\n")
     assert "contact, chosen: tau 1.5" in out
+
+
+def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path) -> None:
+    file, readout = write_gaitpdb(tmp_path), tmp_path / "gait.json"
+    assert call(capsys, "train", file, "--labels", "notes", "--folds", 0, "-o", readout)[0] == 0
+    assert call(capsys, "detect", file, "--readout", readout, "--report", tmp_path / "r")[0] == 0
+    page = (tmp_path / "r" / "report.html").read_text()
+    felt = page[page.index("The sum over time") : page.index("<h2>contact</h2>")]
+    assert re.findall(r'"title":"[^"]*GaCo99_01 (\w+)"', felt) == ["left", "right"]
+    for foot, curve in zip(
+        taxel.open(file), re.findall(r'"y":(\[[^]]*\]),"color":"[^"]*","width":0.9', felt), strict=True
+    ):
+        frames = foot.frames()
+        assert json.loads(curve) == pytest.approx(frames.values.sum(axis=(1, 2))), foot.label
 
 
 def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:

@@ -24,6 +24,11 @@ from taxel.detect import Alignment, Judged, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
 from taxel.detect.examples import array_of
 from taxel.encode import Composite, Encoder
+from taxel.frames import Frames
+from taxel.recorded import recorded
+from taxel.recording import Recording
+from taxel.recording.contents import Contents
+from taxel.recording.pressure import series
 from taxel.report.charts import INK, STYLE, chart
 from taxel.report.page import render
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -40,6 +45,8 @@ _MOMENTS, _AROUND = 4, 6.0
 _MISSED_MS = 50.0
 #: Files that `taxel view` shows, and the largest number of them that the page lists.
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
+#: Recordings of pictures whose sums are drawn, and stretches of a curve, each with its greatest value.
+_MOST_SUMS, _STRETCHES = 4, 1000
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
 _DETECTED, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
@@ -109,8 +116,10 @@ def write_listening(
             }
             for label in readout.labels
         }
+        felt = _drawn(_sums(listened, readout.labels))
     text = render(
         "report/listening.html.j2",
+        felt=felt,
         title=title,
         judged=judged,
         readout=repr(readout),
@@ -174,6 +183,34 @@ def _drawn(figure: Figure | None) -> Markup | None:
     drawn = chart(figure)
     plt.close(figure)
     return drawn
+
+
+def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
+    """Draw the sum of each recording of pictures over time, so of each foot, and what was detected."""
+    pictures = [(one, recorded(one.example.source, hold=False)) for one in listened]
+    shown = [(one, of) for one, of in pictures if isinstance(of, Frames) and len(of)][:_MOST_SUMS]
+    if not shown:
+        return None
+    figure, axes = plt.subplots(
+        len(shown), 1, figsize=(9.0, 0.6 + 1.4 * len(shown)), layout="constrained", squeeze=False
+    )
+    for axis, (one, frames) in zip(axes[:, 0], shown, strict=True):
+        of = series(Recording(Contents(Path(one.name), "", "npz", frames.array, frames=frames)), one.example.tare)
+        assert of is not None  # pictures have values
+        total, unit = (of.total, of.unit) if of.force is None else (of.force, "N")
+        begins = np.arange(0, len(total), 1 + len(total) // _STRETCHES)
+        seconds, most = (of.t[begins] - one.begin_us) / 1e6, np.fmax.reduceat(total, begins)
+        axis.plot(seconds, most, color=INK, linewidth=0.9, label=f"sum, {unit}")
+        for k, label in enumerate(labels):
+            at = (one.found[label].t - one.begin_us) / 1e6
+            axis.plot(
+                at, np.interp(at, seconds, most), "o^sD"[k % 4], color=_DETECTED if k % 2 == 0 else _TRUE, label=label
+            )
+        axis.set_title(one.name, fontsize=9)
+        axis.set_ylabel(unit)
+        axis.legend()
+    axes[-1][0].set_xlabel("s")
+    return figure
 
 
 def _row(one: Outcome, label: str, score: Score | None) -> dict[str, Any]:
