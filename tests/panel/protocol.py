@@ -85,7 +85,7 @@ def head(picture):
     names = ("magic", "bytes", "flags", "number", "rows", "columns", "t_us", "made_ns", "events", "watched")
     names += ("column_us", "first", "count", "none")
     values = struct.unpack_from("<4sHHIHHqqQIIqII", picture)
-    sections = struct.unpack_from("<18I", picture, 64)
+    sections = struct.unpack_from("<20I", picture, 64)
     return dict(zip(names, values, strict=True)), list(zip(sections[::2], sections[1::2], strict=True))
 
 

@@ -372,6 +372,82 @@ def max_and_column(page, about):
     return max(force) * about["pictures"]["step"], int(np.argmax(force))
 
 
+@pytest.mark.parametrize("unit", ["N", "kPa", "counts"])
+@pytest.mark.parametrize("sigma", [0.0, 0.1, 1.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_noise_is_no_area_and_moves_no_centre_and_counts_in_the_sum_of_forces(tmp_path, unit, sigma, seed):
+    random = np.random.default_rng(seed)
+    values = np.maximum(random.normal(0, sigma, (400, 14, 11)), 0)
+    presses = [(begin, random.integers(0, 10), random.integers(0, 7)) for begin in range(100, 400, 60)]
+    for begin, y, x in presses:
+        values[begin : begin + 30, y : y + 4, x : x + 4] += 60
+    frames = Frames(values.astype(np.float32), np.arange(400) * 10_000, unit=unit, array=Array(14, 11))
+    taxel.convert(frames, tmp_path / "mat.npz")
+    shown, floor, _ = above_rest(taxel.open(tmp_path / "mat.npz"))
+    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
+        about = opened(page, "mat.npz")
+        step = about["pictures"]["step"]
+        assert about["pictures"]["floor"] * step == pytest.approx(floor, abs=step)
+        for begin, y, x in presses:
+            for k, pressed in ((begin - 20, False), (begin + 10, True)):
+                _, picture = values_at(page, about, k * 10_000)
+                at = head(picture)[0]
+                total, area = section(picture, 3, "<u4").reshape(-1, 4)[-1, :2]
+                centre = section(picture, 3, "<f4").reshape(-1, 4)[-1, 2:]
+                assert at["t_us"] == k * 10_000
+                of_all = unit != "counts"
+                # As taxel info has it: one in ten may have more noise than what counts as such, in counts more.
+                assert int(area) == pytest.approx(np.count_nonzero(shown.values[k] > floor), abs=1 if of_all else 3)
+                assert not of_all or int(area) == pytest.approx(16 * pressed, abs=1)
+                sum_ = frames.values[k].sum() if of_all else shown.values[k][shown.values[k] > floor].sum()
+                assert total * step == pytest.approx(sum_, abs=160 * step + (1e-3 if of_all else 3.3 * floor))
+                if pressed:
+                    assert centre == pytest.approx((x + 1.5, y + 1.5), abs=0.1 if of_all else 0.5)
+                elif area == 0:
+                    assert np.isnan(centre).all()
+
+
+@pytest.mark.parametrize("column_us", [4_000, 64_000])
+def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
+    random = np.random.default_rng(4)
+
+    def walked(rows):
+        """Give each sensor a load of its own."""
+        table = np.array([[float(cell) for cell in row.split("\t")] for row in rows])
+        table[:, 1:17] *= random.uniform(0.2, 2, (len(table), 16)).round(2)
+        table[:, 17], table[:, 18] = table[:, 1:9].sum(axis=1), table[:, 9:17].sum(axis=1)
+        return ["\t".join(f"{cell:.6g}" for cell in row) for row in table]
+
+    file = write_gaitpdb(tmp_path, change=walked)
+    [both] = open_joined(file)
+    feet = [both.sources[foot].frames() for foot in ("left", "right")]
+    with Panel(file) as panel, Client(panel) as page:
+        about = opened(page, file.name)
+        assert page.ask("zoom", column_us=column_us)["type"] == "done"
+        _, picture = values_at(page, about, 5_000_000)
+        while head(picture)[0]["column_us"] != column_us:
+            picture = page.until("picture")
+        of = head(picture)[0]
+        sums = section(picture, 8, "<u4").reshape(-1, 2)
+        centres = section(picture, 9, "<f4").reshape(-1, 2, 2)
+        assert len(sums) == len(centres) == of["count"] > 70
+        for number, at, own in zip(range(of["first"], of["first"] + of["count"]), centres, sums, strict=True):
+            ends = [min(end, 5_000_000) for end in parts_of(number, column_us)]
+            for k, frames in enumerate(feet):
+                seen = frames.values.reshape(len(frames), -1)[np.searchsorted(frames.t, ends, side="right") - 1]
+                most = seen[np.argmax(seen.sum(axis=1))].astype(float)
+                assert own[k] * about["pictures"]["step"] == pytest.approx(
+                    most.sum(), abs=9 * about["pictures"]["step"]
+                )
+                if not most.sum():
+                    assert np.isnan(at[k]).all()
+                    continue
+                places = frames.array.places
+                assert at[k] == pytest.approx(
+                    [(most @ axis.reshape(-1)) / most.sum() for axis in (places.x, places.y)], abs=1
+                )
+
+
 def test_without_a_quiet_stretch_values_are_shown_as_they_are(tmp_path):
     rng, t = np.random.default_rng(8), np.arange(100) * 10_000
     values = rng.uniform(20, 90, (100, 4, 4))

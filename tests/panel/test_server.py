@@ -32,7 +32,7 @@ def test_a_picture_shows_what_came(live, panel):
             pass
         picture = page.pictures[-1]
         about, sections = head(picture)
-        assert (about["magic"], about["bytes"], about["rows"], about["columns"]) == (b"TXP1", 136, 64, 64)
+        assert (about["magic"], about["bytes"], about["rows"], about["columns"]) == (b"TXP1", 144, 64, 64)
         assert all(start % 8 == 0 for start, _ in sections)
         pressure = section(picture, 0, "<u2").reshape(64, 64)
         assert pressure[5, 3] == 90

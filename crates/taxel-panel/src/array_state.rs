@@ -6,7 +6,9 @@
 use std::sync::Arc;
 
 use super::centre::Coordinates;
-use super::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, TimeColumns, column_of};
+use super::keyframe_index::Pictures;
+use super::load::Load;
+use super::time_columns::{COLUMN_US, MISSING, TimeColumns, column_of};
 use super::weights::Weights;
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
@@ -95,6 +97,8 @@ pub struct ArrayState {
     /// Column and row of each taxel, looked up because a division per change would dominate the cost.
     places: Arc<[(u16, u16)]>,
     floor: u16,
+    /// Ticks above rest that count as none in the sums.
+    sum_floor: u16,
     columns: usize,
     centre: Coordinates,
     weights: Weights,
@@ -123,15 +127,10 @@ pub struct ArrayState {
     /// Number of times that time was set back or the board was reset.
     restarts: u64,
     events: u64,
-    sum: u64,
-    /// The sum by weight, where the taxels do not count alike.
-    weighted: u64,
-    sum_x: u64,
-    sum_y: u64,
-    area: u32,
-    /// Number of the source of each column of several sources, and the sum and the weighted sum of each; else empty.
+    load: Load,
+    /// Number of the source of each column of several sources, and the load of each; else empty.
     source_of: Arc<[usize]>,
-    sums: Vec<(u64, u64)>,
+    loads: Vec<Load>,
 }
 
 impl ArrayState {
@@ -145,6 +144,7 @@ impl ArrayState {
         let mut state = Self {
             places: (0..from.held.len()).map(place).collect(),
             floor,
+            sum_floor: floor,
             columns,
             centre: Coordinates::new(array),
             weights: Weights::default(),
@@ -164,13 +164,9 @@ impl ArrayState {
             latest: from.latest,
             restarts: 0,
             events: from.events,
-            sum: 0,
-            weighted: 0,
-            sum_x: 0,
-            sum_y: 0,
-            area: 0,
+            load: Load::default(),
             source_of: Arc::default(),
-            sums: vec![],
+            loads: vec![],
         };
         state.sum_above_rest();
         if let Some(t) = from.latest {
@@ -179,19 +175,14 @@ impl ArrayState {
         state
     }
 
-    /// The state where pictures are shown, whose taxels have these weights, and columns these sources: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change
+    /// The state where these pictures are shown: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change
     /// without a value is a value that is missing from then on, and pictures are counted as events are.
     #[must_use]
-    pub(crate) fn of_pictures(
-        mut self,
-        from: &Keyframe,
-        rest: RestSource,
-        weights: Weights,
-        source_of: Arc<[usize]>,
-    ) -> Self {
-        (self.pictures, self.weights, self.source_of) = (Some(rest), weights, source_of);
-        self.sums = vec![(0, 0); self.source_of.last().map_or(0, |last| last + 1)];
-        self.time_columns = self.time_columns.with_sources(self.sums.len());
+    pub(crate) fn of_pictures(mut self, from: &Keyframe, pictures: &dyn Pictures) -> Self {
+        (self.pictures, self.sum_floor) = (Some(pictures.rest_source()), pictures.sum_floor());
+        (self.weights, self.source_of) = (pictures.weights().clone(), pictures.source_of());
+        self.loads = vec![Load::default(); self.source_of.last().map_or(0, |last| last + 1)];
+        self.time_columns = self.time_columns.with_sources(self.loads.len());
         (self.tracked, self.track_at) = (None, None);
         self.rest = Rest::measured(from.rest.clone());
         self.sum_above_rest();
@@ -208,41 +199,24 @@ impl ArrayState {
 
     /// Computes the sums above rest from all taxels.
     fn sum_above_rest(&mut self) {
-        (self.sum, self.weighted, self.sum_x, self.sum_y, self.area) = (0, 0, 0, 0, 0);
-        self.sums.fill((0, 0));
+        self.load = Load::default();
+        self.loads.fill(Load::default());
         for taxel in 0..self.places.len() {
             self.change_above_rest(taxel, 0, self.above(taxel));
         }
     }
 
-    /// Ticks of a taxel above rest; 0 up to the noise floor.
+    /// Ticks of a taxel above rest, as they count in the sums; 0 up to the noise floor.
     fn above(&self, taxel: usize) -> u16 {
-        self.rest.above_noise(taxel, self.held.values()[taxel], self.floor)
+        self.rest.above_noise(taxel, self.held.values()[taxel], self.sum_floor)
     }
 
     /// Updates the sums for a taxel that was `before` ticks above rest and is `now`.
     fn change_above_rest(&mut self, taxel: usize, before: u16, now: u16) {
-        let (x, y) = self.centre.get(taxel);
-        // A decrease wraps to a large number; the sums are right modulo 2^64.
-        let moved = u64::from(now).wrapping_sub(before.into());
-        self.sum = self.sum.wrapping_add(moved);
-        self.weighted = self.weighted.wrapping_add(self.weights.weighed(taxel, moved));
-        self.sum_x = self.sum_x.wrapping_add(moved.wrapping_mul(x));
-        self.sum_y = self.sum_y.wrapping_add(moved.wrapping_mul(y));
-        self.area = self.area + u32::from(now > 0) - u32::from(before > 0);
+        self.load.change(taxel, (before, now), self.floor, &self.centre, &self.weights);
         if let Some(&source) = self.source_of.get(usize::from(self.places[taxel].0)) {
-            let (sum, weighted) = &mut self.sums[source];
-            *sum = sum.wrapping_add(moved);
-            *weighted = weighted.wrapping_add(self.weights.weighed(taxel, moved));
+            self.loads[source].change(taxel, (before, now), self.floor, &self.centre, &self.weights);
         }
-    }
-
-    fn curve(&self) -> Curve {
-        if self.sum == 0 {
-            return NOTHING;
-        }
-        let (x, y) = self.centre.centre(self.sum, self.sum_x, self.sum_y);
-        Curve { sum: self.weights.sum(self.sum, self.weighted), area: self.area, x, y }
     }
 
     /// Applies changes in order; those of one time together, because most of the work is per time.
@@ -467,7 +441,7 @@ impl ArrayState {
     /// Copies rest and noise floor from another state of the same source, where they differ.
     pub fn copy_rest(&mut self, other: &Self) {
         if self.floor != other.floor || self.rest != other.rest {
-            self.floor = other.floor;
+            (self.floor, self.sum_floor) = (other.floor, other.sum_floor);
             self.rest.clone_from(&other.rest);
             self.tracked.clone_from(&other.tracked);
             self.sum_above_rest();
@@ -476,7 +450,7 @@ impl ArrayState {
 
     /// Sets the noise floor: ticks above rest that count as none.
     pub fn set_noise_floor(&mut self, floor: u16) {
-        self.floor = floor;
+        (self.floor, self.sum_floor) = (floor, floor);
         self.sum_above_rest();
     }
 
@@ -526,15 +500,16 @@ impl ArrayState {
     /// Writes the current curve, and the values that have a curve each, into a column.
     fn store_curve(&mut self, column: i64) {
         let missing = self.pictures.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN);
-        let curve = if missing { MISSING } else { self.curve() };
-        self.time_columns.set_curve(column, curve);
+        let curve = |load: &Load| load.curve(&self.centre, &self.weights);
+        let whole = if missing { MISSING } else { curve(&self.load) };
+        self.time_columns.set_curve(column, whole);
         if self.time_columns.value_count() > 0 {
             let channels = (0..self.time_columns.channel_count()).map(|channel| self.above(channel).into());
-            let sums = self.sums.iter().enumerate().map(|(source, &(sum, weighted))| match self.knows(source) {
-                true => self.weights.sum(sum, weighted),
-                false => MISSING_SUM,
+            let sources = self.loads.iter().enumerate().flat_map(|(source, load)| match self.knows(source) {
+                true => curve(load).of_source(),
+                false => MISSING.of_source(),
             });
-            let values: Vec<u32> = channels.chain(sums).collect();
+            let values: Vec<u32> = channels.chain(sources).collect();
             self.time_columns.set_values(column, &values);
         }
     }

@@ -55,6 +55,9 @@ pub trait Pictures: Send + Sync {
     /// Where the rest of the sources comes from; none where they differ.
     fn rest_source(&self) -> RestSource;
 
+    /// Steps above rest that count as none in the sums.
+    fn sum_floor(&self) -> u16;
+
     /// How much each taxel counts in the sum.
     fn weights(&self) -> &Weights;
 

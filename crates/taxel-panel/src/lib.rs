@@ -19,6 +19,7 @@ mod keyframe_index;
 mod labels;
 mod limits;
 mod live_source;
+mod load;
 mod messages;
 mod opening;
 mod options;

@@ -8,14 +8,14 @@ use super::array_state::{ArrayState, RestSource};
 use super::encoded_spikes::EncodedSpikes;
 use super::player::Player;
 use super::taxel_history::TaxelHistory;
-use super::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, SPAN, TimeColumns, column_of};
+use super::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, OF_SOURCE, SPAN, TimeColumns, column_of};
 
 /// Bytes of the header.
-const HEADER: usize = 136;
+const HEADER: usize = 144;
 
 /// Where the table of sections begins, and how many there are.
 const SECTIONS: usize = 64;
-const SECTION_COUNT: usize = 9;
+const SECTION_COUNT: usize = 10;
 
 /// The flags of the header.
 pub(super) const LIVE: u16 = 1;
@@ -50,8 +50,8 @@ struct ShownColumns<'a> {
     last: i64,
     /// Stored columns in one shown column.
     factor: i64,
-    /// The most that noise adds up to.
-    noise: u32,
+    /// The most that noise adds up to, and that of each of several sources.
+    noise: (u32, &'a [u32]),
 }
 
 impl<'a> ShownColumns<'a> {
@@ -61,7 +61,7 @@ impl<'a> ShownColumns<'a> {
         whole: Option<&'a TimeColumns>,
         latest: Option<i64>,
         column_us: i64,
-        noise: u32,
+        noise: (u32, &'a [u32]),
     ) -> Self {
         let stored_us = column_us.min(COLUMN_US);
         let last = latest.map_or(i64::MIN, |t| column_of(t, stored_us));
@@ -97,7 +97,7 @@ impl<'a> ShownColumns<'a> {
         let greatest =
             |most: Curve, one: Curve| if one.sum > most.sum || most.area == MISSING.area { one } else { most };
         let curve = parts.map(|(store, columns)| store.greatest(columns)).reduce(greatest).unwrap_or(NOTHING);
-        if curve.sum > self.noise { curve } else { Curve { x: f32::NAN, y: f32::NAN, ..curve } }
+        if curve.sum > self.noise.0 { curve } else { Curve { x: f32::NAN, y: f32::NAN, ..curve } }
     }
 
     /// The values that have a curve each, column after column.
@@ -109,6 +109,10 @@ impl<'a> ShownColumns<'a> {
             all.resize(begin + self.own.value_count(), MISSING_SUM);
             for (store, columns) in self.parts(column) {
                 store.raise_values(columns, &mut all[begin..]);
+            }
+            let sources = all[begin + self.own.channel_count()..].chunks_exact_mut(OF_SOURCE);
+            for (source, _) in sources.zip(self.noise.1).filter(|(source, noise)| source[0] <= **noise) {
+                source[1..].fill(f32::NAN.to_bits());
             }
         }
         all
@@ -136,7 +140,7 @@ pub(super) fn of_state(
         None if about.column_us < COLUMN_US => (state.time_columns(), i64::MAX),
         None => (state.time_columns(), i64::MIN),
     };
-    let shown = ShownColumns::new(own, first_own, None, state.latest(), about.column_us, 0);
+    let shown = ShownColumns::new(own, first_own, None, state.latest(), about.column_us, (0, &[]));
     write(state, columns, &shown, history, spikes, about)
 }
 
@@ -153,7 +157,7 @@ pub(super) fn of_player(player: &mut Player, window: Option<&mut Player>, about:
         None => player,
     };
     let (own, first_own, whole) = beside.time_columns();
-    let noise = player.index().time_columns().map_or(0, TimeColumns::noise);
+    let noise = player.index().time_columns().map_or((0, &[][..]), |all| (all.noise(), all.source_noise()));
     let shown = ShownColumns::new(own, first_own, whole, beside.state().latest(), about.column_us, noise);
     write(player.state(), player.index().array().columns, &shown, beside.history(), beside.spikes(), about)
 }
@@ -210,8 +214,10 @@ fn write(
         #[allow(clippy::cast_possible_truncation)]
         each().for_each(|(channels, _)| channels.iter().for_each(|&v| out.extend((v as u16).to_le_bytes())));
     });
-    section(&mut out, 8, &|out| {
-        each().for_each(|(_, sums)| sums.iter().for_each(|sum| out.extend(sum.to_le_bytes())));
+    let sources = || each().flat_map(|(_, sources)| sources.chunks_exact(OF_SOURCE));
+    section(&mut out, 8, &|out| sources().for_each(|source| out.extend(source[0].to_le_bytes())));
+    section(&mut out, 9, &|out| {
+        sources().flat_map(|source| &source[1..]).for_each(|at| out.extend(at.to_le_bytes()));
     });
     let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
     put(0, b"TXP1");

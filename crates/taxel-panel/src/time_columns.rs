@@ -23,6 +23,9 @@ const BLOCK: i64 = 250;
 /// Of channels up to this number each has a curve of its own.
 const MOST_CHANNELS: usize = 64;
 
+/// What is stored of a source: its sum, and the bits of the coordinates of its centre.
+pub(super) const OF_SOURCE: usize = 3;
+
 /// A touch exceeds the quiet force by this part of the greatest excess: one in so many.
 const TOUCH_SHARE: u32 = 4;
 /// The force of one column in so many, the least ones, is that of a sensor at rest.
@@ -39,6 +42,14 @@ pub struct Curve {
     pub x: f32,
     /// Row of the centre of pressure; NaN where nothing is pressed.
     pub y: f32,
+}
+
+impl Curve {
+    /// What is stored of a source with this curve; [`MISSING_SUM`] everywhere, which is no number, for one without values.
+    pub(super) fn of_source(self) -> [u32; OF_SOURCE] {
+        let missing = self.area == MISSING.area;
+        if missing { [MISSING_SUM; OF_SOURCE] } else { [self.sum, self.x.to_bits(), self.y.to_bits()] }
+    }
 }
 
 /// Number of the column of time that holds `t` (us), of columns `column_us` wide.
@@ -77,7 +88,7 @@ impl Shape {
 
     /// Number of values that have a curve of their own.
     fn values(self) -> usize {
-        self.channels + self.sources
+        self.channels + OF_SOURCE * self.sources
     }
 
     fn block_bytes(self) -> usize {
@@ -105,8 +116,9 @@ pub struct TimeColumns {
     reach: Option<(i64, i64)>,
     /// Maximum number of blocks.
     max_blocks: usize,
-    /// Up to this sum of ticks above rest there is noise alone, and no centre.
+    /// Up to this sum of ticks above rest there is noise alone, and no centre; of each of several sources.
     noise: u32,
+    source_noise: Vec<u32>,
 }
 
 impl TimeColumns {
@@ -121,6 +133,7 @@ impl TimeColumns {
             reach: None,
             max_blocks: (bytes / block).max(SPAN.unsigned_abs() as usize / BLOCK.unsigned_abs() as usize + 2),
             noise: 0,
+            source_noise: vec![],
         }
     }
 
@@ -132,10 +145,11 @@ impl TimeColumns {
         self
     }
 
-    /// The same with this sum as the most that noise adds up to.
+    /// The same with these sums as the most that noise adds up to, of each source.
     #[must_use]
-    pub(super) fn with_noise(mut self, noise: u32) -> Self {
-        self.noise = noise;
+    pub(super) fn with_noise(mut self, each: Vec<u32>) -> Self {
+        self.noise = each.iter().fold(0, |all, &one| all.saturating_add(one));
+        self.source_noise = each;
         self
     }
 
@@ -143,6 +157,12 @@ impl TimeColumns {
     #[must_use]
     pub fn noise(&self) -> u32 {
         self.noise
+    }
+
+    /// The most that noise of each source adds up to, ticks above rest.
+    #[must_use]
+    pub fn source_noise(&self) -> &[u32] {
+        &self.source_noise
     }
 
     /// Bytes that `columns` columns of an array take.
@@ -163,7 +183,7 @@ impl TimeColumns {
         self.shape.channels
     }
 
-    /// Number of values that have a curve each: of channels, and then of sources if there are several.
+    /// Number of values that have a curve each: of channels, and then the sum and the centre of each source if there are several.
     #[must_use]
     pub fn value_count(&self) -> usize {
         self.shape.values()
@@ -262,7 +282,7 @@ impl TimeColumns {
     }
 
     /// Sets the values that have a curve each, from this column to the end of its block: ticks above rest of the channels,
-    /// and sums of the sources.
+    /// and what is stored of the sources ([`Curve::of_source`]).
     pub(super) fn set_values(&mut self, column: i64, values: &[u32]) {
         let count = self.shape.values();
         if values.len() == count && self.values_at(column).is_none_or(|before| before != values) {
@@ -282,12 +302,18 @@ impl TimeColumns {
         Some(&self.blocks[place].1.values[k * count..(k + 1) * count])
     }
 
-    /// Raises the values in `out` to the greatest of each in columns; any is greater than [`MISSING_SUM`].
+    /// Raises the values in `out` to the greatest of each in columns, and the sources to where the sum of each is greatest;
+    /// any sum is greater than [`MISSING_SUM`].
     pub fn raise_values(&self, columns: Range<i64>, out: &mut [u32]) {
+        let (channels, sources) = out.split_at_mut(self.shape.channels);
         for values in self.differing(columns).filter_map(|column| self.values_at(column)) {
-            for (most, &value) in out.iter_mut().zip(values) {
+            let (of_channels, of_sources) = values.split_at(self.shape.channels);
+            channels.iter_mut().zip(of_channels).for_each(|(most, &value)| *most = value.max(*most));
+            for (most, one) in sources.chunks_exact_mut(OF_SOURCE).zip(of_sources.chunks_exact(OF_SOURCE)) {
                 // What is missing wraps to 0.
-                *most = most.wrapping_add(1).max(value.wrapping_add(1)).wrapping_sub(1);
+                if one[0].wrapping_add(1) > most[0].wrapping_add(1) {
+                    most.copy_from_slice(one);
+                }
             }
         }
     }

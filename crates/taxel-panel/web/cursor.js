@@ -142,11 +142,20 @@ export class Cursor {
     }
     const area = this.sensor?.area(timeline.area[place]) ?? "";
     write(part("force-area", HTMLElement), area);
-    const [x, y] = [timeline.x[place], timeline.y[place]];
-    const centre = Number.isNaN(x) ? "nothing pressed" : (this.sensor?.centre(x, y) ?? "");
+    const centre = this.centre(timeline, place);
     write(part("centre-now", HTMLElement), centre);
     const channels = this.sensor?.kind === "channels";
     const sum = written.length > 1 ? written.map((one, k) => `${this.sensor?.sources[k].name ?? ""} ${one}`).join(", ") : written[0];
     write(part("picture-info", HTMLElement), `${sum}${channels ? "" : ` over ${area}, centre (${this.sensor?.axes.join(", ") ?? ""}): ${centre}`}`);
+  }
+
+  /** @param {Timeline} timeline @param {number} place @returns {string} the centre of pressure, of several sources of each that is pressed */
+  centre(timeline, place) {
+    const { sensor } = this;
+    const [first, ...others] = timeline.centres(place);
+    if (!sensor || sensor.kind === "channels") return "";
+    if (!others.length) return Number.isNaN(first[0]) ? "nothing pressed" : sensor.centre(...first);
+    const pressed = [first, ...others].flatMap((at, k) => (Number.isNaN(at[0]) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, at)}`]));
+    return pressed.length ? `${pressed.join("  ")} ${sensor.unit}`.trim() : "nothing pressed";
   }
 }

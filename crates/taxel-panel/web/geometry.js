@@ -59,11 +59,6 @@ class Sensor {
     return [x, y];
   }
 
-  /** @returns {Taxel | null} the taxel that is watched until a person chooses one */
-  get first() {
-    return null;
-  }
-
   /** @returns {Taxel} where a crosshair begins */
   get middle() {
     const middle = /** @type {Taxel} */ ([this.columns >> 1, this.rows >> 1]);
@@ -94,7 +89,7 @@ class Grid extends Sensor {
   constructor(array, sources) {
     super(array, sources);
     /** @type {[number, number]} */
-    this.limits = [0, Math.max(this.rows, this.columns)];
+    this.limits = [0, Math.max(this.rows, ...(sources.length ? sources : [this]).map(({ columns }) => columns))];
     const { pitch_mm } = array;
     this.mm = typeof pitch_mm === "number" ? [pitch_mm, pitch_mm] : pitch_mm;
     const ratio = this.mm ? this.mm[1] / this.mm[0] : 1;
@@ -119,6 +114,22 @@ class Grid extends Sensor {
   /** @param {number} x @param {number} y @returns {string} a centre, in columns and rows; in mm, too, where the pitch is known */
   centre(x, y) {
     return `${x.toFixed(1)}, ${y.toFixed(1)}${this.mm ? ` (${rounded(x * this.mm[1])}, ${rounded(y * this.mm[0])} mm)` : ""}`;
+  }
+
+  /** @param {number} k @param {number} x @returns {number} a column, counted from the first one of source k */
+  across(k, x) {
+    return x - (this.sources[k]?.left ?? 0);
+  }
+
+  /** @param {number} k @param {[number, number]} at @returns {string} a centre within source k, in `unit` */
+  within(k, [x, y]) {
+    const column = this.across(k, x);
+    return this.mm ? `${rounded(column * this.mm[1])}, ${rounded(y * this.mm[0])}` : `${column.toFixed(1)}, ${y.toFixed(1)}`;
+  }
+
+  /** @returns {string} the unit of a centre within a source */
+  get unit() {
+    return this.mm ? "mm" : "";
   }
 
   /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
@@ -196,9 +207,23 @@ class Placed extends Sensor {
 
   /** @param {number} x @param {number} y @returns {string} a centre, in the unit of the places */
   centre(x, y) {
+    return `${this.within(0, [x, y])} ${this.places.unit ?? "in the places' own unit"}`;
+  }
+
+  /** @param {number} _ @param {number} x @returns {number} x as it is: the places of all sources are in one system */
+  across(_, x) {
+    return x;
+  }
+
+  /** @param {number} _ @param {[number, number]} at @returns {string} a centre, in `unit` */
+  within(_, at) {
     // Coordinates are in steps of the extent.
-    const [across, down] = [x, y].map((at) => rounded(Math.abs(at) < this.near / 100 ? 0 : at));
-    return `${across}, ${down} ${this.places.unit ?? "in the places' own unit"}`;
+    return at.map((one) => rounded(Math.abs(one) < this.near / 100 ? 0 : one)).join(", ");
+  }
+
+  /** @returns {string} */
+  get unit() {
+    return this.places.unit ?? "own unit";
   }
 
   /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
@@ -248,11 +273,6 @@ class Channels extends Sensor {
   named([x, y]) {
     const source = this.source(x);
     return `${source ? `${source.name}, ` : ""}channel ${Math.max(x - (source?.left ?? 0), y)}`;
-  }
-
-  /** Channels have no map in which one could be chosen by its place. @returns {Taxel} */
-  get first() {
-    return [0, 0];
   }
 
   /** @returns {number[]} the places of those that exist */

@@ -25,8 +25,10 @@ export class Lanes {
     this.plots = new Map();
     /** Least and greatest coordinate of a centre; null of channels, which have neither centre nor area. @type {[number, number] | null} */
     this.limits = [0, 64];
-    /** Names of the sources that have a curve each; empty: one curve for all. @type {string[]} */
+    /** Names of the sources that have curves of their own; empty: one for all. @type {string[]} */
     this.sources = [];
+    /** The sensor that is shown. @type {import("./geometry.js").Geometry | null} */
+    this.sensor = null;
     /** Size of a tick in the unit of the values, and ticks of the value 0. */
     this.values = { step: 1, zero: 0 };
     /** Size of a tick in the unit of the sum of the values. */
@@ -91,7 +93,7 @@ export class Lanes {
       },
       centre: {
         scales: { place: { range: [low, high] } },
-        series: [{}, line(one, "place"), line(two, "place", [5, 3])],
+        series: [{}, ...(this.sources.length ? colours.flatMap((colour) => [line(colour, "place"), line(colour, "place", [5, 3])]) : [line(one, "place"), line(two, "place", [5, 3])])],
         axes: [time, { ...axis("place", 3, text), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
       },
     };
@@ -120,6 +122,7 @@ export class Lanes {
 
   /** @param {import("./geometry.js").Geometry} sensor */
   size(sensor) {
+    this.sensor = sensor;
     const limits = sensor.kind === "channels" ? null : sensor.limits;
     const [across, down] = sensor.axes;
     write(part("centre-across", HTMLElement), across);
@@ -130,13 +133,15 @@ export class Lanes {
     this.make();
   }
 
-  /** Names the curves of the sums, by their colours. @param {string[]} sources that have a curve each; none: one curve for all */
+  /** Names the curves of the sums, by their colours, which those of the centres have too. @param {string[]} sources that have a curve each; none: one curve for all */
   name(sources) {
     if (String(this.sources) === String(sources)) return;
     this.sources = sources;
     /** @type {Curve[]} */
     const curves = [[], ...(sources.length ? sources.map(() => []) : [[]])];
     this.data.force = [this.data.taxel[0], ...curves];
+    this.data.centre = [this.data.taxel[0], ...curves.slice(1).flatMap(() => [[], []])];
+    part("centre-legend", HTMLElement).classList.toggle("apart", sources.length > 0);
     const one = () => make("output", { id: "force-sum", "aria-live": "off" });
     const names = sources.flatMap((source, k) => [make("span", { class: `swatch ${COLOURS[k]}` }), ` ${source} `, make("output", { "aria-live": "off" }), " "]);
     part("force-sums", HTMLElement).replaceChildren(...(names.length ? names : [make("span", { class: "swatch more" }), " ", one()]));
@@ -154,7 +159,7 @@ export class Lanes {
 
   /** @param {Timeline} timeline */
   draw(timeline) {
-    const { columns, window, column_us, history, area, x, y } = timeline;
+    const { columns, window, column_us, history, area } = timeline;
     const { step, zero } = this.values;
     if (!columns || !window) return;
     this.span_s = timeline.span_us / 1e6;
@@ -165,9 +170,12 @@ export class Lanes {
     const [times, least, greatest, last] = this.data.taxel;
     const [, ...sums] = this.data.force;
     const touched = sums.pop() ?? [];
-    const [, column, row] = this.data.centre;
+    const [, ...places] = this.data.centre;
     this.data.force[0] = this.data.centre[0] = times;
-    for (const curve of [times, least, greatest, last, ...sums, touched, column, row]) curve.length = count;
+    for (const curve of [times, least, greatest, last, ...sums, touched, ...places]) curve.length = count;
+    const { sensor } = this;
+    /** @param {number} k @param {number} x */
+    const across = (k, x) => (sensor && sensor.kind !== "channels" ? sensor.across(k, x) : x);
     for (let i = 0; i < count; i++) {
       const place = timeline.known(first - 1 + i);
       // A curve has the value at the end of its column.
@@ -179,9 +187,12 @@ export class Lanes {
       const each = place >= 0 ? timeline.sums(place) : [];
       sums.forEach((curve, k) => (curve[i] = each[k] >= 0 ? each[k] * this.sum_step : null));
       touched[i] = place >= 0 && area[place] >= 0 ? area[place] : null;
-      const pressed = place >= 0 && !Number.isNaN(x[place]);
-      column[i] = pressed ? x[place] : null;
-      row[i] = pressed ? y[place] : null;
+      const centres = place >= 0 ? timeline.centres(place) : [];
+      for (let k = 0; 2 * k < places.length; k++) {
+        const [x, y] = centres[k] ?? [NaN, NaN];
+        places[2 * k][i] = Number.isNaN(x) ? null : across(k, x);
+        places[2 * k + 1][i] = Number.isNaN(x) ? null : y;
+      }
     }
     for (const [name, plot] of this.plots) {
       if (!part(`${name}-block`, HTMLElement).hidden) plot.setData(this.data[name]);

@@ -90,6 +90,7 @@ export const MISSING = 0xffffffff;
  * @property {Uint8Array | null} spikes of the encoder, as the raster
  * @property {Uint16Array | null} channels ticks above rest of each channel, column after column
  * @property {Uint32Array | null} sources sum of each of several sources, column after column
+ * @property {Float32Array | null} sourceCentres centre of each of them, x and y, column after column
  */
 
 /**
@@ -143,5 +144,6 @@ export function readPicture(buffer) {
     spikes: words(6, Uint8Array),
     channels: words(7, Uint16Array),
     sources: words(8, Uint32Array),
+    sourceCentres: words(9, Float32Array),
   };
 }

@@ -30,9 +30,10 @@ export class Timeline {
     /** How many channels have a curve each, and their ticks above rest, column after column. */
     this.channel_count = 0;
     this.channels = new Uint16Array(0);
-    /** How many of several sources have a curve each, and their sums. */
+    /** How many of several sources have curves of their own, their sums, and their centres, x and y. */
     this.source_count = 0;
     this.sources = new Uint32Array(0);
+    this.sourceCentres = new Float32Array(0);
     this.number = new Float64Array(SPAN);
     /** The window, us from its left edge to its right one; null before the first picture. @type {[number, number] | null} */
     this.window = null;
@@ -78,11 +79,14 @@ export class Timeline {
       const end = (Math.floor(picture.t_us / this.column_us) + 1) * this.column_us;
       this.window = [end - this.span_us, end];
     }
-    const { first, count, raster, spikes, sums, centres, history, channels, sources } = picture;
+    const { first, count, raster, spikes, sums, centres, history, channels, sources, sourceCentres } = picture;
     const each = channels && count ? channels.length / count : this.channel_count;
     if (each !== this.channel_count) [this.channel_count, this.channels] = [each, new Uint16Array(SPAN * each)];
     const several = count ? (sources?.length ?? 0) / count : this.source_count;
-    if (several !== this.source_count) [this.source_count, this.sources] = [several, new Uint32Array(SPAN * several)];
+    if (several !== this.source_count) {
+      this.source_count = several;
+      [this.sources, this.sourceCentres] = [new Uint32Array(SPAN * several), new Float32Array(SPAN * several * 2)];
+    }
     for (let i = 0; i < count; i++) {
       const place = this.place(first + i);
       this.number[place] = first + i;
@@ -97,6 +101,7 @@ export class Timeline {
         this.y[place] = centres[4 * i + 3];
       }
       if (sources) this.sources.set(sources.subarray(i * several, (i + 1) * several), place * several);
+      if (sourceCentres) this.sourceCentres.set(sourceCentres.subarray(2 * i * several, 2 * (i + 1) * several), 2 * place * several);
       if (channels) this.channels.set(channels.subarray(i * each, (i + 1) * each), place * each);
       if (history) this.history.set(history.subarray(3 * i, 3 * i + 3), 3 * place);
       else this.history.fill(UNKNOWN_VALUE, 3 * place, 3 * place + 3);
@@ -108,6 +113,13 @@ export class Timeline {
     const { source_count: count, sources } = this;
     if (!count) return [this.sum[place]];
     return Array.from(sources.subarray(place * count, (place + 1) * count), (sum) => (sum === MISSING ? NaN : sum));
+  }
+
+  /** @param {number} place @returns {[number, number][]} the centre of each of several sources, or of all; not a number where nothing is pressed */
+  centres(place) {
+    const { source_count: count, sourceCentres: all } = this;
+    if (!count) return [[this.x[place], this.y[place]]];
+    return Array.from({ length: count }, (_, k) => [all[2 * (place * count + k)], all[2 * (place * count + k) + 1]]);
   }
 
   /** Another taxel is watched: the values of the last one are discarded. */

@@ -211,7 +211,7 @@ type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReado
 
 /// The rest of a source: where it is known from, that of each cell (NaN where unknown), ticks by the unit, whether values
 /// fall from it, the cells that flicker, and where something lay then (for people).
-type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, bool, Vec<usize>, String);
+type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, f64, bool, Vec<usize>, String);
 
 /// Pictures as Python has read them: the array of all sources, the sources; unit, time from one picture to the next if they
 /// are numbered (us), notes (time, text, source) and detections (label, time, known) as JSON, the verdict, the trial and all
@@ -238,7 +238,9 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
     };
     let file = PictureFile { unit, picture_us, remarks, note_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
-    for (name, left, rows, columns, t, values, (rest, rests, ticks_by_unit, falls, flickering, on)) in &sources {
+    for (name, left, rows, columns, t, values, (rest, rests, ticks_by_unit, loaded_from, falls, flickering, on)) in
+        &sources
+    {
         let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", rests)?);
         let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
         let cells = usize::from(*rows) * usize::from(*columns);
@@ -252,6 +254,7 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
                 .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {rest:?} is none")))?,
             values: rests.iter().map(known).collect(),
             ticks_by_unit: *ticks_by_unit,
+            loaded_from: *loaded_from,
             falls: *falls,
             flickering: flickering.clone(),
             on: on.clone(),

@@ -24,7 +24,7 @@ from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.health import health
 from taxel.recording.opening import is_recording, open_joined
-from taxel.recording.rest import flickering, of_pictures, ticks_by_unit
+from taxel.recording.rest import flickering, loaded_from, of_pictures, ticks_by_unit
 
 __all__ = ["Opening", "ReadPictures", "ShownFiles", "side_by_side"]
 
@@ -229,11 +229,15 @@ def _in_its_unit(recording: Recording) -> Frames:
     return recording.frames() if recording.calibration is None else recording.calibrated()
 
 
-def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, bool, list[int], str]:
-    """Return the rest's source, that of each taxel, ticks by the unit, whether values fall, what flickers, what lay."""
+def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, float, bool, list[int], str]:
+    """Return how a sensor rests.
+
+    These are the rest's source, that of each taxel, ticks by the unit, from where on a value above it is a load,
+    whether values fall, what flickers, and what lay on it.
+    """
     rest = of_pictures(frames)
     source, flickers = {"unit": "given"}.get(rest.source, rest.source), np.flatnonzero(flickering(frames)).tolist()
-    return source, rest.values, ticks_by_unit(frames), rest.falls, flickers, rest.on
+    return source, rest.values, ticks_by_unit(frames), loaded_from(frames, rest), rest.falls, flickers, rest.on
 
 
 def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:

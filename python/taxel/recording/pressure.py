@@ -25,8 +25,7 @@ from taxel.recording.rest import (
     Rest,
     flickering,
     found,
-    loaded_above,
-    noise_above,
+    loaded_from,
     of_pictures,
     ticks_by_unit,
     tracked,
@@ -449,9 +448,7 @@ def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float]
     if not recording.has_events:
         frames = recording.frames()
         rest = _rest_of_pictures(recording, frames, tare)
-        if rest.source == "unit":
-            return frames, rest, noise_above(frames)
-        return frames, rest, loaded_above(ticks_by_unit(frames)) if rest.source == "quiet" else 0.0
+        return frames, rest, loaded_from(frames, rest)
     events = recording.events
     if events.present is None or not events.present.any():
         return None

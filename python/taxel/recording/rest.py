@@ -26,8 +26,7 @@ __all__ = [
     "by_unit",
     "flickering",
     "found",
-    "loaded_above",
-    "noise_above",
+    "loaded_from",
     "of_pictures",
     "of_quiet",
     "ticks_by_unit",
@@ -60,6 +59,9 @@ _SMALL = 9
 _FLICKERS, _ALONE, _FEW = 10, 1 / 8, 16
 #: So many pictures or fewer give a taxel's median.
 _MEDIAN_OF = 2000
+
+#: Values in a block of pictures.
+_BLOCK = 1 << 16
 
 #: Pictures in order: their times, us, and their values by taxel, NaN where a taxel has none.
 Picture = tuple[NDArray[np.int64], NDArray[np.float32]]
@@ -132,11 +134,6 @@ class Rest:
         return {"source": self.source, "quiet_us": self.quiet_us, "zeroed": self.zeroed, "falls": self.falls}
 
 
-def loaded_above(scale: float) -> float:
-    """Return from how much above rest a taxel counts as loaded, in the sensor's unit."""
-    return float(_core.touched_above(NOISE_FLOOR)) / scale
-
-
 def by_unit(frames: Frames) -> Tare | None:
     """Return the tare of pictures in a unit of force or pressure: 0, with the noise of a quiet stretch; None of others.
 
@@ -146,7 +143,7 @@ def by_unit(frames: Frames) -> Tare | None:
     """
     if frames.unit not in FORCE_UNITS or not len(frames):
         return None
-    quiet = of_quiet(frames).quiet_us
+    quiet = _of_rising(frames, ticks_by_unit(frames)).quiet_us
     still = np.zeros((1, *frames.array.shape)) if quiet is None else frames.between(*quiet).values
     middle, above = np.nanquantile(np.where(np.isnan(still).all(axis=0), 0.0, still), (0.5, 0.75), axis=0)
     noise = 1.4826 * np.asarray(above - middle, np.float64)
@@ -155,10 +152,17 @@ def by_unit(frames: Frames) -> Tare | None:
     return Tare.from_json(json.dumps(made | {"noise": noise.reshape(-1).tolist()}))
 
 
-def noise_above(frames: Frames) -> float:
-    """Return from how much on a value of force or pressure is no noise: 0 where no quiet stretch shows any."""
-    tare = by_unit(frames)
-    return 0.0 if tare is None else TIMES_NOISE * float(np.quantile(tare.noise, SHARE))
+def loaded_from(frames: Frames, rest: Rest) -> float:
+    """Return from how much above its rest on a taxel of pictures counts as loaded, in their unit.
+
+    Of force and pressure that is more than the noise of a quiet stretch, or than 0 without one; of a rest that a quiet
+    stretch shows, more than the noise floor of the board; of any other rest, more than 0.
+    """
+    if rest.source == "unit" and (tare := by_unit(frames)) is not None:
+        return TIMES_NOISE * float(np.quantile(tare.noise, SHARE))
+    if rest.source != "quiet":
+        return 0.0
+    return float(_core.touched_above(NOISE_FLOOR)) / ticks_by_unit(frames)
 
 
 def ticks_by_unit(frames: Frames) -> float:
@@ -275,14 +279,26 @@ def of_pictures(frames: Frames) -> Rest:
 
 def of_quiet(frames: Frames) -> Rest:
     """Return the rest of pictures that a quiet stretch of them shows, or none."""
-    taxels = frames.array.rows * frames.array.columns
-    pictures, scale = [(frames.t, frames.values.reshape(len(frames), taxels))], ticks_by_unit(frames)
-    rest = found(lambda: pictures, taxels, frames.array.columns, scale)
+    scale = ticks_by_unit(frames)
+    rest = _of_rising(frames, scale)
     if rest.quiet_us is None or not _fall(frames, rest.quiet_us, scale):
         return rest
-    fallen = found(lambda: pictures, taxels, frames.array.columns, scale, falls=True)
+    fallen = _of_rising(frames, scale, falls=True)
     # Without a rest of their own the values are tracked from their first ones on. What they rise by is no load.
     return replace(rest, values=fallen.values, falls=True, lay=None, on="")
+
+
+def _of_rising(frames: Frames, scale: float, *, falls: bool = False) -> Rest:
+    """Return the rest that a quiet stretch of pictures shows if their values rise with pressure, or if they fall."""
+    pictures, columns = _blocks(frames), frames.array.columns
+    return found(lambda: pictures, frames.array.rows * columns, columns, scale, falls=falls)
+
+
+def _blocks(frames: Frames) -> list[Picture]:
+    """Return pictures in blocks that a processor's cache holds."""
+    taxels = frames.array.rows * frames.array.columns
+    values, each = frames.values.reshape(len(frames), taxels), max(1, _BLOCK // max(1, taxels))
+    return [(frames.t[k : k + each], values[k : k + each]) for k in range(0, len(frames), each)]
 
 
 def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:

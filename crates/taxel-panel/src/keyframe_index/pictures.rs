@@ -8,7 +8,7 @@ use std::sync::Arc;
 use taxel_core::Array;
 use taxel_core::array::Places;
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::{NOISE_FLOOR, above_noise, touched_from};
+use taxel_core::rest::{NOISE_FLOOR, above_noise};
 use taxel_core::tracked_rest::TrackedRest;
 use taxel_live::Result;
 use taxel_live::pipeline::Change;
@@ -17,7 +17,8 @@ use taxel_live::recording::Remarks;
 use super::{ChangeReader, KeyframeIndex, Pictures, Read};
 use crate::array_state::{Keyframe, RestSource};
 use crate::centre::Coordinates;
-use crate::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, TimeColumns, column_of};
+use crate::load::Load;
+use crate::time_columns::{COLUMN_US, MISSING, MISSING_SUM, OF_SOURCE, TimeColumns, column_of};
 use crate::weights::Weights;
 
 /// Memory that the curves may take, bytes.
@@ -60,6 +61,8 @@ pub struct PictureRest {
     pub values: Vec<f64>,
     /// Ticks, in which the noise floor is, by the unit.
     pub ticks_by_unit: f64,
+    /// From how much above the rest on a value is a load, in the unit.
+    pub loaded_from: f64,
     /// Whether values fall from that of a quiet stretch: less may mean more pressure.
     pub falls: bool,
     /// The cells that flicker: no value of theirs counts as above rest.
@@ -114,13 +117,10 @@ impl PictureSource<'_> {
         if rests.is_empty() { vec![(0, fixed(values))] } else { rests }
     }
 
-    /// The noise floor in steps: values further above a rest that was found count as loaded.
+    /// The noise floor in steps: values further above the rest count as loaded.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn floor(&self, steps: Steps) -> u16 {
-        match self.rest.source {
-            RestSource::Quiet => (touched_from(0.0, NOISE_FLOOR) / self.rest.ticks_by_unit / steps.size) as u16,
-            RestSource::Given | RestSource::None => 0,
-        }
+        (self.rest.loaded_from / steps.size) as u16
     }
 }
 
@@ -253,7 +253,7 @@ pub struct PictureIndex {
     pub zero: u16,
     /// Number of pictures.
     pub pictures: u64,
-    /// Steps above rest that count as none: of several sources with a rest that was found, the most.
+    /// Steps above rest up to which a taxel counts as not loaded: of several sources, the most.
     pub floor: u16,
     /// The force that a step of the sums is, N; `None` where they are sums of the values.
     pub newtons: Option<f64>,
@@ -346,39 +346,42 @@ impl PictureIndex {
         let Some((first, _)) = self.range else { return };
         let mut columns = TimeColumns::new(&self.array, TIME_COLUMN_BYTES).with_sources(self.curves());
         let mut values = vec![0; columns.value_count()];
-        let sums = columns.channel_count()..values.len();
-        values[sums.clone()].fill(MISSING_SUM);
+        let channels = columns.channel_count();
+        values[channels..].fill(MISSING_SUM);
         let mut noise = vec![Noise::default(); self.sources.len()];
         let mut cursor = vec![0; self.sources.len()];
-        let mut loads = vec![Load::default(); self.sources.len()];
+        let mut loads = vec![None; self.sources.len()];
         let at = Coordinates::new(&self.array);
         while let Some((source, k, t)) = self.next(&cursor) {
             cursor[source] += 1;
-            loads[source] = self.load(&self.sources[source], k, &at);
+            let known = self.sources[source].picture(k).iter().any(|&ticks| ticks != UNKNOWN);
+            loads[source] = known.then(|| self.load(&self.sources[source], k, &at));
             let column = column_of(t, COLUMN_US);
             columns.extend_to(column);
-            let load = loads.iter().fold(Load::default(), Load::plus);
-            columns.set_curve(column, load.curve(&at, &self.weights));
-            let sum = self.weights.sum(loads[source].sum, loads[source].weighted);
-            let known = loads[source].known;
+            let curve = |load: Option<Load>| load.map_or(MISSING, |load| load.curve(&at, &self.weights));
+            columns.set_curve(column, curve(loads.iter().flatten().copied().reduce(|all, one| all.plus(&one))));
+            let curve = curve(loads[source]);
             if known {
-                noise[source].take(t - first, sum);
+                noise[source].take(t - first, curve.sum);
             }
             if !values.is_empty() {
-                if sums.start > 0 {
+                if channels > 0 {
                     self.above(&self.sources[source], k).for_each(|(taxel, above)| values[taxel] = above.into());
                 }
-                if let Some(of_source) = values[sums.clone()].get_mut(source) {
-                    *of_source = if known { sum } else { MISSING_SUM };
+                if let Some(of_source) = values[channels..].chunks_exact_mut(OF_SOURCE).nth(source) {
+                    of_source.copy_from_slice(&curve.of_source());
                 }
                 columns.set_values(column, &values);
             }
         }
         let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
         // Noise is what is above a rest that was found: above a given one any value is load.
-        let found = self.sources.iter().zip(noise).filter(|(source, _)| source.rest_source == RestSource::Quiet);
-        let most = found.map(|(_, noise)| noise.most(self.floor)).fold(0, u32::saturating_add);
-        self.time_columns = whole.then(|| columns.with_noise(most));
+        let most = |(source, noise): (&Source, Noise)| match source.rest_source {
+            RestSource::Quiet => noise.most(self.floor),
+            RestSource::Given | RestSource::None => 0,
+        };
+        let noise = self.sources.iter().zip(noise).map(most).collect();
+        self.time_columns = whole.then(|| columns.with_noise(noise));
     }
 
     /// The number of sources that have a curve each.
@@ -386,10 +389,11 @@ impl PictureIndex {
         Some(self.sources.len()).filter(|count| (2..=MOST_SOURCES).contains(count)).unwrap_or(0)
     }
 
-    /// The taxels of a source's picture, each with its steps above rest.
+    /// The taxels of a source's picture, each with its steps above rest as they count in the sums.
     fn above<'a>(&'a self, source: &'a Source, k: usize) -> impl Iterator<Item = (usize, u16)> + 'a {
         let values = source.picture(k).iter().zip(source.rest(k));
-        let above = move |(&ticks, &rest): (&u16, &u16)| above_noise(ticks, rest, self.floor);
+        let floor = self.sum_floor();
+        let above = move |(&ticks, &rest): (&u16, &u16)| above_noise(ticks, rest, floor);
         source.taxels(self.array.columns).zip(values.map(above))
     }
 
@@ -397,15 +401,8 @@ impl PictureIndex {
     fn load(&self, source: &Source, k: usize, at: &Coordinates) -> Load {
         let mut load = Load::default();
         for (taxel, above) in self.above(source, k) {
-            let above = u64::from(above);
-            let (x, y) = at.get(taxel);
-            load.sum += above;
-            load.weighted += self.weights.weighed(taxel, above);
-            load.sum_x += above * x;
-            load.sum_y += above * y;
-            load.area += u32::from(above > 0);
+            load.change(taxel, (0, above), self.floor, at, &self.weights);
         }
-        load.known = source.picture(k).iter().any(|&ticks| ticks != UNKNOWN);
         load
     }
 }
@@ -438,39 +435,6 @@ impl Noise {
     fn most(self, floor: u16) -> u32 {
         let least = self.least.unwrap_or(self.greatest);
         (least + least / 2).saturating_add(NOISY_TAXELS * u32::from(floor))
-    }
-}
-
-/// The load of a source's picture.
-#[derive(Debug, Clone, Copy, Default)]
-struct Load {
-    sum: u64,
-    weighted: u64,
-    sum_x: u64,
-    sum_y: u64,
-    area: u32,
-    /// Whether any taxel has a value.
-    known: bool,
-}
-
-impl Load {
-    fn plus(self, other: &Self) -> Self {
-        Self {
-            sum: self.sum + other.sum,
-            weighted: self.weighted + other.weighted,
-            sum_x: self.sum_x + other.sum_x,
-            sum_y: self.sum_y + other.sum_y,
-            area: self.area + other.area,
-            known: self.known || other.known,
-        }
-    }
-
-    fn curve(self, at: &Coordinates, weights: &Weights) -> Curve {
-        if self.sum == 0 {
-            return if self.known { NOTHING } else { MISSING };
-        }
-        let (x, y) = at.centre(self.sum, self.sum_x, self.sum_y);
-        Curve { sum: weights.sum(self.sum, self.weighted), area: self.area, x, y }
     }
 }
 
@@ -537,6 +501,12 @@ impl Pictures for PictureIndex {
         let mut all = self.sources.iter().map(|source| source.rest_source);
         let first = all.next().unwrap_or(RestSource::None);
         if all.all(|one| one == first) { first } else { RestSource::None }
+    }
+
+    /// Forces and pressures are summed over all taxels; of others, above a rest that was found, the noise is no load.
+    fn sum_floor(&self) -> u16 {
+        let found = self.sources.iter().any(|source| source.rest_source == RestSource::Quiet);
+        if found { self.floor } else { 0 }
     }
 
     fn weights(&self) -> &Weights {
@@ -658,6 +628,7 @@ mod tests {
             source: RestSource::None,
             values: vec![0.0; 6],
             ticks_by_unit: 1.0,
+            loaded_from: 0.0,
             falls: false,
             flickering: vec![],
             on: String::new(),
@@ -736,14 +707,26 @@ mod tests {
                 let sum: f32 = sums.iter().flatten().sum();
                 assert!((load - f64::from(sum)).abs() < 12.0 * index.step, "{load} {sum}");
                 let each = |columns: &TimeColumns| {
-                    let mut each = [MISSING_SUM; 2];
+                    let mut each = [MISSING_SUM; 2 * OF_SOURCE];
                     columns.raise_values(column..column + 1, &mut each);
                     each
                 };
-                for (&ours, theirs) in each(of_state).iter().zip(sums) {
-                    assert_eq!(ours == MISSING_SUM, theirs.is_none());
-                    let near = |sum: f32| (f64::from(ours) * index.step - f64::from(sum)).abs() < 6.0 * index.step;
-                    assert!(theirs.is_none_or(near), "{ours} {theirs:?}");
+                for (source, (ours, theirs)) in each(of_state).chunks(OF_SOURCE).zip(sums).enumerate() {
+                    let (sum, x, y) = (ours[0], f32::from_bits(ours[1]), f32::from_bits(ours[2]));
+                    assert_eq!(sum == MISSING_SUM, theirs.is_none());
+                    let near = |own: f32| (f64::from(sum) * index.step - f64::from(own)).abs() < 6.0 * index.step;
+                    assert!(theirs.is_none_or(near), "{sum} {theirs:?}");
+                    assert_eq!(x.is_nan(), sum == 0 || theirs.is_none());
+                    let (mut mass, mut at) = (0.0, [0.0; 2]);
+                    for (cell, value) in expected.iter().enumerate().filter(|(_, value)| **value > 0.0) {
+                        let (row, column) = (cell / 7, cell % 7);
+                        if (column >= 4) == (source == 1) {
+                            mass += value;
+                            at = [at[0] + value * column as f32, at[1] + value * row as f32];
+                        }
+                    }
+                    let far = |ours: f32, moment: f32| (ours - moment / mass).abs() > 0.02;
+                    assert!(mass < 30.0 || !(far(x, at[0]) || far(y, at[1])), "{source}: {x}, {y} of {at:?} / {mass}");
                 }
                 if sought.t() == last {
                     let whole = shared.time_columns().unwrap();
@@ -769,6 +752,7 @@ mod tests {
                 source: RestSource::Quiet,
                 values: vec![200.0; 16],
                 ticks_by_unit: 0.5,
+                loaded_from: 7.0,
                 falls: false,
                 flickering: vec![],
                 on: String::new(),
