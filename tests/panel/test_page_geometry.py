@@ -57,6 +57,9 @@ def test_a_sensor_is_drawn_as_its_geometry_is_known(name: str, chromium: Any, tm
         assert page.locator("#centre-block").is_visible() is not channels
         assert page.locator("#area-legend").is_visible() is not channels
         assert page.locator("#channels-block").is_visible() is channels
+        # The crosshair is where somebody placed it, and nobody did.
+        assert page.locator("#pressure-cross").is_hidden()
+        assert page.locator("#taxel-block").is_hidden()
         if channels:
             shows(page, "channels-scale", "^each up to 30 kPa$")
             # The second and the fifth have a load, of a third and all of the height.

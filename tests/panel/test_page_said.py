@@ -195,11 +195,46 @@ def test_shapes_of_detections_follow_the_order_of_the_readout(order: list[str], 
     readout.unlink()
 
 
+@pytest.mark.parametrize("size", [(1400, 900), (1100, 800), (390, 844)])
+@pytest.mark.parametrize("words", [3, 60])
+def test_a_notice_covers_nothing(size: tuple[int, int], words: int, chromium: Any, recording: Path) -> None:
+    labelled(recording)
+    refused = {"type": "refused", "reason": "no such label " * words}
+    with answered(chromium, recording, {"delete": [refused]}) as page:
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        page.locator("#label-list button").nth(1).click()
+        shows(page, "notice-text", "^no such label")
+        # On a phone the page scrolls below the header, in which it is.
+        page.evaluate("scrollTo(0, 0)")
+        covered = page.evaluate(
+            """() => {
+                const { left, right, top, bottom } = document.getElementById("notice").getBoundingClientRect();
+                const hidden = [];
+                const seen = document.querySelectorAll("header > *, canvas, button, input, select, #axis, h2, li");
+                for (const one of seen) {
+                    const box = one.getBoundingClientRect();
+                    if (one.closest("#notice") || !one.offsetParent || !box.width) continue;
+                    const beside = box.right <= left + 1 || box.left >= right - 1;
+                    const apart = beside || box.bottom <= top + 1 || box.top >= bottom - 1;
+                    const [x, y] = [(box.left + box.right) / 2, (box.top + box.bottom) / 2];
+                    const over = document.elementFromPoint(x, y);
+                    if (!apart && (!over || over.closest("#notice"))) hidden.push(one.id || one.textContent);
+                }
+                return hidden;
+            }"""
+        )
+        assert not covered
+        assert page.locator("#notice").evaluate("e => getComputedStyle(e).position") == "static"
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    recording.with_suffix("").with_suffix(".notes.csv").unlink()
+
+
 def test_without_a_board_the_tab_record_says_so(chromium: Any, recording: Path) -> None:
     with shown(chromium, recording) as page:
         press(page, "2")
         shows(page, "record-state", "^No board$")
         shows(page, "record-more", "^is listened to")
+        assert page.locator("#record-form").is_hidden(), "there is nothing to fill in"
 
 
 def test_why_a_file_was_not_opened_is_said_once_with_its_name_and_fits_a_phone(chromium: Any, tmp_path: Path) -> None:

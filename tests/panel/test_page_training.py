@@ -124,6 +124,9 @@ def test_play_label_train_and_watch_the_new_readout(
         missed = [(t, label) for t, label in wanted if not any(abs(t - s) < 0.05 and label == of for s, of in heard)]
         assert (missed, len(heard) - len(wanted)) in (([], 0), ([], extra))
         command = page.locator("#train-command").inner_text()
+        shows(page, "train-done", r"^played\.readout\.json reads this recording now")
+        detects = page.locator("#train-detect").inner_text()
+        assert "next: " not in page.locator("#train-text").inner_text()
         low = page.locator("#detection-list").bounding_box()
         assert low["y"] + 40 < 900, "detections are in sight"
     trained = tmp_path / "played.readout.json"
@@ -134,3 +137,9 @@ def test_play_label_train_and_watch_the_new_readout(
     _, *words = shlex.split(command)
     subprocess.run([sys.executable, "-m", "taxel", *words], cwd=tmp_path, check=True, capture_output=True)
     assert trained.read_bytes() == before
+    # So does what it says for other recordings.
+    _, *words = shlex.split(detects.replace("RECORDING", name))
+    again = subprocess.run(
+        [sys.executable, "-m", "taxel", *words, *options], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    assert again.stdout.startswith(f"Detections({len(heard)}: ")

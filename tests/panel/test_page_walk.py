@@ -351,7 +351,10 @@ def test_each_foot_has_a_sum_and_a_colour_of_its_own(size: dict[str, int], chrom
         for name in ("force", "centre"):
             head = page.locator(f"#{name}-block h2")
             assert head.evaluate("e => e.scrollWidth <= e.clientWidth"), f"all is in sight of {head.inner_text()}"
-        shows(page, "centre-now", "^0, 0 ")
+        # Each foot has a centre, where its own heel and toes are.
+        shows(page, "centre-now", r"^left -\d+, 0\s+right \d+, 0 own unit$")
+        pointed(page, 0.3, "centre-now", r"^left -\d+, 0 own unit$")
+        pointed(page, 0.8, "centre-now", r"^right \d+, 0 own unit$")
         named = page.locator("#force-sums .swatch").evaluate_all(
             "all => all.map(e => getComputedStyle(e).backgroundColor.slice(4, -1))"
         )

@@ -210,6 +210,8 @@ export class Labels {
     const place = table ? `${table.labels.length ? "Saved" : "To be saved"} in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
     write(part("label-place", HTMLElement), place);
     part("train-line", HTMLElement).hidden = !labels.length;
+    // Who has made labels knows how, and needs the room.
+    part("label-how", HTMLElement).hidden = labels.length > 0;
     const list = part("label-list", HTMLElement);
     // A row in which a person types stays what it is.
     const typing = list.contains(document.activeElement) ? document.activeElement?.closest("li")?.dataset.id : undefined;

@@ -140,7 +140,7 @@ export class Maps {
   forget() {
     this.pressureScale.forget();
     this.changeScale.forget();
-    this.point(this.geometry.first);
+    this.point(null);
   }
 
   /** @param {import("./protocol.js").ArrayInfo} array @param {PictureSource[]} sources that stand side by side in it */
@@ -160,7 +160,7 @@ export class Maps {
       this.picture = null;
     }
     this.health = null;
-    if (!this.taxel || !this.geometry.has(...this.taxel)) this.point(this.geometry.first);
+    if (!this.taxel || !this.geometry.has(...this.taxel)) this.point(null);
     this.mark();
   }
 

@@ -1,4 +1,4 @@
-// The notice at the foot of the page: results and errors for the user.
+// The notice in the header: results and errors for the user.
 
 import { part, write } from "./dom.js";
 

@@ -141,6 +141,7 @@ export class Recorder {
     const big = part("record-state", HTMLElement);
     const more = part("record-more", HTMLElement);
     const bar = part("record-bar", HTMLProgressElement);
+    part("record-form", HTMLElement).hidden = !this.able;
     if (!status || status.state === "idle") {
       write(big, this.able ? "Ready" : "No board");
       write(more, this.able ? "" : "is listened to: taxel live --panel records one");

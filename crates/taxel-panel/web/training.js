@@ -48,12 +48,18 @@ export class Training {
     this.server.request({ type: "train_stop" }).catch(failed);
   }
 
-  /** @param {string} text what the training has printed */
-  text(text) {
+  /** @param {string} printed what the training has printed */
+  text(printed) {
     const place = part("train-text", HTMLElement);
+    // The page says by itself where the readout is, and what to do with it.
+    const [last, readout, next] = printed.match(/^written to (.+); next: (taxel detect .+)$/m) ?? ["", "", ""];
+    const text = printed.replace(last, "").trim();
     place.hidden = !text;
     place.classList.remove("bad");
     write(place, text);
+    part("train-next", HTMLElement).hidden = !next;
+    write(part("train-done", HTMLElement), `${readout} reads this recording now, below. Correct labels and train again, or detect in others:`);
+    write(part("train-detect", HTMLElement), next);
     // The page has no options of the command line, which an advice may name.
     const options = [...new Set(text.match(/--[a-z][a-z-]*/g))];
     write(part("train-how", HTMLElement), options.length ? `Options (${options.join(", ")}) are given in a shell, at the end of this command:` : "The same in a shell:");

@@ -264,7 +264,7 @@ class RequestHandler:
 
     def train(self, recording: Path, out: Path) -> str:
         """Train on the labels of a recording as ``taxel train`` does; return what it prints, then its warnings."""
-        command = [sys.executable, "-m", "taxel", *self._training_words(recording, recording, out)]
+        command = [sys.executable, "-m", "taxel", *self._training_words(recording, out)]
         with self._training_lock:
             if self._training is not None:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
@@ -304,14 +304,14 @@ class RequestHandler:
 
     def train_command(self, recording: Path, out: Path) -> str:
         """Return the command that trains the same in a shell, in the folder where taxel was started."""
-        here = Path.cwd()
-        near = (path.relative_to(here) if path.is_relative_to(here) else path for path in (recording, out))
-        return shlex.join(["taxel", *self._training_words(recording, *near)])
+        return shlex.join(["taxel", *self._training_words(recording, out)])
 
-    def _training_words(self, recording: Path, named: Path, out: Path) -> list[str]:
-        """Return the words of a training on a recording, which they name as they are told."""
+    def _training_words(self, recording: Path, out: Path) -> list[str]:
+        """Return the words of a training on a recording; paths are from the folder where taxel was started."""
+        here = Path.cwd()
+        named, written = (path.relative_to(here) if path.is_relative_to(here) else path for path in (recording, out))
         options = self._opening.options_of(recording)
-        return ["train", str(named), "--labels", "notes", "-o", str(out), *options]
+        return ["train", str(named), "--labels", "notes", "-o", str(written), *options]
 
     def end_training(self) -> None:
         """End the training that runs, if one does."""
