@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from shell import call
 
 import taxel
@@ -422,3 +424,25 @@ def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
     code, out, error = call(capsys, "detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", *truth)
     assert code == 0, error
     assert json.loads(out)["score"]["found"] >= 22, out[:500]
+
+
+def squares(sides: list[int]) -> tuple[Frames, dict[str, list[int]]]:
+    """Return pictures at 100 Hz of touches that load squares of so many taxels at once, one a second."""
+    values = np.random.default_rng(1).normal(0, 1, (100 * (len(sides) + 2), 12, 12))
+    starts = 100 + 100 * np.arange(len(sides))
+    for start, side in zip(starts, sides, strict=True):
+        values[start : start + 40, 2 : 2 + side, 3 : 3 + side] += 300.0
+    frames = Frames(values, np.arange(len(values)) * 10_000, unit="counts")
+    return frames, {"contact": (10_000 * starts).tolist(), "lift": (10_000 * (starts + 40)).tolist()}
+
+
+@given(st.lists(st.integers(4, 8), min_size=1, max_size=6), st.integers(2, 3))
+def test_a_touch_smaller_than_all_that_were_learnt_is_found(sides: list[int], small: int) -> None:
+    frames, labels = squares(sides)
+    tare = Tare.take(frames.between(0, 900_000))
+    example = Example(frames, labels, tare)
+    plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
+    readout = trained([example], plan, None).readout
+    others, truth = squares([small] * 3)
+    judged = score(run(readout, others, tare=tare), truth)
+    assert {label: (one.missed, one.false) for label, one in judged.by_label.items()} == dict.fromkeys(LABELS, (0, 0))

@@ -21,7 +21,7 @@ from taxel.array import Array
 from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_pictures, later_us, silent_windows
 from taxel.detect.alignment import Alignment, align, aligned_to
 from taxel.detect.examples import Example, array_of, called, checked, unit_of
-from taxel.detect.followed import FOLLOWED_MS, Followed, follow, only, silence
+from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.loads import clock_of, lacks_noise
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
@@ -370,7 +370,8 @@ class Fitting:
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
         self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
-        trains = [_until(source, targets) for source, targets in zip(self._sources, self._targets, strict=True)]
+        learnt = self._sources if self._graded or self.alignment is None else distinct(self._sources)
+        trains = [_until(source, targets) for source, targets in zip(learnt, self._targets, strict=True)]
         self._check_felt(trains)
         silent = self._silent(followed, sources, trains, ages, learner._on_grid())
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
