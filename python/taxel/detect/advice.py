@@ -165,7 +165,7 @@ def _of_name(made: Trained, label: str, scored: Score) -> Advice | None:
     if not kinds or scored.found or alignment is None or alignment.train is not None:
         return None
     ends = ", ".join(("lift", *(name for name, of in recipes.read("touch")["also"].items() if of == "lift")))
-    because = f"by this one it is learnt as a kind of touch; names of the end of a touch are {ends}"
+    because = f"by this one it is learnt as a kind of touch, told as one begins; names of the end of a touch are {ends}"
     return Advice("another name of the label", because)
 
 
