@@ -449,3 +449,14 @@ def test_a_touch_smaller_than_all_that_were_learnt_is_found(sides: list[int], sm
     others, truth = squares([small] * 3)
     judged = score(run(readout, others, tare=tare), truth)
     assert {label: (one.missed, one.false) for label, one in judged.by_label.items()} == dict.fromkeys(LABELS, (0, 0))
+
+
+def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
+    """On a mat that lies full, how many taxels are loaded never changes."""
+    frames, labels = squares([4, 3, 5, 4] * 3)
+    tare = Tare.take(frames.between(0, 900_000))
+    full = Frames(frames.values + 100.0, frames.t, unit=frames.unit, array=frames.array)
+    example = Example(full, labels, tare)
+    plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
+    judged = judge([example], plan, 2)
+    assert {label: one.missed for label, one in judged.together.by_label.items()} == dict.fromkeys(LABELS, 0)
