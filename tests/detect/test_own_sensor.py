@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from shell import call
 
@@ -460,3 +460,18 @@ def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
     plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
     judged = judge([example], plan, 2)
     assert {label: one.missed for label, one in judged.together.by_label.items()} == dict.fromkeys(LABELS, 0)
+
+
+@pytest.mark.filterwarnings("ignore:.* out of reach")
+@settings(max_examples=10)
+@given(st.integers(0, 1000))
+def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed: int) -> None:
+    frames, labels = squares([4, 3, 5, 4] * 3)
+    apart = np.random.default_rng(seed).uniform(0.55, 0.9, 12)
+    labels = {"contact": [t + round(1e6 * by) for t, by in zip(labels["contact"], apart, strict=True)]}
+    example = Example(frames, labels, Tare.take(frames.between(0, 900_000)))
+    made = trained([example], Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example])), None)
+    none = score(taxel.Detections([], [], []), labels)
+    advice = advised(made, [example], none, none, 1.0)["contact"]
+    assert advice.helps == "other labels, or another tare"
+    assert advice.because.startswith("nothing was felt of 12 of 12 labels: they are of another recording, or")

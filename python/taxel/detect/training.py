@@ -537,6 +537,11 @@ def _remarks(
                 f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from; {TWO_FOLDS} are the "
                 f"least to score it held out: label more. {len(missed)} out of reach of the inputs ({listed})"
             )
+        elif len(missed) == count:
+            yield (
+                f"{count} of {count} events are out of reach, as too few input spikes come before them ({listed}): "
+                "none was learnt. Their times may be off, or of another recording"
+            )
         else:
             yield (
                 f"{len(missed)} of {count} events are out of reach, as too few input spikes come before "
