@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from test_readout import recipe, tare, touches
 
 import taxel
+from taxel import SpikeTrains
 from taxel.detect import Example, Fold, Part, Score, choose, judge, run, score, train
 from taxel.detect import folds as folds_module
 from taxel.detect.folds import _folds as folds
@@ -306,6 +307,21 @@ def test_a_search_scores_held_out_data_wherever_the_events_of_a_label_lie(seed: 
         )
         chosen = made.recipe.neurons["release"]["ub"]
         assert chosen == 2.0 or (events < 4 and few), (events, few)
+
+
+@given(st.integers(0, 10_000), st.integers(2, 5), st.integers(2, 4), st.data())
+def test_what_a_fold_of_one_recording_trains_on_is_split_again_by_its_events(seed: int, k: int, inner: int, drawn):
+    times = np.cumsum(np.random.default_rng(seed).integers(1, 2_000_000, drawn.draw(st.integers(4 * k * inner, 100))))
+    data = [Example(SpikeTrains.from_lists([times / 1000.0]), {"press": times.tolist()})]
+    way = folds(data, k)[0][drawn.draw(st.integers(0, k - 1))]
+    events = folds_module._only_inside(data[0], Part(0, way.train[0].start, way.train[-1].stop))
+    events = events[[any(part.start <= t < part.stop for part in way.train) for t in events]]
+    again = folds_module._split(data, way.train, inner)
+    assert len(again) == inner
+    for fold in again:
+        within = [[sum(part.start <= t < part.stop for part in parts) for t in events] for parts in fold[:2]]
+        assert np.array_equal(np.sum(within, axis=0), np.ones(len(events))), "each is trained on or tested"
+        assert sum(within[1]) >= 2
 
 
 def test_what_a_search_reports_is_in_plain_words() -> None:

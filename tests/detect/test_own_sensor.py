@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from shell import call
 
 import taxel
@@ -120,13 +122,16 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
         (("contact",), "V", (2, 2), "touch"),
         (("contact", "foot_off"), "counts", (2, 2), "gait_plate"),
         (("contact", "Foot off"), "N", (2, 2), "gait_insole"),
-        (("slip",), "counts", (2, 2), "gait_plate"),
+        (("slip",), "counts", (2, 2), "touch"),
         (("contact", "lift"), "V", (1, 4), "gait_channel"),
         (("soft", "hard"), "V", (16, 16), "touch"),
         (("soft", "hard"), "V", (3, 11), "touch"),
         (("soft", "hard"), "V", (4, 8), "touch"),
-        (("slip",), "V", (4, 8), "gait_channel"),
-        (("contact", "lift", "slip"), "counts", (4, 8), "gait_plate"),
+        (("slip",), "V", (4, 8), "touch"),
+        (("contact", "lift", "slip"), "counts", (4, 8), "touch"),
+        (("tap",), "N", (16, 16), "touch"),
+        (("tap",), "N", (1, 16), "gait_insole"),
+        (("Heel off",), "counts", (16, 16), "gait_plate"),
         (("contact", "lift", "soft", "hard"), "N", (4, 8), "touch"),
         (("heel strike", "toe-off"), "counts", (16, 16), "gait_plate"),
         (("soft", "hard"), "V", (1, 64), "gait_channel"),
@@ -422,3 +427,51 @@ def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
     code, out, error = call(capsys, "detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", *truth)
     assert code == 0, error
     assert json.loads(out)["score"]["found"] >= 22, out[:500]
+
+
+def squares(sides: list[int]) -> tuple[Frames, dict[str, list[int]]]:
+    """Return pictures at 100 Hz of touches that load squares of so many taxels at once, one a second."""
+    values = np.random.default_rng(1).normal(0, 1, (100 * (len(sides) + 2), 12, 12))
+    starts = 100 + 100 * np.arange(len(sides))
+    for start, side in zip(starts, sides, strict=True):
+        values[start : start + 40, 2 : 2 + side, 3 : 3 + side] += 300.0
+    frames = Frames(values, np.arange(len(values)) * 10_000, unit="counts")
+    return frames, {"contact": (10_000 * starts).tolist(), "lift": (10_000 * (starts + 40)).tolist()}
+
+
+@given(st.lists(st.integers(4, 8), min_size=1, max_size=6), st.integers(2, 3))
+def test_a_touch_smaller_than_all_that_were_learnt_is_found(sides: list[int], small: int) -> None:
+    frames, labels = squares(sides)
+    tare = Tare.take(frames.between(0, 900_000))
+    example = Example(frames, labels, tare)
+    plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
+    readout = trained([example], plan, None).readout
+    others, truth = squares([small] * 3)
+    judged = score(run(readout, others, tare=tare), truth)
+    assert {label: (one.missed, one.false) for label, one in judged.by_label.items()} == dict.fromkeys(LABELS, (0, 0))
+
+
+def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
+    """On a mat that lies full, how many taxels are loaded never changes."""
+    frames, labels = squares([4, 3, 5, 4] * 3)
+    tare = Tare.take(frames.between(0, 900_000))
+    full = Frames(frames.values + 100.0, frames.t, unit=frames.unit, array=frames.array)
+    example = Example(full, labels, tare)
+    plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
+    judged = judge([example], plan, 2)
+    assert {label: one.missed for label, one in judged.together.by_label.items()} == dict.fromkeys(LABELS, 0)
+
+
+@pytest.mark.filterwarnings("ignore:.* out of reach")
+@settings(max_examples=10)
+@given(st.integers(0, 1000))
+def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed: int) -> None:
+    frames, labels = squares([4, 3, 5, 4] * 3)
+    apart = np.random.default_rng(seed).uniform(0.55, 0.9, 12)
+    labels = {"contact": [t + round(1e6 * by) for t, by in zip(labels["contact"], apart, strict=True)]}
+    example = Example(frames, labels, Tare.take(frames.between(0, 900_000)))
+    made = trained([example], Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example])), None)
+    none = score(taxel.Detections([], [], []), labels)
+    advice = advised(made, [example], none, none, 1.0)["contact"]
+    assert advice.helps == "other labels, or another tare"
+    assert advice.because.startswith("nothing was felt of 12 of 12 labels: they are of another recording, or")

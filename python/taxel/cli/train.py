@@ -51,11 +51,10 @@ def train(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="The recipe to start from: touch (events of a board; contact and lift on any grid; other labels on a "
-            "grid of more than 32 taxels that no other fits), gait_plate (counts), gait_insole (N), gait_channel "
-            "(others); or a TOML or JSON file (a path with a dot or a slash): "
-            "[encoder] or [encoders.NAME], [learner], [neurons.LABEL], run_threshold, align. Default, without "
-            "--encoder: that which fits the recording and its labels."
+            help="The recipe to start from: touch (events of a board; all labels but those of steps on any grid), "
+            "gait_plate (counts), gait_insole (N), gait_channel (others); or a TOML or JSON file (a path with a dot or "
+            "a slash): [encoder] or [encoders.NAME], [learner], [neurons.LABEL], run_threshold, align. Default, "
+            "without --encoder: that which fits the recording and its labels."
         ),
     ] = None,
     encoder: Annotated[

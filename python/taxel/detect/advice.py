@@ -69,12 +69,12 @@ def advised(
     time or more lies before the first label or behind the last. Another name where none is found of a label that no
     input follows, as it was learnt as a kind of touch. The recipe that fits recording and labels, if a named one was
     taken that does not. Another tare where it holds a touch, where taxels read above their rest before touches begin,
-    or where nothing was felt of most labels that are missed. Else the plain rule, where it makes at most half the
-    mistakes on the same labels; or the recipe that learns from the same quantities, if this one does not. For contact
-    and lift of channels, and kinds of touch that they do not tell, their distance. Other kinds of touch where neither
-    neuron nor rule tells more of them than chance would. Else more labels, where on its own training data the readout
-    makes at most half the mistakes, as it learnt by heart what these data have. Else a search of other parameters, if
-    the recipe lists any.
+    or where nothing was felt of most labels that are missed; or other labels, where nothing was felt of most. Else the
+    plain rule, where it makes at most half the mistakes on the same labels; or the recipe that learns from the same
+    quantities, if this one does not. For contact and lift of channels, and kinds of touch that they do not tell, their
+    distance. Other kinds of touch where neither neuron nor rule tells more of them than chance would. Else more labels,
+    where on its own training data the readout makes at most half the mistakes, as it learnt by heart what these data
+    have. Else a search of other parameters, if the recipe lists any.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _of_name(made: Trained, label: str, scored: Score) -> Advice | None:
     if not kinds or scored.found or alignment is None or alignment.train is not None:
         return None
     ends = ", ".join(("lift", *(name for name, of in recipes.read("touch")["also"].items() if of == "lift")))
-    because = f"by this one it is learnt as a kind of touch; names of the end of a touch are {ends}"
+    because = f"by this one it is learnt as a kind of touch, told as one begins; names of the end of a touch are {ends}"
     return Advice("another name of the label", because)
 
 
@@ -188,7 +188,17 @@ def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advic
         return Advice("another tare", f"it holds a touch of {times.held} taxels{why}; give --tare SECONDS or FILE")
     if times.loaded >= TOUCH:
         return Advice("another tare", f"{times.loaded} taxels read above theirs while nothing touches them")
-    unfelt = 0 if alignment is None else int(alignment.unpaired.sum())
+    if alignment is None:
+        return None
+    # Where no input follows the labels none was moved.
+    labels = len(alignment.given)
+    unfelt = labels if alignment.train is None else int(alignment.unpaired.sum())
+    if 2 * unfelt > labels and 2 * scored.found < scored.events:
+        return Advice(
+            "other labels, or another tare",
+            f"nothing was felt of {unfelt} of {counted(labels, 'label')}: they are of another recording, or their "
+            "times are off by more than 50 ms, each by another time, or they name what the sensor does not feel",
+        )
     if 2 * unfelt > scored.missed + scored.false:
         return Advice(
             "another tare",

@@ -462,8 +462,8 @@ def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequen
 def _grouped(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Part]]:
     """Return the parts of each recording: those of examples of one group together."""
     groups: dict[object, list[Part]] = {}
-    for n, part in enumerate(parts):
-        groups.setdefault(examples[part.example].group or n, []).append(part)
+    for part in parts:
+        groups.setdefault(examples[part.example].group or part.example, []).append(part)
     return list(groups.values())
 
 
@@ -502,14 +502,15 @@ def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> li
     if len(groups) == 1:
         (group,) = groups
         events = np.sort(np.concatenate([_only_inside(examples[part.example], part) for part in group]))
-        inner = list(_between_events(events, count))
-        cuts = [[part.start, *(t for t in inner if part.start < t < part.stop), part.stop] for part in group]
-        stretches = [list(pairwise(edges)) for edges in cuts]
-        groups = [
-            [Part(part.example, *own[n]) for part, own in zip(group, stretches, strict=True) if n < len(own)]
-            for n in range(max(map(len, stretches)))
-        ]
+        edges = (-np.inf, *_between_events(events, count), np.inf)
+        stretches = [[_within(part, *of) for part in group] for of in pairwise(edges)]
+        groups = [own for each in stretches if (own := [part for part in each if part.start < part.stop])]
     return _dealt(groups, count)
+
+
+def _within(part: Part, start: float, stop: float) -> Part:
+    """Return what of a part lies between two times; of none a part that does not start before it stops."""
+    return Part(part.example, max(part.start, start), min(part.stop, stop))
 
 
 def _folds_for(label: str, examples: Sequence[Example], parts: Sequence[Part], count: int) -> list[Fold]:

@@ -12,7 +12,7 @@ from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_us
 
-__all__ = ["FOLLOWED_MS", "Followed", "follow", "only", "silence"]
+__all__ = ["FOLLOWED_MS", "Followed", "distinct", "follow", "only", "silence"]
 
 #: How far from its label an onset may lie, either way, ms.
 FOLLOWED_MS = 50.0
@@ -190,3 +190,14 @@ def only(trains: SpikeTrains, received: Sequence[int]) -> SpikeTrains:
     offsets = np.concatenate([[0], np.cumsum(np.where(kept, trains.counts, 0))])
     values = None if trains.values is None else trains.values[spikes]
     return SpikeTrains(trains.times[spikes], offsets, trains.start, trains.stop, values, kind=trains.kind)
+
+
+def distinct(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:
+    """Return patterns in which, of trains with the same spikes in all of them, only the first has any.
+
+    Weights that equal trains share require all of these to spike at once, as levels do that every touch of the training
+    reached in one picture. Of levels the first is the lowest, which weaker touches reach as well.
+    """
+    spikes = [tuple(one[train].tobytes() for one in patterns) for train in range(len(patterns[0]))]
+    first = {own: train for train, own in reversed(list(enumerate(spikes)))}
+    return [only(one, sorted(first.values())) for one in patterns]

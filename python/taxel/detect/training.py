@@ -21,7 +21,7 @@ from taxel.array import Array
 from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_pictures, later_us, silent_windows
 from taxel.detect.alignment import Alignment, align, aligned_to
 from taxel.detect.examples import Example, array_of, called, checked, unit_of
-from taxel.detect.followed import FOLLOWED_MS, Followed, follow, only, silence
+from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.loads import clock_of, lacks_noise
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
@@ -249,7 +249,8 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
     They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
     `_FEWER_SHARE` of the labels, as some more or less are chance; with 0 it counts if it leaves no more. Where an
     encoder has quantities that labels may follow, a point is tried with each of the `_FOLLOWED` that follow them best.
-    A later point that cannot be learnt is left out. Warnings are those of the point that counts.
+    A later point that cannot be learnt is left out. If the first felt nothing, which counts as all labels missed, a
+    later one must leave fewer. Warnings are those of the point that counts.
     """
     points = recipe._choices_of(label)
     known: Known = {}
@@ -258,19 +259,31 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
         plan, patterns = examples.receiving(recipe._with_point(label, point))
         return _fitted(patterns, plan, label, array, report, point, place, known, count=len(points) > 1)
 
-    best = fitted(points[0], 0)
-    usual = max(_FEWER, _FEWER_SHARE * sum(len(one.labels.get(label, ())) for one in examples.patterns))
+    count = sum(len(one.labels.get(label, ())) for one in examples.patterns)
+    best, refused = None, None
+    try:
+        best = fitted(points[0], 0)
+    except ProblemError as error:
+        if not str(error).endswith(UNFELT):
+            raise
+        refused = error
+    usual = max(_FEWER, _FEWER_SHARE * count)
     for point, stated in zip(points[1:], recipe._fewer_of(label), strict=True):
         fewer = usual if stated is None else stated
-        if best.wrong < fewer:
+        wrong, fewer = (count, max(1, fewer)) if best is None else (best.wrong, fewer)
+        if wrong < fewer:
             continue
         others = []
         followed = recipe._received(recipe._with_point(label, point)._of(label))._quantities()
         for place in range(_FOLLOWED if followed else 1):
             with contextlib.suppress(ProblemError):
                 others.append(fitted(point, place))
-        other = min(others, key=lambda one: one.wrong, default=best)
-        best = other if other.wrong <= best.wrong - fewer else best
+        other = min(others, key=lambda one: one.wrong, default=None)
+        if other is not None and other.wrong <= wrong - fewer:
+            best = other
+    if best is None:
+        assert refused is not None
+        raise refused
     for one in best.caught:
         warnings.warn(one.message, stacklevel=5)
     return best
@@ -370,7 +383,8 @@ class Fitting:
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
         self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
-        trains = [_until(source, targets) for source, targets in zip(self._sources, self._targets, strict=True)]
+        learnt = self._sources if self._graded or self.alignment is None else distinct(self._sources)
+        trains = [_until(source, targets) for source, targets in zip(learnt, self._targets, strict=True)]
         self._check_felt(trains)
         silent = self._silent(followed, sources, trains, ages, learner._on_grid())
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
@@ -522,6 +536,11 @@ def _remarks(
             yield (
                 f"there {'is' if count == 1 else 'are'} {counted(count, 'event')} to learn from; {TWO_FOLDS} are the "
                 f"least to score it held out: label more. {len(missed)} out of reach of the inputs ({listed})"
+            )
+        elif len(missed) == count:
+            yield (
+                f"{count} of {count} events are out of reach, as too few input spikes come before them ({listed}): "
+                "none was learnt. Their times may be off, or of another recording"
             )
         else:
             yield (

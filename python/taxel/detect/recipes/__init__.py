@@ -1,11 +1,11 @@
 """Recipes by name, one data file each: where none is named, `taxel train` chooses the one that fits the recording.
 
 A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", units of frames, or "many
-UNIT": units of frames of a grid or of more than 32 channels, or "grids": frames of taxels with known neighbours, whose
-labels are all its own neurons' before what fits the unit, any others where nothing fits it), the encoder, or several as
-`encoders` by name, whether labels are moved to what the sensor felt (`align`), what all neurons share (`learner`), what
-is a neuron's own (`neurons`), which labels are `also` called otherwise, and the parameters of any `other` label, or
-whose they are; without `other` it is for its neurons' labels alone. A new recipe is a new file in this folder.
+UNIT": units of frames of a grid or of more than 32 channels, or "grids": frames of taxels with known neighbours, before
+what fits the unit, but for labels of steps, as "foot_off"), the encoder, or several as `encoders` by name, whether
+labels are moved to what the sensor felt (`align`), what all neurons share (`learner`), what is a neuron's own
+(`neurons`), which labels are `also` called otherwise, and the parameters of any `other` label, or whose they are;
+without `other` it is for its neurons' labels alone. A new recipe is a new file in this folder.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ __all__ = ["chosen", "fitting", "for_labels", "knows", "names", "read"]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
-#: More taxels than these are many: a grid's kinds of touch are then not learnt by `_ANY`, whose 22 trains a taxel take
-#: minutes.
+#: More channels than these are many.
 _MOST_CHANNELS = 32
+#: A label with one of these words is of a step, which begins and ends otherwise than a touch.
+_OF_STEPS = {"foot", "heel", "toe"}
 
 
 @cache
@@ -53,9 +54,8 @@ def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
     ----------
     source : Events or Frames
     labels : sequence of str
-        What is to be learnt. Contact and lift of a grid have one recipe whatever the unit. All others have that of the
-        unit, and where there is none, that of grids if it is one of more than 32 taxels; but "foot_off" that of
-        channels.
+        What is to be learnt. Contact, lift and kinds of touch of a grid have one recipe whatever the unit; steps, as
+        "foot_off", and no labels have that of the unit, and where there is none that of channels.
 
     Examples
     --------
@@ -88,18 +88,13 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     else:
         what = f"a grid of {array.rows} x {array.columns} taxels"
         others = [label for label in labels if _own(every[grids], label) is None]
-        if not others:
-            return grids, f"{' and '.join(labels)} on {what}"
-    # Foot-off and the like are no kinds of touch; nor is one label alone, as "slip".
-    steps = grids is not None and any(_own(values, label) for label in others for values in every.values())
-    if grids is not None and not steps and len(others) > 1:
-        return grids, f"kinds of touch on {what}"
+        known = any(_own(values, label) for label in others for values in every.values())
+        if not known and not any(_OF_STEPS & set(_plain(label).split("_")) for label in others):
+            return grids, f"{'kinds of touch' if others else ' and '.join(labels)} on {what}"
     many = array.taxels > _MOST_CHANNELS
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
         if unit in of:
             return of[unit], f"pictures in {source.unit}"
-    if grids is not None and many and not steps:
-        return grids, what
     return _ANY, f"{what} in {source.unit}"
 
 
