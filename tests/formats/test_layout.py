@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,46 @@ def test_arrays_of_somebody_else(tmp_path: Path, ending: str, flat: bool) -> Non
     frames = recording.frames()
     np.testing.assert_array_equal(frames.values, values.reshape(3, 2, 3).astype(np.float32))
     assert frames.t.tolist() == ([0, 250_000, 750_000] if data else [0, 250_000, 500_000])
+
+
+@pytest.mark.parametrize("ending", [".npy", ".npz", ".h5"])
+@pytest.mark.parametrize("kind", ["?", "i1", ">u2", "i4", "u8", "f2", ">f4", "f8"])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_arrays_of_every_kind_of_number_open(tmp_path: Path, ending: str, kind: str, order: str) -> None:
+    values = np.zeros((7, 2, 3), kind, order=order)
+    values[2:5, 1] = 1
+    if np.dtype(kind).kind == "f":
+        values[3, 0, 0] = np.nan
+    place = tmp_path / f"grasp{ending}"
+    if ending == ".npy":
+        np.save(place, values)
+    elif ending == ".npz":
+        np.savez(place, palm=values, t=np.arange(7) / 4)
+    else:
+        import h5py
+
+        with h5py.File(place, "w") as h5:
+            h5["palm"], h5["t"] = values, np.arange(7) / 4
+    with pytest.raises(FormatError, match=r"docs/files\.md") as refused:
+        taxel.open(place)
+    # The lines that the refusal prints are the layout that reads it.
+    (tmp_path / "grasp.layout.toml").write_text(str(refused.value).partition("\n")[2])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        recording = taxel.open(place)
+    assert recording.timed == (ending != ".npy")
+    np.testing.assert_array_equal(recording.frames().values, values.astype(np.float32))
+
+
+@pytest.mark.parametrize(("at", "named"), [((3, 1, 2), "picture 3, row 1, column 2"), ((3, 5), "picture 3, taxel 5")])
+@pytest.mark.parametrize("value", [np.inf, -1e39])
+def test_a_value_that_does_not_fit_names_its_place(tmp_path: Path, at: Any, named: str, value: float) -> None:
+    values = np.zeros((5, 2, 3) if len(at) == 3 else (5, 6))
+    values[at] = value
+    np.save(tmp_path / "a.npy", values)
+    (tmp_path / "a.layout.toml").write_text("rate_hz = 10\n")
+    with pytest.raises(FormatError, match=rf"a\.npy.*{named}: .*must fit 32 bits"):
+        taxel.open(tmp_path / "a.npy")
 
 
 def test_a_given_sensor_lays_out_arrays_of_somebody_else_and_another_is_refused(tmp_path: Path) -> None:

@@ -232,6 +232,21 @@ def test_both_feet_of_a_file_become_sources_left_and_right(
     assert left.frames() == trials[0].frames().between(-np.inf, stop)
 
 
+def test_info_of_a_folder_takes_each_source_as_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "feet").mkdir()
+    taxel.convert(Frames(np.ones((5, 2, 2)), np.arange(5), array=Array(2, 2)), tmp_path / "feet" / "hand.mcap")
+    call(capsys, "convert", write_pedar(tmp_path), tmp_path / "feet" / "walk.mcap")
+    code, shown, said = call(capsys, "info", tmp_path / "feet")
+    assert (code, said) == (0, "")
+    assert [
+        f"{tmp_path / 'feet' / name}: .mcap" in shown for name in ("hand.mcap", "walk.mcap left", "walk.mcap right")
+    ]
+    hand, walk = json.loads(call(capsys, "info", tmp_path / "feet", "--json")[1])
+    assert hand["file"] == str(tmp_path / "feet" / "hand.mcap")
+    assert walk == json.loads(call(capsys, "info", tmp_path / "feet" / "walk.mcap", "--json")[1])
+    assert list(walk["sources"]) == ["left", "right"]
+
+
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     array = Array(1, 2)
     frames = Frames(np.ones((5, 1, 2)), np.arange(5) * 10_000, unit="N", array=array)

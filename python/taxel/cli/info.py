@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -87,18 +87,15 @@ def info(
             return
         opened = files.open(file)
         # A file of another maker may hold several recordings; many hold one.
-        opened = opened[0] if isinstance(opened, list) and len(opened) == 1 else opened
-        if isinstance(opened, list):
+        every = opened if isinstance(opened, list) else [opened]
+        recording = every[0]
+        if len(every) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:
-                raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")
-            every = [summary(recording, series(recording, tare_of(tare, recording))) for recording in opened]
-            typer.echo(json.dumps(every) if as_json else "\n".join(_page(facts) for facts in every))
+                raise ProblemError(_several(file, every))
+            of_each = [_facts(one, tare) for one in every]
+            text = json.dumps(of_each if len(every) > 1 else of_each[0])
+            typer.echo(text if as_json else "\n".join(map(_pages, of_each)))
             return
-        if len(opened.sources) > 1:
-            several = _sources(opened, tare, drawn=picture is not None or table is not None)
-            typer.echo(json.dumps(several) if as_json else _pages(several))
-            return
-        recording = opened
         rest = tare_of(tare, recording)
         pressed = series(recording, rest)
         facts = summary(recording, pressed)
@@ -157,16 +154,32 @@ def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest]
     write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
 
 
-def _sources(recording: Recording, tare: str | None, *, drawn: bool) -> dict[str, Any]:
+def _several(file: Path, every: Sequence[Recording]) -> str:
+    """Return why there is no picture or table of several recordings, or of one with several sources."""
+    if len(every) > 1:
+        return f"{file}: holds {len(every)} recordings; a picture or a table is of one"
+    names = ", ".join(every[0].sources)
+    return (
+        f"{file}: holds {len(every[0].sources)} sources ({names}); a picture or a table is of one: taxel convert "
+        "--source NAME writes it to a file of its own"
+    )
+
+
+def _facts(recording: Recording, tare: str | None) -> dict[str, Any]:
+    """Return the facts of a recording, or of each of its sources."""
+    from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.summary import summary  # noqa: PLC0415
+
+    if len(recording.sources) > 1:
+        return _sources(recording, tare)
+    return summary(recording, series(recording, tare_of(tare, recording)))
+
+
+def _sources(recording: Recording, tare: str | None) -> dict[str, Any]:
     """Return the facts of each source of a file, with offset and drift of their clocks against the first one's."""
     from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
     from taxel.recording.summary import summary  # noqa: PLC0415
 
-    if drawn:
-        raise ProblemError(
-            f"{recording.path}: holds {len(recording.sources)} sources ({', '.join(recording.sources)}); a picture "
-            "or a table is of one: taxel convert --source NAME writes it to a file of its own"
-        )
     first = next(iter(recording.sources.values()))
     sources: dict[str, Any] = {}
     for name, source in recording.sources.items():
@@ -193,8 +206,11 @@ def _sources(recording: Recording, tare: str | None, *, drawn: bool) -> dict[str
     return {"file": str(recording.path), **of_all, "sources": sources}
 
 
-def _pages(several: dict[str, Any]) -> str:
-    return "\n".join(f"{name}: {_page(facts)}" for name, facts in several["sources"].items())
+def _pages(facts: dict[str, Any]) -> str:
+    """Return the facts of a recording, or of each source of one, as lines for people."""
+    if "sources" not in facts:
+        return _page(facts)
+    return "\n".join(f"{name}: {_page(of)}" for name, of in facts["sources"].items())
 
 
 def _lines(pressed: Series) -> Iterator[str]:

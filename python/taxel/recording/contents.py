@@ -245,7 +245,7 @@ def several(sources: Mapping[str, Contents]) -> Contents:
     def refuse() -> Any:
         raise ProblemError(
             f"{first.path}: holds {len(sources)} sources ({names}); say which, as "
-            f"recording.sources[{next(iter(sources))!r}]"
+            f"recording.sources[{next(iter(sources))!r}]; taxel convert --source NAME writes one to a file of its own"
         )
 
     of_one_board = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -42,8 +43,11 @@ PICTURES_HZ = 100.0
 _BLOCK = 1 << 21
 #: So many events are looked at at once for where area, peak and sum are largest, in so many moments of each.
 _EVENTS, _MOMENTS = 1 << 16, 32
-#: The rest of events is tracked this often, us.
-_TRACKED_US = 50_000
+#: The rest of events is tracked this often, us, and so many times make a stretch that may be quiet.
+_TRACKED_US, _STRETCH = 50_000, 10
+#: In silence, where nothing changes, the rest is tracked so many times, and then after each further one in so many of
+#: it: a wrong time stamp may make it one of years.
+_IN_SILENCE = 64
 #: *Reading*: noise adds up to at most so many times the greatest sum of the stretch of this length, us, in which it is
 #: least, and so many taxels just above the floor (crates/taxel-panel/src/keyframe_index/pictures.rs has the same).
 _TIMES_LEAST, _STRETCH_US, _NOISY_TAXELS = 1.5, 250_000, 4
@@ -262,6 +266,8 @@ class _Drawn:
     taxels: NDArray[np.int64]
     since: NDArray[np.int64]
     held: _core.HeldValues
+    #: Times of events, us: of each `_TRACKED_US` with any, the first.
+    heard: NDArray[np.int64]
     #: The place of each taxel in the rectangle around them, and that one's shape.
     places: NDArray[np.int64]
     box: tuple[int, int]
@@ -293,20 +299,51 @@ class _Drawn:
         of = {int(taxel): k for k, taxel in enumerate(taxels)}
         zeroings = [(of.get(z.y * events.array.columns + z.x), z.t, z.rest) for z in recording.zeroings]
         zeroed = tuple((k, t, rest) for k, t, rest in zeroings if k is not None)
-        return cls(_times(recording), taxels, since, values, places, (rows, columns), corner, zeroed)
+        steps = events.t // _TRACKED_US
+        heard = events.t[np.diff(steps, prepend=steps[0] - 1) != 0]
+        return cls(_times(recording), taxels, since, values, heard, places, (rows, columns), corner, zeroed)
 
     def areas(self, array: Array) -> NDArray[np.float64]:
         """Return the area of each of the taxels, mm2; 1 each where it is not known."""
         areas = array.area_mm2
         return np.asarray((np.ones(array.shape) if areas is None else areas).reshape(-1)[self.taxels], np.float64)
 
+    @cached_property
+    def sampled(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The times at which values are read: the pictures', and those at which the rest is tracked.
+
+        Beside each stands how many times it stands for, of the pictures' and of all multiples of `_TRACKED_US`.
+        """
+        if not len(self.t):
+            return self.t, self.t
+        first, last = self.t[0], self.t[-1]
+        count = -((first - last) // _TRACKED_US)
+        heard = (self.heard - first) // _TRACKED_US
+        steps = np.union1d(heard[(heard > 0) & (heard < count)], np.arange(min(1, count)))
+        until = np.append(steps, count)[1:]
+        since = list(range(_IN_SILENCE + 1))
+        while since[-1] < count:
+            since.append(since[-1] + since[-1] // _IN_SILENCE)
+        many = np.searchsorted(since, until - steps)
+        place = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
+        grid = np.repeat(steps, many) + np.array(since)[place]
+        # Stretches begin and end where they would with all times: in silence, around pictures, and where events begin.
+        later = place >= _IN_SILENCE
+        grid[later] -= grid[later] % _STRETCH
+        around = np.unique((self.t - first) // (_STRETCH * _TRACKED_US))[:, None] * _STRETCH + [0, _STRETCH]
+        ends = until[until - steps > _IN_SILENCE, None] // _STRETCH * _STRETCH + np.arange(_STRETCH)
+        grid = np.concatenate([grid, around[around < count], ends[ends < count]])
+        times = np.union1d(self.t, first + grid * _TRACKED_US)
+        begins = -((first - times) // _TRACKED_US)
+        is_multiple = (first + begins * _TRACKED_US == times) & (times < last)
+        return times, np.diff(begins, append=count) + ~is_multiple
+
     def blocks(self) -> Iterator[tuple[NDArray[np.bool_], Picture]]:
         """Yield the held values in the rectangle, at the pictures' times and often enough between them.
 
         Beside them stands which of them are pictures.
         """
-        between = np.arange(self.t[0], self.t[-1], _TRACKED_US) if len(self.t) else self.t
-        times = np.union1d(self.t, between)
+        times, _ = self.sampled
         shown = np.isin(times, self.t)
         size = self.box[0] * self.box[1]
         each = max(1, _BLOCK // max(1, size))
@@ -320,7 +357,7 @@ class _Drawn:
     def found(self) -> Rest:
         """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""
         size, pictures = self.box[0] * self.box[1], lambda: (picture for _, picture in self.blocks())
-        rest = found(pictures, size, self.box[1], corner=self.corner)
+        rest = found(pictures, size, self.box[1], corner=self.corner, stands_for=self.sampled[1])
         lay = None if rest.lay is None else rest.lay[self.places]
         # A board's comparators are turned by its register, not by a layout file.
         return replace(rest, values=rest.values[self.places], lay=lay, falls=False)
@@ -431,9 +468,9 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     recording = Recording(Contents(Path(), "", "events", events.array, events=events))
     drawn = _Drawn.of(recording)
     # The rest is found from the first event on.
-    before = np.arange(int(events.t.min()), int(t[0]), _TRACKED_US) if len(t) else t
-    drawn = replace(drawn, t=np.concatenate([before, t]).astype(np.int64))
-    return drawn.pictures(_rest_of(recording, drawn, None), events.array)[len(before) :]
+    from_first = np.union1d(t, events.t.min()) if len(t) else t
+    drawn = replace(drawn, t=from_first.astype(np.int64))
+    return drawn.pictures(_rest_of(recording, drawn, None), events.array)[len(from_first) - len(t) :]
 
 
 def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:

@@ -60,7 +60,9 @@ def is_foreign(path: Path) -> bool:
     if not path.is_file() or ending not in (*_TABLES, *ARRAYS):
         return False
     if ending == ".npz":
-        return not {"t", "about"} & set(stored_names(path))
+        names = set(stored_names(path))
+        # Other programs name their times t too.
+        return "about" not in names and not ("t" in names and names & {"x", "y", "p", "values"})
     if ending == ".h5":
         return not is_ours(path)
     if ending == ".csv":
@@ -239,14 +241,21 @@ def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | No
             raise FormatError(f"{path}: holds no array {missing}; there are {listed(every)}{hint}")
         arrays = arrays_of(path, wanted)
     values, unread = arrays[wanted[0]], ", ".join(name for name in there if name not in wanted)
-    if values.dtype.kind not in "uif" or values.ndim not in (2, 3) or 0 in values.shape:
+    if values.dtype.kind not in "uifb" or values.ndim not in (2, 3) or 0 in values.shape:
         shape = " x ".join(map(str, values.shape))
         raise FormatError(
             f"{path}, {wanted[0] or 'the array'}: {values.dtype} of shape {shape}; must be numbers of shape "
             "pictures x rows x columns, or pictures x taxels"
         )
-    if values.dtype.kind == "f" and (np.abs(np.nan_to_num(values, posinf=np.inf)) > VALUE).any():
-        raise FormatError(f"{path}, {wanted[0] or 'the array'}: a value does not fit 32 bits")
+    # VALUE is no number of 16 bits.
+    large = np.argwhere(np.abs(values) > np.float64(VALUE))
+    if len(large):
+        picture, *place = map(int, large[0])
+        at = f"row {place[0]}, column {place[1]}" if len(place) == 2 else f"taxel {place[0]}"
+        raise FormatError(
+            f"{path}, {wanted[0] or 'the array'}, picture {picture}, {at}: {values[tuple(large[0])]}; must fit 32 "
+            "bits, or be NaN where it is missing"
+        )
     if len(wanted) == 1:
         return values, None, unread
     times = arrays[wanted[1]].astype(np.float64)

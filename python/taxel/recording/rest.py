@@ -226,6 +226,7 @@ def found(
     *,
     falls: bool = False,
     corner: tuple[int, int] = (0, 0),
+    stands_for: NDArray[np.int64] | None = None,
 ) -> Rest:
     """Return the rest that a quiet stretch of pictures shows (`_core.TrackedRest`), or none.
 
@@ -251,16 +252,19 @@ def found(
         return Rest("none", unknown)
     begins, known = rest.begins / scale, np.zeros(taxels, np.int64)
     released, less, quiet, in_quiet = known.copy(), np.zeros(taxels), np.zeros(taxels), known.copy()
+    first = 0
     for t, values in pictures():
+        each = np.ones((len(t), 1), np.int64) if stands_for is None else stands_for[first : first + len(t), None]
+        first += len(t)
         load = begins - values if falls else values - begins
         far = load < -LOADED_TICKS / scale
-        released += np.count_nonzero(far, axis=0)
-        less -= np.where(far, load, 0.0).sum(axis=0)
+        released += (far * each).sum(axis=0)
+        less -= (np.where(far, load, 0.0) * each).sum(axis=0)
         there = ~np.isnan(load)
-        known += np.count_nonzero(there, axis=0)
+        known += (there * each).sum(axis=0)
         within = slice(*np.searchsorted(t, rest.quiet))
-        quiet += np.where(there, load, 0.0)[within].sum(axis=0)
-        in_quiet += np.count_nonzero(there[within], axis=0)
+        quiet += (np.where(there, load, 0.0) * each)[within].sum(axis=0)
+        in_quiet += (there * each)[within].sum(axis=0)
     loaded = released > LOADED_SHARE * known
     begins[loaded] = np.nan
     if np.isnan(begins).all():
