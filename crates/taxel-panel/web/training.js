@@ -52,13 +52,12 @@ export class Training {
   text(printed) {
     const place = part("train-text", HTMLElement);
     // The page says by itself where the readout is, and what to do with it.
-    const [last, readout, next] = printed.match(/^written to (.+); next: (taxel detect .+)$/m) ?? ["", "", ""];
+    const [last, next] = printed.match(/^written to .+; next: (taxel detect .+)$/m) ?? ["", ""];
     const text = printed.replace(last, "").trim();
     place.hidden = !text;
     place.classList.remove("bad");
     write(place, text);
     part("train-next", HTMLElement).hidden = !next;
-    write(part("train-done", HTMLElement), `${readout} reads this recording now, below. Correct labels and train again, or detect in others:`);
     write(part("train-detect", HTMLElement), next);
     // The page has no options of the command line, which an advice may name.
     const options = [...new Set(text.match(/--[a-z][a-z-]*/g))];
