@@ -410,6 +410,14 @@ def test_columns_and_times_that_do_not_fit_their_table_are_refused(tmp_path: Pat
         taxel.open(tmp_path / "a.csv")
 
 
+@pytest.mark.parametrize("code", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_table_in_utf_16_says_how_to_save_it(tmp_path: Path, code: str) -> None:
+    begin = "" if code == "utf-16" else "\ufeff"
+    (tmp_path / "a.csv").write_bytes(f"{begin}time,a\n0,1\n".encode(code))
+    with pytest.raises(FormatError, match=r"a\.csv, byte \d: a zero byte; it is in UTF-16: save it as UTF-8"):
+        taxel.open(tmp_path / "a.csv")
+
+
 def test_a_line_with_too_few_cells_is_named_where_columns_are_left_out(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,a,b,who\n0,1,2,me\n1,2,me\n")
     (tmp_path / "a.layout.toml").write_text('[table]\ntime_column = "time"\nleave_out = ["who"]\n')
