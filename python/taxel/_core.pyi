@@ -33,8 +33,8 @@ def check_parameters(of: str, parameters: str) -> str: ...
 
 #: places: x, y, areas, whether they are in mm
 _Places = tuple[list[float], list[float], list[float] | None, bool]
-#: rows, columns, pitch in mm (rows, columns), name, which taxels exist, places
-_Array = tuple[int, int, tuple[float, float] | None, str, list[bool] | None, _Places | None]
+#: rows, columns, pitch in mm (rows, columns), name, which taxels exist, places, names of the taxels
+_Array = tuple[int, int, tuple[float, float] | None, str, list[bool] | None, _Places | None, list[str] | None]
 #: array, t, x, y, p, (intensity, present), repaired, markers as (t, start)
 _Events = tuple[
     _Array,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, number, numbers, shown, text, whole
+from taxel._base.arguments import instance, number, numbers, several, shown, text, whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 
-__all__ = ["Array", "Places"]
+__all__ = ["Array", "Places", "names_beside"]
 
 #: The pitch, mm, that a file states where it was unknown, from before a pitch could be unknown.
 _UNKNOWN_MM = 1.0
@@ -118,11 +119,13 @@ class Array:
     name : str
     places : Places, optional
         The place of each taxel, instead of a pitch.
+    names : sequence of str, one a taxel, row by row, optional
+        What each taxel is called, such as a column of a table; "" for one without a name.
 
     Raises
     ------
-    ProblemError : no row or column, a pitch that is not above 0, `exists` or `places` of another shape, or both a pitch
-        and places
+    ProblemError : no row or column, a pitch that is not above 0, `exists`, `places` or `names` of another shape, or
+        both a pitch and places
 
     Notes
     -----
@@ -146,6 +149,7 @@ class Array:
     exists: NDArray[np.bool_] | None = None
     name: str = "array"
     places: Places | None = None
+    names: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         for field in ("rows", "columns"):
@@ -162,6 +166,14 @@ class Array:
             if self.pitch_mm is not None:
                 raise ProblemError("pitch_mm and places are both given: give one of them")
             object.__setattr__(self, "places", instance("places", self.places, Places)._on(self))
+        if self.names is not None:
+            names = tuple(text("names", one) for one in several("names", self.names))
+            places = self.rows * self.columns
+            if len(names) != places:
+                raise ProblemError(
+                    f"names has {counted(len(names), 'entry', 'entries')}: must be one a taxel, {places}"
+                )
+            object.__setattr__(self, "names", names)
 
     @classmethod
     def thesis(cls) -> Array:
@@ -348,7 +360,7 @@ class Array:
         Returns
         -------
         bool
-            Whether both have the same rows, columns and taxels; neither name nor pitch nor places count.
+            Whether both have the same rows, columns and taxels; neither names nor pitch nor places count.
 
         Raises
         ------
@@ -383,7 +395,9 @@ class Array:
         rows, columns = slice(top, bottom), slice(left, right)
         exists = None if self.exists is None else self.exists[rows, columns]
         places = None if self.places is None else self.places._part(rows, columns)
-        return Array(bottom - top, right - left, self.pitch_mm, exists, self.name, places)
+        kept = np.arange(self.rows * self.columns).reshape(self.shape)[rows, columns].ravel().tolist()
+        names = None if self.names is None else [self.names[k] for k in kept]
+        return Array(bottom - top, right - left, self.pitch_mm, exists, self.name, places, names)
 
     @property
     def _is_measured(self) -> bool:
@@ -417,21 +431,30 @@ class Array:
         lists = None if of is None else (of.x.ravel().tolist(), of.y.ravel().tolist())
         areas = None if of is None or of.area is None else of.area.ravel().tolist()
         places = None if of is None or lists is None else (*lists, areas, of.unit == "mm")
-        return self.rows, self.columns, pitch, self.name, exists, places
+        return (
+            self.rows,
+            self.columns,
+            pitch,
+            self.name,
+            exists,
+            places,
+            None if self.names is None else list(self.names),
+        )
 
     @classmethod
     def _from_parts(cls, parts: _core._Array) -> Array:
-        rows, columns, pitch_mm, name, exists, of = parts
+        rows, columns, pitch_mm, name, exists, of, names = parts
         grid = None if exists is None else np.array(exists).reshape(rows, columns)
         places = None if of is None else Places(of[0], of[1], of[2], "mm" if of[3] else None)  # type: ignore[arg-type]
-        return cls(rows, columns, pitch_mm, grid, name, places)
+        return cls(rows, columns, pitch_mm, grid, name, places, names)
 
     def _geometry(self) -> dict[str, Any]:
         """Return the array as JSON values; a pitch of 1 mm is a pair, as a single 1 in a file is an unknown one."""
-        rows, columns, _, name, exists, _ = self._parts()
+        rows, columns, _, name, exists, _, names = self._parts()
         pitch = self.pitch_mm if self.pitch_mm != _UNKNOWN_MM else (_UNKNOWN_MM, _UNKNOWN_MM)
-        parts = {"rows": rows, "columns": columns, "pitch_mm": pitch, "name": name, "exists": exists}
-        return parts if self.places is None else parts | {"places": self.places._json()}
+        parts: dict[str, Any] = {"rows": rows, "columns": columns, "pitch_mm": pitch, "name": name, "exists": exists}
+        parts |= {} if self.places is None else {"places": self.places._json()}
+        return parts if names is None else parts | {"names": names}
 
     @classmethod
     def _from_geometry(cls, geometry: dict[str, Any]) -> Array:
@@ -441,7 +464,8 @@ class Array:
         rows, columns, name = (geometry[field] for field in ("rows", "columns", "name"))
         exists, places = geometry.get("exists"), geometry.get("places")
         grid = None if exists is None else np.array(exists).reshape(rows, columns)
-        return cls(rows, columns, pitch, grid, name, None if places is None else Places(**places))
+        of_each = None if places is None else Places(**places)
+        return cls(rows, columns, pitch, grid, name, of_each, geometry.get("names"))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Array):
@@ -454,6 +478,17 @@ class Array:
     def __repr__(self) -> str:
         size = f"{counted(self.rows, 'row')} x {counted(self.columns, 'column')}, {counted(self.taxels, 'taxel')}"
         return f"Array({self.name}: {size}, {self._apart()})"
+
+
+def names_beside(arrays: Sequence[Array], lefts: Sequence[int], shape: tuple[int, int]) -> list[str] | None:
+    """Return the names of the taxels of arrays side by side, each from its first column on; None if none has any."""
+    if all(one.names is None for one in arrays):
+        return None
+    names = np.full(shape, "", object)
+    for one, left in zip(arrays, lefts, strict=False):
+        if one.names is not None:
+            names[: one.rows, left : left + one.columns] = np.array(one.names, object).reshape(one.shape)
+    return [str(name) for name in names.ravel()]
 
 
 def _pitch(pitch: object) -> float | tuple[float, float]:

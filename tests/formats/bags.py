@@ -90,6 +90,19 @@ def image(pixels: Any, encoding: str, *, padding: int = 0, big: bool = False) ->
     return make
 
 
+def compressed(types: dict[str, Any], ns: int) -> Any:
+    """A CompressedImage."""
+    return types["sensor_msgs/msg/CompressedImage"](header(types, ns), "png", np.zeros(9, np.uint8))
+
+
+def cloud(types: dict[str, Any], ns: int) -> Any:
+    """A PointCloud2 of two points."""
+    field = types["sensor_msgs/msg/PointField"]("x", 0, 7, 1)
+    return types["sensor_msgs/msg/PointCloud2"](
+        header(types, ns), 1, 2, [field], False, 4, 8, np.zeros(8, np.uint8), True
+    )
+
+
 def skin(patches: Sequence[tuple[Sequence[int], Sequence[float]]]) -> Make:
     """Return the maker of a message of several sensors, each of taxels and of forces along z."""
 

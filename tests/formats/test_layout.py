@@ -66,6 +66,36 @@ def test_tables_of_any_separator_with_or_without_names(tmp_path: Path, separator
     assert frames.array.is_channels
 
 
+@pytest.mark.parametrize("time", [None, 1, "zeit"])
+@pytest.mark.parametrize("shape", ["", "rows = 2\ncolumns = 3\n", "rows = 1\ncolumns = 6\npitch_mm = 5\n"])
+def test_taxels_keep_the_names_of_their_columns(tmp_path: Path, time: int | str | None, shape: str) -> None:
+    names = ["Daumen", '"Handfläche"', "", "x3y5", "a", "a"]
+    called = ("Daumen", "Handfläche", "", "x3y5", "a", "a")
+    rows = VALUES if time is None else np.column_stack([[0.0, 0.1, 0.2], VALUES])
+    text = ",".join([*(["zeit"] if time else []), *names]) + "\n" + lines(rows)
+    (tmp_path / "step.csv").write_bytes(text.encode("latin-1"))
+    column = "" if time is None else f"time_column = {time!r}\n".replace("'", '"')
+    (tmp_path / "step.layout.toml").write_text(f"{shape}[table]\n{column}")
+    recording = taxel.open(tmp_path / "step.csv")
+    assert recording.array.names == called
+    for ending in (".mcap", ".npz", ".h5"):
+        taxel.convert(recording, tmp_path / f"step2{ending}")
+        assert taxel.open(tmp_path / f"step2{ending}").array.names == called
+    shown = CliRunner().invoke(app, ["info", str(tmp_path / "step2.mcap")]).stdout
+    assert "names               Daumen, Handfläche, , x3y5, a, a\n" in shown
+
+
+@pytest.mark.parametrize("array", [None, Array(1, 3), Array(3, 1, pitch_mm=2.0)])
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "latin-1"])
+def test_channels_of_our_own_table_keep_their_names(tmp_path: Path, array: Array | None, code: str) -> None:
+    (tmp_path / "a.csv").write_bytes("t_us,Daumen,Handfläche,c\n0,1,2,3\n10,4,5,6\n".encode(code))
+    recording = taxel.open(tmp_path / "a.csv", array=array)
+    assert recording.array.names == ("Daumen", "Handfläche", "c")
+    assert recording.frames().array.names == recording.array.names
+    (tmp_path / "b.csv").write_text("t_us,x0y0,x1y0\n0,1,2\n")
+    assert taxel.open(tmp_path / "b.csv").array.names is None
+
+
 def test_a_compressed_table_a_numbered_time_column_and_missing_cells(tmp_path: Path) -> None:
     text = lines(np.column_stack([VALUES[:, :2], [0.5, 1.0, 1.5], VALUES[:, 2:]])).replace("6.5", "NA")
     (tmp_path / "step.csv.gz").write_bytes(gzip.compress(text.encode()))
@@ -293,6 +323,106 @@ def test_tables_without_a_layout_print_the_one_that_reads_them(
     assert recording.timed == bool(time)
     expected_us = t * {"": 0, "time (ms)": 1e3}.get(time, 1e6) if time else np.arange(len(t))
     assert recording.frames().t.tolist() == expected_us.tolist()
+
+
+TIMES = {
+    "time (ms)": lambda t: f"{1000 * t:.0f}",
+    "timestamp": lambda t: f"{1_714_557_600_000 + 1000 * t:.0f}",
+    "time": lambda t: f"2024-05-01T10:00:{t:09.6f}",
+    "date and time": lambda t: f"2024-05-01 12:00:{t:06.3f}+02:00",
+    "clock": lambda t: f"00:00:{t:06.3f}",
+}
+
+
+@pytest.mark.parametrize("time", TIMES)
+@pytest.mark.parametrize("units", [None, "[N]", "kPa"])
+@pytest.mark.parametrize("ending", ["", ",", "rows"])
+@pytest.mark.parametrize("more", ["", "index", "texts"])
+@pytest.mark.parametrize("quoted", [False, True])
+def test_tables_as_programs_write_them_open_by_the_layout_that_is_printed(
+    tmp_path: Path, time: str, units: str | None, ending: str, more: str, quoted: bool
+) -> None:
+    values = np.tile(VALUES, (8, 1))
+    t = np.arange(len(values)) / 50
+    names, unit = [time, *"abcdef"], ["[ms]" if time == "timestamp" else "", *[str(units)] * 6]
+    rows = [[TIMES[time](at), *map(str, row)] for at, row in zip(t, values, strict=True)]
+    if more == "index":
+        names, unit = ["", *names], ["", *unit]
+        rows = [[str(k), *row] for k, row in enumerate(rows)]
+    elif more == "texts":
+        names, unit = [*names, "who", "note"], [*unit, "", ""]
+        rows = [[*row, "left", "" if k % 3 else "a touch"] for k, row in enumerate(rows)]
+    lines_of = [names, *([unit] if units is not None else []), *rows]
+    if quoted:
+        lines_of = [[f'"{cell}"' for cell in row] for row in lines_of]
+    texts = [",".join(row) for row in lines_of]
+    first = len(texts) - len(rows)
+    texts = [line + "," * (ending == "," or (ending == "rows" and k >= first)) for k, line in enumerate(texts)]
+    (tmp_path / "a.csv").write_text("\n".join(texts) + "\n")
+    said = layout_said_of(tmp_path / "a.csv")
+    (tmp_path / "a.layout.toml").write_text(said)
+    recording = taxel.open(tmp_path / "a.csv")
+    frames = recording.frames()
+    np.testing.assert_array_equal(frames.values[:, 0], values.astype(np.float32))
+    assert recording.array.names == tuple("abcdef")
+    begin = {"time (ms)": 0, "clock": 0}.get(time, 1_714_557_600_000_000)
+    np.testing.assert_allclose(frames.t - begin, t * 1e6, atol=1)
+    assert frames.unit == ("counts" if units is None else units.strip("[]"))
+    left = {"index": ("columns that are no taxels: column 1",), "texts": ("columns that are no taxels: who, note",)}
+    assert recording.lost == left.get(more, ())
+
+
+@pytest.mark.parametrize("at", [0, 3, 20])
+@pytest.mark.parametrize("cell", ["inf", "ERR"])
+def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: int, cell: str) -> None:
+    rows = [[f"{k / 50}", *"123"] for k in range(30)]
+    rows[at + 2][2] = cell
+    (tmp_path / "a.csv").write_text("time,a,b,c\n" + "".join(",".join(row) + "\n" for row in rows))
+    said = layout_said_of(tmp_path / "a.csv")
+    assert "skip_lines" not in said
+    (tmp_path / "a.layout.toml").write_text(said)
+    with pytest.raises(FormatError, match=rf"a\.csv, line {at + 4}: b is '{cell}'.*missing = '{cell}'"):
+        taxel.open(tmp_path / "a.csv")
+    (tmp_path / "a.layout.toml").write_text(f'{said}\nmissing = "{cell}"')
+    assert taxel.open(tmp_path / "a.csv").frames().missing == 1
+
+
+@pytest.mark.parametrize(
+    ("layout", "match"),
+    [
+        ('leave_out = ["x"]', r"a\.csv: no column 'x'; there are time, a, who"),
+        ("leave_out = [4]", r"a\.csv: 3 columns; leave_out is 4"),
+        ("leave_out = [0]", "leave_out is 0: must be a whole number from 1"),
+        ('leave_out = "who"', "leave_out is 'who': must be a list of columns"),
+        ('leave_out = ["time", "who"]\ntime_column = "time"', "column 'time' is time_column, and left out"),
+        (
+            'leave_out = ["who"]\ntime_column = "time"\ntime_unit = "iso"',
+            r"line 3: time is 'noon'; must be as 2024-05-01T",
+        ),
+        ('leave_out = ["who"]', r"column 'time' holds times by its name"),
+        ('leave_out = ["time", "a"]', "line 2: who is 'me', not a number"),
+    ],
+)
+def test_columns_and_times_that_do_not_fit_their_table_are_refused(tmp_path: Path, layout: str, match: str) -> None:
+    (tmp_path / "a.csv").write_text("time,a,who\n10:00,1,me\nnoon,2,me\n")
+    (tmp_path / "a.layout.toml").write_text(f"[table]\n{layout}\n")
+    with pytest.raises(FormatError, match=match):
+        taxel.open(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("code", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_table_in_utf_16_says_how_to_save_it(tmp_path: Path, code: str) -> None:
+    begin = "" if code == "utf-16" else "\ufeff"
+    (tmp_path / "a.csv").write_bytes(f"{begin}time,a\n0,1\n".encode(code))
+    with pytest.raises(FormatError, match=r"a\.csv, byte \d: a zero byte; it is in UTF-16: save it as UTF-8"):
+        taxel.open(tmp_path / "a.csv")
+
+
+def test_a_line_with_too_few_cells_is_named_where_columns_are_left_out(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,a,b,who\n0,1,2,me\n1,2,me\n")
+    (tmp_path / "a.layout.toml").write_text('[table]\ntime_column = "time"\nleave_out = ["who"]\n')
+    with pytest.raises(FormatError, match=r"a\.csv, line 3: 3 cells, must have 4"):
+        taxel.open(tmp_path / "a.csv")
 
 
 def test_a_table_of_one_picture_without_a_layout_prints_no_rate(tmp_path: Path) -> None:

@@ -321,6 +321,36 @@ def test_what_cannot_be_opened_is_one_clear_error(given, error, said, tmp_path) 
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.parametrize("ending", [".bag", ".db3", ".mcap"])
+@pytest.mark.parametrize(
+    ("kind", "make", "why"),
+    [
+        (
+            "sensor_msgs/msg/Image",
+            bags.image(np.zeros((2, 6), np.uint8), "rgb8"),
+            "images of encoding rgb8; must have one",
+        ),
+        ("sensor_msgs/msg/CompressedImage", bags.compressed, "a compressed image; record it as sensor_msgs/Image"),
+        ("sensor_msgs/msg/PointCloud2", bags.cloud, "a cloud of points; record its readings as an array"),
+    ],
+)
+def test_images_that_are_not_read_are_listed_and_refused_by_their_topic(
+    tmp_path: Path, ending: str, kind: str, make: bags.Make, why: str
+) -> None:
+    bag = bags.write(tmp_path / f"camera{ending}", [("/camera", kind, 5, 5, make), *palms(1)])
+    (camera,) = (one for one in ros.topics(bag, ros="humble") if one.topic == "/camera")
+    assert camera.trouble.startswith(why)
+    with pytest.raises(FormatError, match=rf"camera\{ending}: topic /camera: {why}"):
+        taxel.open(bag, topic="/camera", ros="humble")
+
+
+def test_a_bag_that_was_cut_off_says_what_makes_it_whole(tmp_path: Path) -> None:
+    bag = bags.write(tmp_path / "grasp.mcap", palms())
+    bag.write_bytes(bag.read_bytes()[:-200])
+    with pytest.raises(FormatError, match=r"grasp\.mcap: .*was cut off; mcap recover makes a whole file of it"):
+        taxel.open(bag, topic="/palm")
+
+
 def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> None:
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "own.mcap")

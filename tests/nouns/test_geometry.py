@@ -40,7 +40,8 @@ def arrays(draw: st.DrawFn) -> Array:
         where = st.lists(st.floats(-1e9, 1e9), min_size=rows * columns, max_size=rows * columns)
         area = draw(st.none() | st.lists(st.floats(1e-9, 1e9), min_size=rows * columns, max_size=rows * columns))
         places = Places(draw(where), draw(where), area, draw(st.none() | st.just("mm")))
-    return Array(rows, columns, pitch, grid, draw(st.text(max_size=8)), places)
+    names = draw(st.none() | st.lists(st.text(max_size=8), min_size=rows * columns, max_size=rows * columns))
+    return Array(rows, columns, pitch, grid, draw(st.text(max_size=8)), places, names)
 
 
 @given(arrays())
@@ -277,6 +278,27 @@ def test_recordings_of_other_pitches_merge_and_the_loss_is_said(tmp_path: Path) 
     whole = taxel.merge(parts)
     assert whole.array == PLATE
     assert [line for line in whole.lost if "pitch" in line] == ["the pitch or places of b.npz (5.08 mm apart)"]
+
+
+def test_names_of_taxels_go_with_them_and_are_never_grounds_to_refuse(tmp_path: Path) -> None:
+    called, other, nameless = Array(2, 2, names=["a", "b", "c", "d"]), Array(2, 2, names="efgh"), Array(2, 2)
+    with pytest.raises(ProblemError, match="names has 3 entries: must be one a taxel, 4"):
+        Array(2, 2, names=["a", "b", "c"])
+    assert called.fits(other)
+    assert called.fits(nameless)
+    frames = {array: Frames(np.ones((4, 2, 2)), np.arange(4), array=array) for array in (called, other, nameless)}
+    for k, array in enumerate((called, other, nameless)):
+        taxel.convert(frames[array], tmp_path / f"{k}.mcap")
+    opened = [taxel.open(tmp_path / f"{k}.mcap") for k in range(3)]
+    assert [one.array.names for one in opened] == [tuple("abcd"), tuple("efgh"), None]
+    assert opened[0].frames().region(slice(1, 2), slice(0, 2)).array.names == ("b", "d")
+    one, beside = taxel.merge(opened, gap_us=1), taxel.merge([opened[0], opened[2]], beside=True)
+    assert one.array.names == tuple("abcd")
+    assert [line for line in one.lost if "names" in line] == ["the names of the taxels of 1.mcap"]
+    assert beside.array.names == ("a", "b", "", "", "c", "d", "", "")
+    lost = taxel.convert(opened[0], tmp_path / "a.csv")
+    assert 'the name of the sensor ("array")' in lost
+    assert "the names of the taxels" in lost
 
 
 def test_a_region_keeps_its_part_of_places_and_both_pitches() -> None:

@@ -101,3 +101,14 @@ def test_a_sensor_is_drawn_as_its_geometry_is_known(name: str, chromium: Any, tm
             until(lambda named=named: page.locator("#taxel-name").inner_text() == named, named)
             page.locator("#tab-view").click()
             page.locator("#flip-x").check()
+
+
+@pytest.mark.parametrize("count", [3, 20])
+def test_channels_are_called_as_the_columns_of_their_table(count: int, chromium: Any, tmp_path: Path) -> None:
+    names = ["Daumen", "Zeigefinger", "", *(f"s{k}" for k in range(3, count))]
+    rows = "".join(f"{k * 20_000}," + ",".join(str(5 * (k > 20)) for _ in names) + "\n" for k in range(60))
+    (tmp_path / "glove.csv").write_text(f"t_us,{','.join(names)}\n{rows}")
+    with shown(chromium, tmp_path / "glove.csv") as page:
+        shows(page, "taxel-name", "^Daumen$")
+        ends = "Daumen\nZeigefinger\n2" if count == 3 else "Daumen\ns19"
+        assert page.locator("#channel-names").all_inner_texts() == [ends]

@@ -247,6 +247,20 @@ def test_info_of_a_folder_takes_each_source_as_a_recording(tmp_path: Path, capsy
     assert list(walk["sources"]) == ["left", "right"]
 
 
+def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    array, quiet = Array(6, 6), np.random.default_rng(4).integers(0, 3, (400, 6, 6)).astype(np.float32)
+    pressed = quiet.copy()
+    pressed[30:80, 1:4, 1:4] += 300
+    sources: dict[str, Contents] = {}
+    for foot, values in (("left", quiet), ("right", pressed)):
+        frames = Frames(values, np.arange(400) * 10_000, array=array)
+        sources[foot] = Contents(tmp_path / "a.asc", f"a {foot}", "pedar", array, label=foot, frames=frames)
+    [both] = joined([taxel.Recording(one) for one in sources.values()])
+    taxel.convert(both, tmp_path / "a.mcap")
+    with pytest.warns(UserWarning, match=r"--tare 0\.5: the beginning of .*a\.mcap right is not quiet but holds"):
+        assert call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")[0] == 0
+
+
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     array = Array(1, 2)
     frames = Frames(np.ones((5, 1, 2)), np.arange(5) * 10_000, unit="N", array=array)

@@ -25,6 +25,9 @@ pub struct Array {
     /// The place of each taxel, of a sensor without even distances.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<Places>,
+    /// The name of each taxel, by index, as a table's columns name them; "" for one without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub names: Option<Vec<String>>,
 }
 
 /// Distance between the centres of neighbours, mm.
@@ -124,7 +127,7 @@ impl Array {
     /// An array whose taxels all exist, of unknown pitch; `check` refuses one without rows or columns.
     #[must_use]
     pub fn unmeasured(rows: u16, columns: u16, name: &str) -> Self {
-        Self { rows, columns, pitch_mm: None, name: name.to_owned(), exists: None, places: None }
+        Self { rows, columns, pitch_mm: None, name: name.to_owned(), exists: None, places: None, names: None }
     }
 
     /// The thesis' array: 64 x 64 taxels, 2.67 mm apart (chapter 4).
@@ -138,7 +141,7 @@ impl Array {
     /// # Errors
     ///
     /// `Problem` if there is no row or no column, if the pitch is not above 0, if there is a pitch beside places, if
-    /// `exists` or places have another length, or if a place is not finite or an area not above 0.
+    /// `exists`, places or names have another length, or if a place is not finite or an area not above 0.
     pub fn check(&self) -> Result<()> {
         let Self { rows, columns, .. } = self;
         if *rows == 0 || *columns == 0 {
@@ -158,6 +161,9 @@ impl Array {
         };
         if let Some(exists) = &self.exists {
             of_each("exists", exists.len())?;
+        }
+        if let Some(names) = &self.names {
+            of_each("names", names.len())?;
         }
         let Some(Places { x, y, area, unit: _ }) = &self.places else { return Ok(()) };
         for (name, values) in [("places.x", Some(x)), ("places.y", Some(y)), ("places.area", area.as_ref())] {
@@ -323,6 +329,17 @@ mod tests {
         assert!(text(&Array { places: Some(flat.clone()), ..array.clone() }).contains("at row 0, column 1 is 0"));
         let exists = Some(vec![true, false]);
         Array { places: Some(flat), exists, ..array }.check().unwrap();
+    }
+
+    #[test]
+    fn names_are_one_a_taxel_and_kept_and_no_ground_to_refuse() {
+        let names = Some(vec!["thumb".to_owned(), String::new()]);
+        let array = Array { names: names.clone(), ..Array::unmeasured(1, 2, "two") };
+        array.check().unwrap();
+        assert_eq!(read(&serde_json::to_string(&array).unwrap()), array);
+        assert!(array.fits(&Array::unmeasured(1, 2, "two")));
+        let long = Array { names, ..Array::unmeasured(1, 3, "three") };
+        assert!(long.check().unwrap_err().to_string().contains("names has 2 entries"));
     }
 
     #[test]

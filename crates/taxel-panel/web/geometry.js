@@ -38,10 +38,16 @@ class Sensor {
     return this.sources.length < 2 ? undefined : this.sources.find(({ left, columns }) => x >= left && x < left + columns);
   }
 
-  /** @param {Taxel} taxel @returns {string} its name: source, row and column within it */
+  /** @param {Taxel} taxel @returns {string} its name: source, and what it is called, or else where it is within that */
   named([x, y]) {
     const source = this.source(x);
-    return `${source ? `${source.name}, ` : ""}row ${y}, column ${x - (source?.left ?? 0)}`;
+    const called = this.array.names?.[y * this.columns + x] || this.numbered([x - (source?.left ?? 0), y]);
+    return `${source ? `${source.name}, ` : ""}${called}`;
+  }
+
+  /** @param {Taxel} taxel within its source @returns {string} row and column */
+  numbered([x, y]) {
+    return `row ${y}, column ${x}`;
   }
 
   /**
@@ -269,10 +275,9 @@ class Channels extends Sensor {
   limits = /** @type {[number, number]} */ ([0, 1]);
   aspect = 6;
 
-  /** @param {Taxel} taxel @returns {string} its name: source, and number within it */
-  named([x, y]) {
-    const source = this.source(x);
-    return `${source ? `${source.name}, ` : ""}channel ${Math.max(x - (source?.left ?? 0), y)}`;
+  /** @param {Taxel} taxel within its source @returns {string} its number */
+  numbered([x, y]) {
+    return `channel ${Math.max(x, y)}`;
   }
 
   /** @returns {number[]} the places of those that exist */

@@ -45,6 +45,8 @@ const OVERVIEW_MS = 2000;
 const LANES = /** @type {const} */ (["raster", "channels", "taxel", "force", "centre"]);
 /** Of so many channels at most each has a curve. */
 const MOST_CHANNELS = 64;
+/** So many names of channels have room beside their curves. */
+const NAMED_CHANNELS = 8;
 
 const settings = new Settings();
 const fragment = new URLSearchParams(location.hash.slice(1));
@@ -193,22 +195,23 @@ function resize(array) {
   lanes.size(maps.geometry);
   cursor.sensor = maps.geometry;
   showSums();
-  if (maps.geometry.kind === "channels") showChannels(maps.geometry.there.length, maps.geometry.sources);
+  if (maps.geometry.kind === "channels") showChannels(maps.geometry);
   write(part("raster-rows", HTMLElement), String(array.rows - 1));
   showLanes();
 }
 
 /**
- * Names the first and the last channel, or the sources that stand one above the other.
- * @param {number} count
- * @param {import("./protocol.js").PictureSource[]} sources
+ * Names the sources that stand one above the other; else the channels, or only the first and the last without names or of many.
+ * @param {{ array: import("./protocol.js").ArrayInfo, there: number[], sources: import("./protocol.js").PictureSource[] }} sensor
  */
-function showChannels(count, sources) {
-  part("channels-block", HTMLElement).style.setProperty("--count", String(count));
+function showChannels({ array, there, sources }) {
+  part("channels-block", HTMLElement).style.setProperty("--count", String(there.length));
   const names = part("channel-names", HTMLElement);
+  const all = array.names !== undefined && there.length <= NAMED_CHANNELS;
+  const shown = (all ? there : [there[0], there[there.length - 1]]).map((k) => array.names?.[k] || String(k));
   const several = sources.length > 1;
-  names.classList.toggle("several", several);
-  names.replaceChildren(...(several ? sources.map(({ name }) => name) : ["0", String(count - 1)]).map((name) => make("span", {}, name)));
+  names.classList.toggle("several", several || all);
+  names.replaceChildren(...(several ? sources.map(({ name }) => name) : shown).map((name) => make("span", { title: name }, name)));
 }
 
 /** @param {ArrayBuffer} buffer */

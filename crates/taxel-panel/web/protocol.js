@@ -9,7 +9,7 @@ export const MISSING = 0xffffffff;
 
 /**
  * @typedef {{ x: number[], y: number[], area?: number[], unit: "mm" | null }} TaxelPlaces
- * @typedef {{ rows: number, columns: number, pitch_mm: number | [number, number] | null, name: string, exists: string | null, places?: TaxelPlaces }} ArrayInfo
+ * @typedef {{ rows: number, columns: number, pitch_mm: number | [number, number] | null, name: string, exists: string | null, places?: TaxelPlaces, names?: string[] }} ArrayInfo
  * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayInfo | null, udp: string | null, control: string | null,
  *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, columns_us: [number, number], time_columns: number,
  *   delta_intensity: boolean | null }} Hello

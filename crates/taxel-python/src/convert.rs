@@ -64,24 +64,26 @@ pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyA
     values.into_pyarray(py)
 }
 
-/// An array's geometry as Python hands it over: rows, columns, pitch in mm (rows, columns), name, which exist, places.
-pub(crate) type ArrayParts = (u16, u16, Option<(f64, f64)>, String, Option<Vec<bool>>, Option<PlacesParts>);
+/// An array's geometry as Python hands it over: rows, columns, pitch in mm (rows, columns), name, which exist, places,
+/// names of the taxels.
+pub(crate) type ArrayParts =
+    (u16, u16, Option<(f64, f64)>, String, Option<Vec<bool>>, Option<PlacesParts>, Option<Vec<String>>);
 
 /// Places by taxel: x, y, areas, whether they are in mm.
 type PlacesParts = (Vec<f64>, Vec<f64>, Option<Vec<f64>>, bool);
 
-pub(crate) fn to_array((rows, columns, pitch_mm, name, exists, places): ArrayParts) -> PyResult<Array> {
+pub(crate) fn to_array((rows, columns, pitch_mm, name, exists, places, names): ArrayParts) -> PyResult<Array> {
     let pitch_mm = pitch_mm.map(|(rows, columns)| Pitch { rows, columns });
     let places = places.map(|(x, y, area, mm)| Places { x, y, area, unit: mm.then_some(PlaceUnit::Mm) });
-    let array = Array { rows, columns, pitch_mm, name, exists, places };
+    let array = Array { rows, columns, pitch_mm, name, exists, places, names };
     array.check().map_err(core)?;
     Ok(array)
 }
 
 pub(crate) fn from_array(array: &Array) -> ArrayParts {
-    let Array { rows, columns, pitch_mm, name, exists, places } = array.clone();
+    let Array { rows, columns, pitch_mm, name, exists, places, names } = array.clone();
     let places = places.map(|Places { x, y, area, unit }| (x, y, area, unit.is_some()));
-    (rows, columns, pitch_mm.map(|pitch| (pitch.rows, pitch.columns)), name, exists, places)
+    (rows, columns, pitch_mm.map(|pitch| (pitch.rows, pitch.columns)), name, exists, places, names)
 }
 
 /// How many rows of columns were filled, whether ticks were, which rows states gave (none where no row is of that kind), and

@@ -94,7 +94,7 @@ def tare_of(value: str | None, recording: Recording) -> Tare | None:
     first, last = int(source.t[0]), int(source.t[-1])
     if seconds * 2e6 > last - first:
         raise ProblemError(
-            f"--tare {value}: more than half of {recording.path}, which lasts {(last - first) / 1e6:g} s; "
+            f"--tare {value}: more than half of {recording.title}, which lasts {(last - first) / 1e6:g} s; "
             "give the seconds at its beginning in which nothing was touched"
         )
     stop = first + int(seconds * 1e6)
@@ -124,7 +124,7 @@ def _warn_of_touch(value: str, recording: Recording, source: Events | Frames, ta
     held = held_by_tare([Example(source, {}, tare)], NOISE_FLOOR)
     if held >= TOUCH:
         warnings.warn(
-            f"--tare {value}: the beginning of {recording.path} is not quiet but holds a touch of {held} taxels; give "
+            f"--tare {value}: the beginning of {recording.title} is not quiet but holds a touch of {held} taxels; give "
             "the seconds before it, or --tare FILE",
             stacklevel=2,
         )

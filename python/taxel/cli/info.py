@@ -245,9 +245,9 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     # The default's name, and that of --array, say nothing more.
     size += "" if re.fullmatch(r"array|\d+x\d+\S*", array.name) else f", {array.name}"
     yield "array", size + (f"; a .{facts['kind']} does not hold it: --array" if facts["array_assumed"] else "")
-    for name in ("side", "heel"):
-        if facts[name]:
-            yield name, facts[name]
+    names = array.names or ()
+    of_it = {"names": ", ".join(names[:8]) + " ..." * (len(names) > 8), "side": facts["side"], "heel": facts["heel"]}
+    yield from ((name, value) for name, value in of_it.items() if value)
     yield from _time(facts)
     if "events" in facts:
         words = f"{facts['intensities']} with intensity, {counted(len(facts['markers']), 'marker')}"

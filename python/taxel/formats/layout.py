@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import finite, flag, mapping, shown, text, whole
+from taxel._base.arguments import finite, flag, mapping, several, shown, text, whole
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
@@ -24,6 +24,8 @@ __all__ = ["Data", "Layout", "Table", "advice", "packaged"]
 
 #: Times of a table in units of these, us.
 UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
+#: The unit of times of a table that are texts.
+ISO = "iso"
 
 
 @dataclass(frozen=True)
@@ -37,10 +39,13 @@ class Table:
     skip_lines : int, 0 or more
         Lines before the names of the columns, or before the numbers if there are no names.
     time_column : str or int, optional
-        The column of times, by its name or its number from 1; default: none. All other columns are taxels.
-    time_unit : {"s", "ms", "us"}
+        The column of times, by its name or its number from 1; default: none.
+    time_unit : {"s", "ms", "us", "iso"}
+        "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day.
     missing : str, optional
         A cell without a value; default: every cell is a number.
+    leave_out : list of str or int
+        The columns that are no taxels, by name or number from 1, which may hold texts. All others are taxels.
 
     Raises
     ------
@@ -52,18 +57,29 @@ class Table:
     time_column: str | int | None = None
     time_unit: str = "s"
     missing: str | None = None
+    leave_out: Sequence[str | int] = ()
 
     def __post_init__(self) -> None:
         if len(text("separator", self.separator)) != 1:
             raise ProblemError(f"separator is {shown(self.separator)}: must be one character")
         whole("skip_lines", self.skip_lines, 0)
-        if isinstance(self.time_column, str):
-            text("time_column", self.time_column)
-        elif self.time_column is not None:
-            whole("time_column", self.time_column, 1)
-        text("time_unit", self.time_unit, UNITS_US)
+        if self.time_column is not None:
+            _column("time_column", self.time_column)
+        if isinstance(self.leave_out, str):
+            raise ProblemError(f"leave_out is {shown(self.leave_out)}: must be a list of columns")
+        for column in several("leave_out", self.leave_out):
+            _column("leave_out", column)
+        text("time_unit", self.time_unit, (*UNITS_US, ISO))
         if self.missing is not None:
             text("missing", self.missing)
+
+
+def _column(name: str, value: object) -> None:
+    """Refuse what is neither the name of a column nor its number from 1."""
+    if isinstance(value, str):
+        text(name, value)
+    else:
+        whole(name, value, 1)
 
 
 @dataclass(frozen=True)
@@ -219,7 +235,7 @@ class Layout:
         taxels : int
             How many taxels the recording holds.
         own : Array, optional
-            The sensor that the recording states, whose name and taxels are kept.
+            The sensor that the recording states, whose name and taxels, with their names, are kept.
         side : {"left", "right", ""}
             The foot of the recording, if it is known.
 
@@ -236,7 +252,7 @@ class Layout:
             places = Places(-places.x, places.y, places.area, places.unit)
         exists = None if own is None or own.exists is None else own.exists.reshape(rows, columns)
         name = f"{rows}x{columns}" if own is None else own.name
-        return Array(rows, columns, self.pitch_mm, exists, name, places)
+        return Array(rows, columns, self.pitch_mm, exists, name, places, None if own is None else own.names)
 
 
 def advice(path: Path, says: str) -> str:

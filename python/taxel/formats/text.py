@@ -72,7 +72,9 @@ def _bytes(path: Path, most: int) -> bytes:
 
 def _lines(path: Path, data: bytes) -> list[str]:
     if b"\0" in data:
-        raise FormatError(f"{path.name}, byte {data.index(0)}: a zero byte; this is not a text file")
+        is_utf_16 = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        why = "it is in UTF-16: save it as UTF-8" if is_utf_16 else "this is not a text file"
+        raise FormatError(f"{path.name}, byte {data.index(0)}: a zero byte; {why}")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

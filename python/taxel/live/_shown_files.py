@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._core import FormatError, ProblemError
-from taxel.array import Array, Places
+from taxel.array import Array, Places, names_beside
 from taxel.frames import Frames
 from taxel.labels import Labels, beside
 from taxel.recording import Recording
@@ -262,7 +262,7 @@ def side_by_side(arrays: list[Array]) -> tuple[Array, list[int]]:
     pitches = {one.pitch_mm for one in arrays}
     name = arrays[0].name if len({one.name for one in arrays}) == 1 else ", ".join(one.name for one in arrays)
     more: dict[str, Any] = {"pitch_mm": pitches.pop()} if len(pitches) == 1 else {}
-    more |= {"places": _places_beside(arrays, lefts, exists)}
+    more |= {"places": _places_beside(arrays, lefts, exists), "names": names_beside(arrays, lefts, exists.shape)}
     return Array(rows, columns - 1, exists=exists, name=name, **more), lefts
 
 

@@ -1,7 +1,7 @@
 """Tables of text: a .csv of events or of pictures.
 
 A .csv has either the columns ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is an absent one), or ``t_us``
-and a column a taxel, named ``x3y5``.
+and a column a taxel, named ``x3y5``, or, of channels, as they are called.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -133,10 +134,12 @@ def _names(path: Path, head: bytes) -> list[str]:
     if columns > COLUMNS:
         raise FormatError(f"{path}, line 1: {columns} columns; at most {COLUMNS} are read")
     try:
-        names = [name.strip() for name in head.decode().split(",")]
+        text = head.decode()
     except UnicodeDecodeError:
-        names = []
-    if not names or names[0] != "t_us" or len(names) < 2:
+        # As in other tables of text.
+        text = head.decode("latin-1")
+    names = [name.strip() for name in text.split(",")]
+    if names[0] != "t_us" or len(names) < 2:
         if {"label", "t_us"} <= set(names):
             raise FormatError(f"{path}, line 1: a table of labels (docs/command-line.md), no recording")
         begin = repr(head[:40].decode("utf-8", "replace"))
@@ -191,7 +194,7 @@ def _csv_events(path: Path, names: list[str], blocks: Iterator[_Block], array: A
 
 
 def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: Array | None) -> Frames:
-    matches = [_TAXEL.fullmatch(name) for name in names[1:]]
+    matches, called = [_TAXEL.fullmatch(name) for name in names[1:]], None
     if all(matches):
         places = [(int(m[1]), int(m[2])) for m in matches if m is not None]
     elif any(matches):
@@ -203,7 +206,7 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
             raise FormatError(
                 f"{path}, line 1: {counted(len(names) - 1, 'column')} for an array of {shape[0]} x {shape[1]} taxels"
             )
-        places = [(k % shape[1], k // shape[1]) for k in range(len(names) - 1)]
+        places, called = [(k % shape[1], k // shape[1]) for k in range(len(names) - 1)], names[1:]
     x, y = np.array(places).T
     rows, columns = (int(y.max()) + 1, int(x.max()) + 1) if array is None else array.shape
     sparse = f"{path}, line 1: {counted(len(places), 'column')} for {rows} x {columns} taxels: most are missing"
@@ -212,12 +215,12 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
             raise FormatError(sparse)
         exists = np.zeros((rows, columns), bool)
         exists[y, x] = True
-        sensor = Array(rows, columns, exists=None if exists.all() else exists)
+        sensor = Array(rows, columns, exists=None if exists.all() else exists, names=called)
     elif x.max() >= columns or y.max() >= rows:
         k = int(np.flatnonzero((x >= columns) | (y >= rows))[0])
         raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {rows} x {columns} taxels")
     else:
-        sensor = array
+        sensor = array if called is None else replace(array, names=called)
     t, values, n = [np.empty(0)], [np.empty((0, rows, columns), np.float32)], 0
     for first, body in blocks:
         table = _numbers(path, names, first, body, np.float64)

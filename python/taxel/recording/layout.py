@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,9 @@ def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
 
 
 def on_array(of: Contents, array: Array) -> Contents:
-    """Return the same recording on another description of its sensor, of as many taxels."""
+    """Return the same recording on another description of its sensor, of as many taxels; their names stay."""
+    if array.names is None and of.array.names is not None:
+        array = replace(array, names=of.array.names)
 
     def events() -> Events | None:
         if of.events is None:
@@ -87,7 +90,7 @@ def _array(of: Contents, layout: Layout) -> Array:
     if min(own.shape) > 1 and array.shape != own.shape:
         raise ProblemError(f"says {array.rows} x {array.columns} taxels; the file says {own.rows} x {own.columns}")
     if not array._is_measured:
-        kept = own if array.shape == own.shape else Array(*array.shape, own.pitch_mm, array.exists, own.name)
+        kept = own if array.shape == own.shape else replace(array, pitch_mm=own.pitch_mm, name=own.name)
         return kept if own.places is None or array.shape == own.shape else array
     along = own.places is not None and of.kind in _ALONG and own.places == _places_along(of)
     if own._is_measured and not along and (own.pitch_mm, own.places) != (array.pitch_mm, array.places):

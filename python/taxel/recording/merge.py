@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import flag, instance, number, several, shown
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.array import Array
+from taxel.array import Array, names_beside
 from taxel.calibration import Calibration
 from taxel.clock import Clock
 from taxel.detections import Detections
@@ -91,6 +91,9 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         f"the pitch or places of {p.name} ({p.array._apart()})"
         for p in parts
         if p.array._is_measured and (p.array.pitch_mm, p.array.places) != (array.pitch_mm, array.places)
+    ]
+    lost += [
+        f"the names of the taxels of {p.name}" for p in parts if not beside and p.array.names not in (None, array.names)
     ]
     has_events = parts[0].has_events
     events = _events([t for t in tables if isinstance(t, Events)], shifts, array, lefts) if has_events else None
@@ -355,7 +358,8 @@ def _side_by_side(tables: Sequence[Events | Frames]) -> tuple[Array, list[int]]:
         exists[: a.rows, left : left + a.columns] = True if a.exists is None else a.exists
     name = " | ".join(dict.fromkeys(a.name for a in arrays))
     pitch = arrays[0].pitch_mm if all(a.pitch_mm == arrays[0].pitch_mm for a in arrays) else None
-    return Array(rows, lefts[-1], pitch, None if exists.all() else exists, name), lefts[:-1]
+    names = names_beside(arrays, lefts, exists.shape)
+    return Array(rows, lefts[-1], pitch, None if exists.all() else exists, name, names=names), lefts[:-1]
 
 
 def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[int]) -> Events:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
-from itertools import islice
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.checks import ascending_us
 from taxel.formats.checks import table as limited
-from taxel.formats.layout import UNITS_US, Data, Layout, Table, as_size
+from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Contents
 from taxel.recording.h5 import is_ours
@@ -32,11 +33,16 @@ from taxel.recording.kinds import is_label_table, is_own_table
 
 __all__ = [
     "ARRAYS",
+    "MISSING",
+    "are_units",
     "arrays_of",
+    "cells",
+    "ends_in_separator",
     "is_foreign",
     "is_lone_array",
     "listed",
     "read_foreign",
+    "seconds_of",
     "shapes_of",
     "time_of",
     "unit_of",
@@ -45,6 +51,11 @@ __all__ = [
 #: The endings of tables of text, also compressed by gzip, and of files of arrays.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
+
+#: A cell that says a unit, as N, [kPa] or (m/s^2).
+_UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
+#: Cells that tables hold where a value is missing.
+MISSING = ("", "nan", "NaN", "NA", "-", "null")
 
 _UNIT = "s|secs?|seconds?|ms|us|µs|ns"
 
@@ -99,27 +110,23 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
         column), an array that is not there
     """
     is_table = path.suffix.lower() not in ARRAYS
-    first, unread = 0, ""
-    if is_table:
-        values, seconds, first = _table(path, layout.table or Table())
-    else:
-        values, seconds, unread = _data(path, layout.data or Data())
-    t = np.arange(len(values)) if seconds is None else ascending_us(path.name, seconds, first)
+    read = _table(path, layout.table or Table()) if is_table else _data(path, layout.data or Data())
+    values, seconds = read.values, read.seconds
+    t = np.arange(len(values)) if seconds is None else ascending_us(path.name, seconds, read.first)
     try:
         taxels = math.prod(values.shape[1:])
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
             what = counted(taxels, "column") if is_table else f"pictures of {' x '.join(map(str, values.shape[1:]))}"
             raise FormatError(f"{path}: {what}; {layout.place} says {layout.rows} x {layout.columns} taxels")
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
-        array = layout.array(taxels, grid or Array(1, taxels, name=path.stem))
+        array = layout.array(taxels, grid or Array(1, taxels, name=path.stem, names=read.names))
         unpacked(str(path), 4 * values.size)
         frames = Frames(frozen(values.astype(np.float32).reshape(-1, *array.shape)), t, array=array)
     except ProblemError as error:
         raise FormatError(f"{layout.place}: {first_line(error)}") from None
     limited(path, frames)
     kind = "table" if is_table else "arrays"
-    lost = (f"other arrays of the file: {unread}",) if unread else ()
-    return Contents(path, path.name, kind, array, frames=frames, untimed=seconds is None, lost=lost)
+    return Contents(path, path.name, kind, array, frames=frames, untimed=seconds is None, lost=read.lost)
 
 
 def time_of(names: Sequence[str]) -> int | None:
@@ -147,13 +154,24 @@ def listed(there: Mapping[str, tuple[int, ...]]) -> str:
     return (", ".join(shown) or "no numbers") + " ..." * (len(there) > 8)
 
 
-def _table(path: Path, how: Table) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, int]:
-    """Return the readings, the times in s, and the number of the first line of numbers."""
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """Hold what a file of another program says: readings, times in s, and the names of the taxels and of the rest."""
+
+    values: NDArray[Any]
+    seconds: NDArray[np.float64] | None
+    #: The number of the first line of numbers.
+    first: int = 0
+    names: Sequence[str] | None = None
+    lost: tuple[str, ...] = ()
+
+
+def _table(path: Path, how: Table) -> _Read:
     first = how.skip_lines + 1
     lines = [line for line in text.lines(path)[how.skip_lines :] if line.strip()]
     if not lines:
         raise FormatError(f"{path.name}, line {first}: no line after {how.skip_lines} skipped ones")
-    names = _cells(lines[0], how)
+    names = cells(lines[0], how.separator)
     if len(names) > COLUMNS:
         raise FormatError(f"{path.name}, line {first}: {len(names)} columns; at most {COLUMNS} are read")
     other = next((mark for mark in ",;\t " if all(mark in line.strip() for line in lines[:2])), None)
@@ -163,10 +181,21 @@ def _table(path: Path, how: Table) -> tuple[NDArray[np.float64], NDArray[np.floa
             "it; say in the layout which it is: [table] separator"
         )
     named = not all(_is_number(cell, how) for cell in names)
+    below = lines[1:] if named else lines
+    # A line of units may stand between names and numbers.
+    in_units = named and len(below) > 1 and are_units(names, cells(below[0], how.separator))
+    below = below[in_units:]
+    if ends_in_separator(names if named else None, below, how.separator):
+        below = [line.rstrip(" ").removesuffix(how.separator) for line in below]
+        names = names[: len(cells(below[0], how.separator))]
     names = names if named else [f"column {k}" for k in range(1, len(names) + 1)]
-    first += named
-    column = _time_column(path, how, names, named)
-    if column is None and (place := time_of(names)) is not None:
+    first += named + in_units
+    column = None if how.time_column is None else _column(path, "time_column", how.time_column, names, named)
+    left = {_column(path, "leave_out", one, names, named) for one in how.leave_out}
+    if column in left:
+        raise FormatError(f"{path.name}: column {shown(names[column or 0])} is time_column, and left out")
+    place = time_of([name if k not in left else "" for k, name in enumerate(names)])
+    if column is None and place is not None:
         time = names[place]
         raise FormatError(
             f"{path.name}, line {first - 1}: column {shown(time)} holds times by its name; say in the layout: [table] "
@@ -174,20 +203,85 @@ def _table(path: Path, how: Table) -> tuple[NDArray[np.float64], NDArray[np.floa
             f"the names: skip_lines = {first - 1}"
         )
     missing = frozenset() if how.missing is None else frozenset({how.missing, "nan"})
-    rows = (_cells(line, how) for line in islice(lines, int(named), None))
-    values = text.numbers(rows, path, first, names, missing, unmarked=how.missing is None)
+    rows = (cells(line, how.separator) for line in below)
+    if column is not None and how.time_unit == ISO:
+        rows = (_with_seconds(row, column, path, line) for line, row in enumerate(rows, first))
+    if left:
+        rows = (_without(row, left, len(names), path, line) for line, row in enumerate(rows, first))
+    kept = [name for k, name in enumerate(names) if k not in left]
+    values = text.numbers(rows, path, first, kept, missing, unmarked=how.missing is None)
+    lost = ", ".join(names[k] or f"column {k + 1}" for k in sorted(left))
+    lines_of_lost = (f"columns that are no taxels: {lost}",) if lost else ()
     if column is None:
-        return values, None, first
-    seconds = values[:, column] * UNITS_US[how.time_unit] / 1e6
+        return _Read(values, None, first, kept if named else None, lines_of_lost)
+    column -= sum(k < column for k in left)
+    seconds = values[:, column] * UNITS_US.get(how.time_unit, UNITS_US["s"]) / 1e6
     if np.isnan(seconds).any():
         line = first + int(np.flatnonzero(np.isnan(seconds))[0])
-        raise FormatError(f"{path.name}, line {line}: {names[column]} is missing; every picture has a time")
-    return np.delete(values, column, axis=1), seconds, first
+        raise FormatError(f"{path.name}, line {line}: {kept[column]} is missing; every picture has a time")
+    values = np.delete(values, column, axis=1)
+    return _Read(values, seconds, first, kept[:column] + kept[column + 1 :] if named else None, lines_of_lost)
 
 
-def _cells(line: str, how: Table) -> list[str]:
-    cells = line.split() if how.separator == " " else line.split(how.separator)
-    return [cell.strip() for cell in cells]
+def cells(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, without blanks and quotes around them; by " " any number of blanks stands between."""
+    parts = line.split() if separator == " " else line.split(separator)
+    return [part.strip().strip("\"'") for part in parts]
+
+
+def are_units(names: Sequence[str], below: Sequence[str]) -> bool:
+    """Return whether the cells below names say units: as many, none of them a number, as [ms] and N.
+
+    Examples
+    --------
+    >>> are_units(["time", "thumb"], ["[ms]", "N"]), are_units(["time", "thumb"], ["2024-05-01", "0.5"])
+    (True, False)
+    """
+    are_texts = any(cell not in MISSING for cell in below) and all(_UNITS.fullmatch(cell) for cell in below)
+    return are_texts and len(below) == len(names)
+
+
+def ends_in_separator(names: Sequence[str] | None, lines: Sequence[str], separator: str) -> bool:
+    """Return whether each line of numbers ends in a separator, after which there is no column."""
+    if separator == " " or not lines or not all(line.rstrip(" ").endswith(separator) for line in lines):
+        return False
+    return names is None or not names[-1] or len(names) < len(cells(lines[0], separator))
+
+
+def seconds_of(cell: str) -> float:
+    """Return the seconds since 1970, or of the day, of a text of ISO 8601; NaN of any other text.
+
+    Examples
+    --------
+    >>> seconds_of("1970-01-02T00:00:00.5"), seconds_of("1970-01-01 01:00:00+01:00"), seconds_of("00:01:00.25")
+    (86400.5, 0.0, 60.25)
+    """
+    for read in (datetime.fromisoformat, lambda cell: datetime.fromisoformat(f"1970-01-01T{cell}")):
+        try:
+            at = read(cell)
+        except ValueError:
+            continue
+        return (at if at.tzinfo else at.replace(tzinfo=UTC)).timestamp()
+    return math.nan
+
+
+def _with_seconds(row: list[str], column: int, path: Path, line: int) -> list[str]:
+    """Return the cells of a line with its time as a number."""
+    if column >= len(row):
+        return row
+    seconds = seconds_of(row[column])
+    if math.isnan(seconds):
+        raise FormatError(
+            f"{path.name}, line {line}: time is {shown(row[column])}; must be as 2024-05-01T10:00:00.25, or 10:00:00.25"
+        )
+    return [*row[:column], repr(seconds), *row[column + 1 :]]
+
+
+def _without(row: list[str], left: Collection[int], columns: int, path: Path, line: int) -> list[str]:
+    """Return the cells of a line but those of columns that are left out."""
+    if len(row) != columns:
+        raise FormatError(f"{path.name}, line {line}: {len(row)} cells, must have {columns}")
+    return [cell for k, cell in enumerate(row) if k not in left]
 
 
 def _is_number(cell: str, how: Table) -> bool:
@@ -198,22 +292,22 @@ def _is_number(cell: str, how: Table) -> bool:
     return True
 
 
-def _time_column(path: Path, how: Table, names: Sequence[str], named: bool) -> int | None:
-    column = how.time_column
-    if column is None:
-        return None
+def _column(path: Path, key: str, column: str | int, names: Sequence[str], named: bool) -> int:
+    """Return the place of a column that a layout names."""
     if isinstance(column, int):
         if column > len(names):
-            raise FormatError(f"{path.name}: {counted(len(names), 'column')}; time_column is {column}")
+            raise FormatError(f"{path.name}: {counted(len(names), 'column')}; {key} is {column}")
         return column - 1
-    if column not in names:
+    # Quotes are no part of a name.
+    name = column.strip("\"'")
+    if name not in names:
         there = ", ".join(names[:8]) + " ..." * (len(names) > 8) if named else "no names, so give its number from 1"
-        raise FormatError(f"{path.name}: no column {shown(column)} of times; there are {there}")
-    return names.index(column)
+        of = " of times" if key == "time_column" else ""
+        raise FormatError(f"{path.name}: no column {shown(name)}{of}; there are {there}")
+    return names.index(name)
 
 
-def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | None, str]:
-    """Return the pictures, the times in s, and the names of the arrays that are not read."""
+def _data(path: Path, how: Data) -> _Read:
     if path.suffix.lower() == ".npy":
         key = next((key for key in ("array", "time") if getattr(how, key) is not None), None)
         if key is not None:
@@ -241,6 +335,7 @@ def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | No
             raise FormatError(f"{path}: holds no array {missing}; there are {listed(every)}{hint}")
         arrays = arrays_of(path, wanted)
     values, unread = arrays[wanted[0]], ", ".join(name for name in there if name not in wanted)
+    lost = (f"other arrays of the file: {unread}",) if unread else ()
     if values.dtype.kind not in "uifb" or values.ndim not in (2, 3) or 0 in values.shape:
         shape = " x ".join(map(str, values.shape))
         raise FormatError(
@@ -257,11 +352,11 @@ def _data(path: Path, how: Data) -> tuple[NDArray[Any], NDArray[np.float64] | No
             "bits, or be NaN where it is missing"
         )
     if len(wanted) == 1:
-        return values, None, unread
+        return _Read(values, None, lost=lost)
     times = arrays[wanted[1]].astype(np.float64)
     if times.shape != values.shape[:1]:
         raise FormatError(f"{path}, {wanted[1]}: {counted(times.size, 'time')} for {counted(len(values), 'picture')}")
-    return values, times * UNITS_US[how.time_unit] / 1e6, unread
+    return _Read(values, times * UNITS_US[how.time_unit] / 1e6, lost=lost)
 
 
 def shapes_of(path: Path) -> dict[str, tuple[int, ...]]:

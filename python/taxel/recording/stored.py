@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +78,9 @@ def _csv(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
     place = common["path"]
     table, events, frames = of.table, None, None
     own = array_in_csv(table)
-    same = of.array._geometry() | {"name": own.name} == own._geometry()
+    same = replace(of.array, name=own.name, names=None) == own
     lost = [f'the name of the sensor ("{of.array.name}")' if same else sensor(of.array)]
+    lost += ["the names of the taxels"] * (of.array.names is not None)
     if isinstance(table, Events):
         lost += [f"{counted(len(table.markers), 'marker')} of start and stop"] * bool(table.markers)
         events = table[:]

@@ -5,23 +5,36 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.archive import stored_names
+from taxel._base.limits import TIME_US
 from taxel._base.messages import counted
 from taxel._core import FormatError
 from taxel.formats import text
-from taxel.formats.layout import UNITS_US, advice
+from taxel.formats.layout import ISO, UNITS_US, advice
 from taxel.recording.kinds import kind_of
-from taxel.recording.read_foreign import ARRAYS, arrays_of, is_foreign, listed, shapes_of, time_of, unit_of
+from taxel.recording.read_foreign import (
+    ARRAYS,
+    MISSING,
+    are_units,
+    arrays_of,
+    cells,
+    ends_in_separator,
+    is_foreign,
+    listed,
+    seconds_of,
+    shapes_of,
+    time_of,
+    unit_of,
+)
 
 __all__ = ["are_spike_trains", "refuse_without_layout"]
 
-#: Cells that tables hold where a value is missing.
-_MISSING = ("", "nan", "NaN", "NA", "-", "null")
 #: A column without a name is one of times if it ascends for so many lines.
 _ASCENDS = 20
 _NO_RATE = "# rate_hz = 100  # pictures a second: the file does not say it, and without it pictures are numbered"
@@ -47,11 +60,13 @@ def refuse_without_layout(path: Path) -> None:
         kind_of(path)  # refuses what is not of the kind that its name says
     if path.suffix.lower() not in ARRAYS:
         lines = text.beginning(path)
-        said = _of_table(lines)
-        if said is None:
+        found = _Found.of(lines, texts=False)
+        if found is None:
             _refuse_decimal_commas(path, lines)
+            found = _Found.of(lines, texts=True)
+        if found is None:
             return
-        holds, lines = said
+        holds, lines = _of_table(found)
         says = "says how to read it"
     else:
         there = shapes_of(path)
@@ -82,46 +97,129 @@ def _of_arrays(path: Path, name: str, there: Mapping[str, tuple[int, ...]]) -> l
     return [*_size(shape), *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
 
 
-def _of_table(lines: Sequence[str]) -> tuple[str, list[str]] | None:
-    """Return what a table holds, and its layout; None of a text that does not end in lines of numbers."""
-    there = [(k, line) for k, line in enumerate(lines) if line.strip()]
-    # The separator that makes most columns of numbers.
-    cells = {mark: [_cells(line, mark) for _, line in there] for mark in (",", ";", "\t", " ")}
-    fits = {mark: len(rows[-1]) for mark, rows in cells.items() if rows and _are_numbers(rows[-1])}
-    if not fits:
-        return None
-    separator = max(fits, key=lambda mark: fits[mark])
-    rows, columns = cells[separator], fits[separator]
-    first = len(rows)
-    while first and len(rows[first - 1]) == columns and _are_numbers(rows[first - 1]):
-        first -= 1
-    named = first > 0 and len(rows[first - 1]) == columns
-    body, skipped = rows[first:], there[first - named][0]
-    table = [f"separator = {_quoted(separator)}"] * (separator != ",") + [f"skip_lines = {skipped}"] * (skipped > 0)
-    names = rows[first - 1] if named else []
-    time = time_of(names)
-    leading = np.array([_number(row[0]) for row in body])
-    if time is not None:
-        column = np.array([_number(row[time]) for row in body])
-        table += [f"time_column = {_quoted(names[time])}", *_unit(names[time], column)]
-    elif not named and columns > 1 and len(body) >= _ASCENDS and (np.diff(leading) > 0).all():
-        time = 0
-        table += ["time_column = 1  # it ascends; leave this out if it is a taxel", *_unit("", leading)]
-    missing = {cell for row in body for cell in row if not math.isfinite(_number(cell))}
+@dataclass(frozen=True)
+class _Found:
+    """Hold the parts of a table: the cells of its names (none), of its units (none) and of its lines of numbers."""
+
+    separator: str
+    skipped: int
+    names: Sequence[str]
+    units: Sequence[str]
+    body: Sequence[Sequence[str]]
+    #: Which columns hold numbers; the others hold texts.
+    numeric: Sequence[bool]
+
+    @classmethod
+    def of(cls, lines: Sequence[str], *, texts: bool) -> _Found | None:
+        """Find the parts; None of a text that does not end in lines of numbers, with `texts` beside texts."""
+        there = [(k, line) for k, line in enumerate(lines) if line.strip()]
+        # The separator that makes most columns of numbers.
+        rows_by = {mark: [cells(line, mark) for _, line in there] for mark in (",", ";", "\t", " ")}
+        fits = {mark: numeric for mark, rows in rows_by.items() if (numeric := _numeric(rows, texts=texts))}
+        if not fits:
+            return None
+        separator = max(fits, key=lambda mark: sum(fits[mark]))
+        rows, numeric = rows_by[separator], fits[separator]
+        first = next(k for k, row in enumerate(rows) if _fits(row, numeric))
+        in_units = first > 1 and are_units(rows[first - 2], rows[first - 1])
+        head = first - 1 - in_units
+        below, columns = [line for _, line in there[first:]], len(numeric)
+        ends = ends_in_separator(None, below, separator)
+        names = rows[head] if head >= 0 and len(rows[head]) in {columns, columns - ends} else []
+        columns -= ends_in_separator(names or None, below, separator)
+        units = rows[first - 1] if names and in_units else []
+        body = [row[:columns] for row in rows[first:] if len(row) >= columns]
+        skipped = there[head if names else first][0]
+        return cls(separator, skipped, names[:columns], units, body, numeric[:columns])
+
+    def numbers(self, column: int) -> NDArray[np.float64]:
+        return np.array([_number(row[column]) for row in self.body])
+
+    def called(self, column: int) -> str:
+        """Return how a layout names a column: by its name, or by its number from 1 without one of its own."""
+        name = self.names[column] if self.names else ""
+        return _quoted(name) if name and list(self.names).count(name) == 1 else str(column + 1)
+
+    def time(self) -> tuple[int | None, list[str]]:
+        """Return which column holds the times, and the lines that say so."""
+        named = time_of(self.names)
+        if named is not None and self.numeric[named]:
+            unit = f"{self.names[named]} {self.units[named].strip('[]()')}" if self.units else self.names[named]
+            unit = unit if unit_of(unit) else self.names[named]
+            return named, [f"time_column = {_quoted(self.names[named])}", *_unit(unit, self.numbers(named))]
+        for column in (k for k, is_numeric in enumerate(self.numeric) if not is_numeric):
+            if all(not math.isnan(seconds_of(row[column])) for row in self.body):
+                return column, [f"time_column = {self.called(column)}", f"time_unit = {_quoted(ISO)}"]
+        if self._ascends and len(self.numeric) > 1:
+            said = ["time_column = 1  # it ascends; leave this out if it is a taxel"]
+            return 0, [*said, *_unit("", self.numbers(0))]
+        return None, []
+
+    @property
+    def _ascends(self) -> bool:
+        """Whether a first column without a name ascends."""
+        unnamed = not self.names or not self.names[0]
+        return unnamed and len(self.body) >= _ASCENDS and bool((np.diff(self.numbers(0)) > 0).all())
+
+    def left_out(self, time: int | None) -> list[int]:
+        """Return which columns are no taxels: those of texts and of other times, and one that numbers the lines."""
+        times = (
+            []
+            if time is None
+            else [k for k, name in enumerate(self.names) if len(name) > 1 and unit_of(name) is not None]
+        )
+        left = [k for k, is_numeric in enumerate(self.numeric) if k != time and (not is_numeric or k in times)]
+        counts = time and self.names and self._ascends and bool((np.diff(self.numbers(0)) == 1).all())
+        return sorted({0, *left}) if counts else left
+
+
+def _of_table(found: _Found) -> tuple[str, list[str]]:
+    """Return what a table holds, and its layout."""
+    time, of_time = found.time()
+    left = found.left_out(time)
+    taxels = [k for k in range(len(found.numeric)) if k not in left and k != time]
+    table = [f"separator = {_quoted(found.separator)}"] * (found.separator != ",")
+    table += [f"skip_lines = {found.skipped}"] * (found.skipped > 0)
+    table += of_time
+    table += [f"leave_out = [{', '.join(map(found.called, left))}]"] * bool(left)
+    missing = {row[k] for row in found.body for k in taxels if row[k] in MISSING}
     table += [f"missing = {_quoted(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
-    size = _size([columns - (time is not None)])
-    holds = f"a table of {counted(columns, 'column')}"
-    return holds, [*size, *([_NO_RATE] if time is None else []), *(["[table]", *table] if table else [])]
+    units = {found.units[k].strip("[]()") for k in taxels} if found.units else set()
+    unit = [f"unit = {_quoted(one)}" for one in units if one and len(units) == 1]
+    rate = [_NO_RATE] if time is None else []
+    holds = f"a table of {counted(len(found.numeric), 'column')}"
+    return holds, [*_size([len(taxels)]), *unit, *rate, *(["[table]", *table] if table else [])]
+
+
+def _numeric(rows: Sequence[Sequence[str]], *, texts: bool) -> list[bool]:
+    """Return which columns hold numbers; none if others hold texts, which `texts` allows."""
+    alike = [row for row in rows if len(row) == len(rows[-1])]
+    numeric = [_holds_numbers(column) for column in zip(*alike, strict=True)]
+    if not rows or not _fits(rows[-1], numeric):
+        return []
+    # A line of prose may hold a number, too.
+    return numeric if all(numeric) or (texts and len(rows) > 1 and _fits(rows[-2], numeric)) else []
+
+
+def _holds_numbers(column: Sequence[str]) -> bool:
+    """Whether a column holds a number, or, below names and units, nothing."""
+    below = column[2:] or column[-1:]
+    return any(math.isfinite(_number(cell)) for cell in column) or all(cell in MISSING for cell in below)
+
+
+def _fits(row: Sequence[str], numeric: Sequence[bool]) -> bool:
+    """Whether a row has as many cells, with numbers where they are."""
+    return len(row) == len(numeric) and _are_numbers([c for c, one in zip(row, numeric, strict=True) if one])
 
 
 def _refuse_decimal_commas(path: Path, lines: Sequence[str]) -> None:
     """Refuse a table with a line that would hold numbers if its commas were decimal points."""
     for number, line in enumerate(lines, 1):
         for mark in (";", "\t", " "):
-            cells = _cells(line, mark)
-            if len(cells) > 1 and _are_numbers([cell.replace(",", ".", 1) for cell in cells]):
-                for k, cell in enumerate(cells, 1):
-                    if cell not in _MISSING:
+            row = cells(line, mark)
+            if len(row) > 1 and _are_numbers([cell.replace(",", ".", 1) for cell in row]):
+                for k, cell in enumerate(row, 1):
+                    if cell not in MISSING:
                         text.number(cell, path, number, f"column {k}")
 
 
@@ -134,23 +232,20 @@ def _size(shape: Sequence[int]) -> list[str]:
 
 
 def _unit(name: str, times: NDArray[np.float64]) -> list[str]:
-    """Return the line that says the unit of times: that in their name, else s, and what rate that makes."""
+    """Return the line that says the unit of times: that in their name, else the largest that fits, and their rate."""
     said = (unit_of(name) or "").replace("µ", "u")
-    unit = said if said in UNITS_US else "s"
+    most = float(np.nanmax(np.abs(times), initial=0.0))
+    unit = said if said in UNITS_US else next((u for u in UNITS_US if most * UNITS_US[u] <= TIME_US), "us")
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} pictures/s"] if step > 0 else []
-    notes += ['or "ms" or "us"'] * (not said)
+    notes += [" ".join(f"or {_quoted(other)}" for other in UNITS_US if other != unit)] * (not said)
     return [f"time_unit = {_quoted(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    return [cell.strip() for cell in (line.split() if separator == " " else line.split(separator))]
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
     """Whether cells are numbers, at least one of them, or marks of missing values."""
     finite = [math.isfinite(_number(cell)) for cell in cells]
-    return any(finite) and all(one or cell in _MISSING for one, cell in zip(finite, cells, strict=True))
+    return any(finite) and all(one or cell in MISSING for one, cell in zip(finite, cells, strict=True))
 
 
 def _number(cell: str) -> float:

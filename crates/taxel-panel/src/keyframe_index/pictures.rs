@@ -539,6 +539,11 @@ impl Pictures for PictureIndex {
                     area: places.area.as_deref().map(of),
                     unit: places.unit,
                 }),
+                names: self
+                    .array
+                    .names
+                    .as_ref()
+                    .map(|names| taxels.iter().map(|&taxel| names[taxel].clone()).collect()),
             }
         };
         self.sources.iter().map(sensor).collect()

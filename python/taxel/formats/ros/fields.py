@@ -14,14 +14,18 @@ from taxel._core import FormatError
 __all__ = ["IMAGE", "grid", "is_empty", "leaves", "values"]
 
 IMAGE = "sensor_msgs/msg/Image"
-#: Types whose numbers are no readings: times, shapes, and the bytes of compressed images and of points.
+#: Messages that hold bytes, not numbers, and how they could be read.
+_BYTES = {
+    "sensor_msgs/msg/CompressedImage": "a compressed image; record it as sensor_msgs/Image with one channel",
+    "sensor_msgs/msg/PointCloud2": "a cloud of points; record its readings as an array or an image",
+}
+#: Types whose numbers are no readings: times, shapes, and bytes.
 _WITHOUT_READINGS = (
     "std_msgs/msg/Header",
     "std_msgs/msg/MultiArrayLayout",
     "builtin_interfaces/msg/Time",
     "builtin_interfaces/msg/Duration",
-    "sensor_msgs/msg/CompressedImage",
-    "sensor_msgs/msg/PointCloud2",
+    *_BYTES,
 )
 #: What one pixel is, by encoding (sensor_msgs/image_encodings), of those with one channel.
 _PIXELS = {
@@ -35,7 +39,13 @@ def leaves(message: Any, path: str = "", *, listed: bool = False) -> Iterator[tu
     """Yield the fields of a message that hold numbers, each with its path; a single number only in a list of messages.
 
     A part of the messages of a list is one field: ``sensors.taxels`` are the taxels of all sensors, in their order.
+
+    Raises
+    ------
+    FormatError : the message is an image that is not read, or holds bytes
     """
+    if not path and _type(message) in _BYTES:
+        raise FormatError(_BYTES[_type(message)])
     if isinstance(message, np.ndarray) or _type(message) == IMAGE:
         yield path, values(message, "")
     elif isinstance(message, list):

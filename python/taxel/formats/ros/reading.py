@@ -126,9 +126,9 @@ class _Held:
 
     def add(self, message: Any, at: int) -> None:
         """Add a message."""
-        if self.field is None and not is_empty(list(leaves(message))):
-            self.field = self._only_field(message)
         try:
+            if self.field is None and not is_empty(list(leaves(message))):
+                self.field = self._only_field(message)
             # Before a first reading there may be no field to choose by; such messages are of another length.
             numbers = np.empty(0) if self.field is None else values(message, self.field)
         except LookupError:
@@ -153,11 +153,9 @@ class _Held:
     def _only_field(self, message: Any) -> str:
         there = [path for path, numbers in leaves(message) if numbers.size > 1]
         if not there:
-            raise FormatError(
-                f"{self.place}: no field with more numbers than one; taxel info lists topics that have one"
-            )
+            raise FormatError("no field with more numbers than one; taxel info lists topics that have one")
         if len(there) != 1:
-            raise FormatError(f"{self.place}: say which field (--field NAME, field=); there are {_there(message)}")
+            raise FormatError(f"say which field (--field NAME, field=); there are {_there(message)}")
         return there[0]
 
     def read(self, kind: str, unread: tuple[str, ...]) -> Read:
