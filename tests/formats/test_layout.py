@@ -142,6 +142,20 @@ def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
     assert taxel.open(tmp_path / "turned" / "kept.npz").frames() == recording.frames()
 
 
+@pytest.mark.parametrize("falls", ["", "falls = true\n", "falls = 300\n"])
+def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls: str) -> None:
+    values = np.random.default_rng(1).integers(0, 3, (400, 6)).astype(float)
+    for k in range(60, 360, 100):
+        values[k : k + 10, 1:3] += 200 if falls else -200
+    rows = np.column_stack([np.arange(400) / 100, values])
+    table(tmp_path, lines(rows), f"{falls}[table]\ntime_column = 1\n")
+    shown = CliRunner().invoke(app, ["info", str(tmp_path / "step.txt")]).stdout
+    of_it = (
+        "as step.layout.toml turns them: leave falls out of it" if falls else "say falls = true in a layout file beside"
+    )
+    assert of_it in shown
+
+
 def test_without_times_pictures_are_numbered(tmp_path: Path) -> None:
     assert table(tmp_path, lines(VALUES), "rows = 2\ncolumns = 3").frames().t.tolist() == [0, 1, 2]
 

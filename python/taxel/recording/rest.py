@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.times import beginning_us
-from taxel.formats.layout import or_given
+from taxel._core import FormatError
+from taxel.formats.layout import Layout, or_given
 from taxel.frames import Frames
 from taxel.tare import Tare
 
@@ -126,6 +128,10 @@ class Rest:
     @staticmethod
     def fall(path: Path | None = None) -> str:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
+        said = None if path is None else Layout.beside(path)
+        with suppress(FormatError, OSError):
+            if said is not None and Layout.read(said).falls is not False:
+                return f"values fall from their rest as {said.name} turns them: leave falls out of it, if that is wrong"
         where = "" if path is None else f" {or_given(path)}"
         return f"values fall from their rest: if less means more pressure, say falls = true in a layout file{where}"
 
