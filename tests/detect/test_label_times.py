@@ -141,7 +141,9 @@ def test_contact_and_lift_are_no_kinds() -> None:
     assert _chance("contact", score(taxel.Detections([], [], []), {"contact": [1000], "lift": [2000]}), None) == ""
 
 
-def test_of_kinds_that_differ_by_place_the_advice_says_what_sees_places(tmp_path, capsys) -> None:
+def test_kinds_that_differ_by_place_are_told_and_of_others_the_advice_says_what_the_inputs_are(
+    tmp_path, capsys
+) -> None:
     random = np.random.default_rng(1)
     begins = 100 + 60 * np.arange(24) + random.integers(0, 20, 24)
     values = random.normal(50.0, 1.0, (1600, 8, 8))
@@ -150,11 +152,19 @@ def test_of_kinds_that_differ_by_place_the_advice_says_what_sees_places(tmp_path
     for begin, at in zip(begins, np.where(left, 1.5, 5.5), strict=True):
         values[begin : begin + 30] += random.uniform(60, 120) * np.exp(-((y - 4) ** 2 + (x - at) ** 2) / 2)
     taxel.convert(taxel.Frames(values, 10_000 * np.arange(1600), array=taxel.Array(8, 8)), tmp_path / "own.npz")
-    rows = [f"{'left' if one else 'right'},{10_000 * t}\n" for t, one in zip(begins, left, strict=True)]
-    (tmp_path / "own.notes.csv").write_text("label,t_us\n" + "".join(rows))
-    code, out, error = call(capsys, "train", tmp_path / "own.npz", "-o", tmp_path / "readout.json")
-    assert code == 0, error
-    (line,) = [one for one in out.splitlines() if one.startswith("left: ") and "what may help is other kinds: " in one]
+
+    def lines(names: tuple[str, str], first: np.ndarray) -> list[str]:
+        rows = [f"{names[0] if one else names[1]},{10_000 * t}\n" for t, one in zip(begins, first, strict=True)]
+        (tmp_path / "own.notes.csv").write_text("label,t_us\n" + "".join(rows))
+        code, out, error = call(capsys, "train", tmp_path / "own.npz", "-o", tmp_path / "readout.json", "--overwrite")
+        assert code == 0, error
+        return out.splitlines()
+
+    told = lines(("left", "right"), left)
+    for name in ("left", "right"):
+        assert any(one.startswith(f"{name}, neuron: 12 of 12 found, 0 missed, 0 false") for one in told), told[:5]
+    told = lines(("wet", "dry"), random.permutation(24) < 12)
+    (line,) = [one for one in told if one.startswith("wet: ") and "what may help is other kinds: " in one]
     assert "the inputs of this recipe are moments of the picture" in line
     assert "--recipe gait_plate, whose inputs are the taxels, may tell them, and taxel information says" in line
     assert "no input tells" not in line

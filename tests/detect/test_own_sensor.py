@@ -475,3 +475,21 @@ def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed
     advice = advised(made, [example], none, none, 1.0)["contact"]
     assert advice.helps == "other labels, or another tare"
     assert advice.because.startswith("nothing was felt of 12 of 12 labels: they are of another recording, or")
+
+
+@pytest.mark.parametrize(("sides", "count"), [((2, 1), 24), ((1, 3), 60)])
+def test_kinds_of_touch_may_be_places_on_the_array(sides: tuple[int, int], count: int) -> None:
+    """Halves of the array, and the middle of three parts of it, whose touches are of all sizes."""
+    random = np.random.default_rng(3)
+    values = random.normal(0, 1, (200 + 100 * count, 12, 12))
+    labels: dict[str, list[int]] = {}
+    for k in range(count):
+        row, column = (int(random.integers(0, side)) * 12 // side for side in sides)
+        at, size = 100 + 100 * k, random.integers(2, 4, 2)
+        values[at : at + 40, row : row + size[0], column : column + size[1]] += random.uniform(100, 400)
+        labels.setdefault(f"{row},{column}", []).append(10_000 * at)
+    frames = Frames(values, np.arange(len(values)) * 10_000, unit="counts")
+    example = Example(frames, labels, Tare.take(frames.between(0, 900_000)))
+    plan = Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example]))
+    judged = judge([example], plan, 3)
+    assert judged.together.missed + judged.together.false <= 2

@@ -196,19 +196,34 @@ def moment_values(pictures, rest, floor, pitch):
     return np.array(values)
 
 
-def sampled_moments(t, values, shown, ages, first):
+def centre_places(pictures, rest, floor):
+    """Column of the centre from -1 to 1, its square, row and that one's square, of each picture."""
+    places = []
+    for picture in pictures.astype(np.float64):
+        above = np.where(counted(picture, rest, floor), picture - rest, 0.0)
+        y, x = ndimage.center_of_mass(above) if above.any() else [(n - 1) / 2 for n in above.shape]
+        x, y = (2 * x / (above.shape[1] - 1) - 1, 2 * y / (above.shape[0] - 1) - 1)
+        places.append([x, x**2, y, y**2])
+    return np.array(places)
+
+
+def sampled_moments(t, values, shown, ages, first, places=None):
     """A spike of each of the moments `shown` at each sample, and one of the largest age (us) that a touch has reached.
 
-    Trains are numbered from `first`; values are rounded to float32.
+    Those of the `places` of the centre, if given, lie between. Trains are numbered from `first`; values are rounded to
+    float32.
     """
     spikes, onset = [], None
-    for time, sample in zip(t, values, strict=True):
+    places = np.zeros((len(values), 0)) if places is None else places
+    for time, sample, place in zip(t, values, places, strict=True):
         onset = None if sample[0] == 0 else time if onset is None else onset
         for n, moment in enumerate(shown):
             value = np.float32(np.sign(sample[moment]) * np.log1p(abs(sample[moment])))
             spikes += [(time, first + n, value)] if value else []
+        for n, of in enumerate(place if onset is not None else []):
+            spikes += [(time, first + len(shown) + n, np.float32(of))] if np.float32(of) else []
         reached = [] if onset is None else [k for k, age in enumerate(ages) if age <= time - onset]
-        spikes += [(time, first + len(shown) + reached[-1], np.float32(1))] if reached else []
+        spikes += [(time, first + len(shown) + len(place) + reached[-1], np.float32(1))] if reached else []
     return spikes
 
 

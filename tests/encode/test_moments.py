@@ -100,9 +100,10 @@ def test_moments_are_those_of_numpy_and_scipy(seed, levels, left_out, floor, ton
     left_out=st.sets(st.sampled_from(sorted(RANGES)), max_size=3),
     tonic=st.sampled_from([None, 300, 7000]),
     graded=st.booleans(),
+    centre=st.booleans(),
     ages=st.lists(st.integers(0, 30_000), max_size=6, unique=True).map(sorted),
 )
-def test_sampled_moments_and_ages_are_those_of_numpy(seed, levels, left_out, tonic, graded, ages):
+def test_sampled_moments_and_ages_are_those_of_numpy(seed, levels, left_out, tonic, graded, centre, ages):
     if not (graded or ages):
         ages = [0]
     rng = np.random.default_rng(seed)
@@ -113,15 +114,17 @@ def test_sampled_moments_and_ages_are_those_of_numpy(seed, levels, left_out, ton
     pictures[rng.random(150) < 0.1] = 40  # touches end and new ones begin
     ranges = {name: None if name in left_out else of for name, of in RANGES.items()}
     options = {"levels": levels, "tonic_ms": None if tonic is None else tonic / 1000, "tare": tare, **ranges}
-    encoder = Moments(graded=graded, ages_ms=[age / 1000 for age in ages] or None, **options)
+    centre = centre and graded
+    encoder = Moments(graded=graded, centre=centre, ages_ms=[age / 1000 for age in ages] or None, **options)
     spikes = encoder.encode(Frames(pictures, t, unit="ticks", array=array))
     assert spikes.kind == encoder.kind == ("graded" if graded else "unsigned")
     every = oracles.moment_levels(levels, **ranges)
     first = len(every) * (2 if tonic is None else 3)
     shown = [n for n, name in enumerate(["area", "total", "peak", *["displacement_mm"] * 2]) if ranges[name] and graded]
-    assert len(spikes) == encoder.trains(array) == first + len(shown) + len(ages)
+    assert len(spikes) == encoder.trains(array) == first + len(shown) + 4 * centre + len(ages)
     values = oracles.moment_values(pictures, tare.rest, 3.0, 2.67)
-    wanted = oracles.sampled_moments(t.tolist(), values, shown, ages, first)
+    places = oracles.centre_places(pictures, tare.rest, 3.0) if centre else None
+    wanted = oracles.sampled_moments(t.tolist(), values, shown, ages, first, places)
     assert [spike for spike in spikes_of(spikes) if spike[1] < first] == oracles.moments(
         t.tolist(), pictures, tare.rest, int(t[-1]), 3.0, 2.67, every, tonic
     )
@@ -262,6 +265,7 @@ def test_it_begins_settled():
         ({"peak": (5,)}, r"peak is \[5\]: must be a list of 2"),
         ({"displacement_mm": (-1, 4)}, r"displacement_mm\[0\] is -1 mm"),
         (dict.fromkeys(RANGES), "all left out"),
+        ({"centre": True}, "centre is given without graded"),
         ({"tonic_ms": 0}, "tonic_ms is 0"),
         ({"period_ms": 0}, "period_ms is 0"),
         ({"noise_floor": -1}, "noise_floor is -1"),

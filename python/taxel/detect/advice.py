@@ -231,9 +231,9 @@ def _advice(
     if chance and any(isinstance(one, Moments) for one in made.recipe.encoder._each()):
         return Advice(
             "other kinds",
-            f"{chance}: the inputs of this recipe are moments of the picture, as area and load, the same wherever it "
-            "is touched; where kinds differ by place, --recipe gait_plate, whose inputs are the taxels, may tell them, "
-            "and taxel information says whether places do; or the labels are too few or mixed up",
+            f"{chance}: the inputs of this recipe are moments of the picture, as area and load, and its centre, which "
+            "is tried where these tell too few; where kinds differ otherwise, --recipe gait_plate, whose inputs are "
+            "the taxels, may tell them, and taxel information says whether they differ; or labels are few or mixed up",
         )
     if search_s is not None and 2 * learnt > wrong and points > 1:
         return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")

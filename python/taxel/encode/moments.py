@@ -23,7 +23,7 @@ class Moments(Tared):
     values above rest (total, peak), and the displacement to the right and downwards of their centre, weighted by these
     values, since the present touch began. A touch begins when area rises above 0 and ends when it is 0; between touches
     all moments are 0. Each level of the displacement applies on both sides of 0. The moments do not depend on the
-    position of the touch on the array, so weights that are learnt at one position apply to others.
+    position of the touch on the array, so weights that are learnt at one position apply to others; `centre` adds it.
 
     Trains are unsigned, one a level in the order area, total, peak, x right, x left, y down, y up, levels ascending:
     first the trains of levels reached, then those of levels left, then (with `tonic_ms`) those that fire while beyond
@@ -32,9 +32,11 @@ class Moments(Tared):
     With `graded` all trains are graded. Those of the levels, whose spikes have the value 1, are followed by one for
     each moment in the order area, total, peak, x, y. During a touch it fires at every sample with the value
     log(1 + moment), of a displacement log(1 + its size) with its sign; where the value is 0 there is no spike. With
-    `ages_ms` the last trains are one an age. During a touch, at every sample, one of them fires: that of the largest of
-    the ages that the touch has reached. Age is counted from the encoder's own onset, the first sample at which area is
-    above 0. A sample is a frame, or of events the state every `period_ms` from the first stamp.
+    `centre` four more follow: the column of the centre, from -1 for the first to 1 for the last, its square, its row
+    and that one's square, as they are. With `ages_ms` the last trains are one an age. During a touch, at every sample,
+    one of them fires: that of the largest of the ages that the touch has reached. Age is counted from the encoder's own
+    onset, the first sample at which area is above 0. A sample is a frame, or of events the state every `period_ms` from
+    the first stamp.
 
     Parameters
     ----------
@@ -53,6 +55,8 @@ class Moments(Tared):
         Adds tonic spikes: one when a level is reached, then one every `tonic_ms` while beyond it. None: crossings only.
     graded : bool
         Whether the moments themselves are encoded too, as graded spikes.
+    centre : bool
+        Whether the place of the centre is encoded too, as graded spikes; needs `graded`.
     ages_ms : float sequence, ms, 0 or more, ascending, optional
         Ages of a touch, each with a train that fires from that age to the next one, the last to the end of the touch.
         Each is rounded to a whole us. A neuron that learns to fire at an age needs an age there: training refuses a
@@ -98,6 +102,7 @@ class Moments(Tared):
     displacement_mm: tuple[float, float] | None = _DEFAULT.displacement_mm
     tonic_ms: float | None = _DEFAULT.tonic_ms
     graded: bool = _DEFAULT.graded
+    centre: bool = _DEFAULT.centre
     ages_ms: Sequence[float] | None = _DEFAULT.ages_ms
     period_ms: float = _DEFAULT.period_ms
     tare: Tare | float | None = _DEFAULT.tare

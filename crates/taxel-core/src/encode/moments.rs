@@ -1,5 +1,5 @@
 //! Area, force, displacement and age of a touch. None of them depends on where the touch began, so what is learnt at one
-//! position holds at others.
+//! position holds at others; its centre, which does, is an option.
 
 use std::collections::VecDeque;
 
@@ -34,6 +34,9 @@ use crate::{Array, Result, Spike, SpikeKind, problem};
 /// order area, total, peak, x, y. During a touch it spikes at every sample (each frame; of events every `period_ms` from
 /// the first stamp) with the value `log(1 + moment)`, of a displacement `log(1 + |moment|)` with its sign; never with 0.
 ///
+/// With `centre` four more follow, with the column of the centre, -1 in the first to 1 in the last, its square, and its
+/// row and that one's square, as they are.
+///
 /// With `ages_ms` the last trains are one per age. During a touch, at every sample, the train of the largest of these
 /// ages that the touch has reached spikes; its age is counted from the sample at which it began.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,6 +61,9 @@ pub struct Moments {
     /// Whether the moments themselves are emitted, as graded spikes.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub graded: bool,
+    /// Whether the place of the centre is emitted too, as graded spikes.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub centre: bool,
     /// The ages of a touch that have a train each, ms, ascending, each rounded to a whole us; `None` for none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ages_ms: Option<Vec<f64>>,
@@ -80,6 +86,7 @@ impl Default for Moments {
             displacement_mm: Some([0.2, 20.0]),
             tonic_ms: Some(0.5),
             graded: false,
+            centre: false,
             ages_ms: None,
             period_ms: super::periods::stamp_period(),
             tare: None,
@@ -131,6 +138,11 @@ impl Moments {
         self.ages_ms.iter().flatten().map(|&age| us(age).round() as i64).collect()
     }
 
+    /// The number of trains of the centre.
+    fn centre_trains(&self) -> usize {
+        if self.centre { CENTRE } else { 0 }
+    }
+
     /// The number of trains of levels.
     fn level_trains(&self) -> usize {
         self.all_levels().len() * if self.tonic_ms.is_some() { 3 } else { 2 }
@@ -139,7 +151,11 @@ impl Moments {
 
 impl Law for Moments {
     fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare").or_nothing("ages_ms").or("graded", false)
+        Described::by(&Self::default(), &[], Self::RANGES)
+            .or_nothing("tare")
+            .or_nothing("ages_ms")
+            .or("graded", false)
+            .or("centre", false)
     }
 
     fn check(&self) -> Result<()> {
@@ -165,6 +181,9 @@ impl Law for Moments {
         if self.levels == 0 && !self.graded && ages.is_empty() {
             return Err(problem!("levels is 0, and neither graded nor ages_ms is given: choose one or more of them"));
         }
+        if self.centre && !self.graded {
+            return Err(problem!("centre is given without graded: its place has graded spikes alone"));
+        }
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
 
@@ -182,6 +201,8 @@ impl Law for Moments {
             levels,
             first_graded: self.level_trains(),
             graded: self.all_graded(),
+            centre: self.centre.then(|| [array.columns, array.rows].map(|places| (places.max(2) - 1) as f64 / 2.0)),
+            place: [0.0; CENTRE],
             ages: self.all_ages(),
             every: self.tonic_ms.map(|every| micros("tonic_ms", every)).transpose()?,
             due: VecDeque::new(),
@@ -192,7 +213,7 @@ impl Law for Moments {
     }
 
     fn trains(&self, _array: &Array) -> usize {
-        self.level_trains() + self.all_graded().len() + self.all_ages().len()
+        self.level_trains() + self.all_graded().len() + self.centre_trains() + self.all_ages().len()
     }
 
     fn kind(&self) -> SpikeKind {
@@ -213,6 +234,9 @@ fn in_equal_ratios(least: f64, most: f64, n: usize) -> Vec<f64> {
     };
     (0..n).map(level).collect()
 }
+
+/// The centre's column, its square, its row and that one's square.
+const CENTRE: usize = 4;
 
 /// A level of one moment; a negative level is crossed downwards.
 #[derive(Clone, Copy)]
@@ -263,6 +287,10 @@ struct Passing {
     first_graded: usize,
     /// The moments that are emitted as graded spikes.
     graded: Vec<usize>,
+    /// Half of the columns and rows, where the centre is emitted; `None` where it is not.
+    centre: Option<[f64; 2]>,
+    /// The place of the centre in the last sample.
+    place: [f64; CENTRE],
     /// The ages that have a train each, us.
     ages: Vec<i64>,
     /// The time at which each level was reached, us; `None` below it.
@@ -290,6 +318,11 @@ impl Passing {
         let (_, origin) = *self.touch.get_or_insert((t, centre));
         let way = |axis: usize| (centre[axis] - origin[axis]) * unit[axis];
         self.moments = [f64::from(self.loaded.area()), total, peak, way(0), way(1)];
+        if let Some(half) = self.centre {
+            let Sums { total, x, y, .. } = self.loaded.sums(held);
+            let [column, row] = [x / total / half[0] - 1.0, y / total / half[1] - 1.0];
+            self.place = [column, column * column, row, row * row];
+        }
     }
 
     /// Whether every sample during a touch causes spikes.
@@ -309,8 +342,12 @@ impl Passing {
             let value = self.moments[moment];
             emit(n, value.abs().ln_1p().copysign(value) as f32);
         }
+        let places = if self.centre.is_some() { &self.place[..] } else { &[] };
+        for (n, &value) in places.iter().enumerate() {
+            emit(self.graded.len() + n, value as f32);
+        }
         if let Some(reached) = self.ages.partition_point(|&age| age <= t - since).checked_sub(1) {
-            emit(self.graded.len() + reached, 1.0);
+            emit(self.graded.len() + places.len() + reached, 1.0);
         }
     }
 
