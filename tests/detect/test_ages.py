@@ -110,9 +110,11 @@ def test_each_delay_has_one_picture(picture_ms: float) -> None:
     assert in_pictures(made, examples, clocks) == made
     period_ms = float(np.median(np.diff(t))) / 1e3
     neuron = made.neurons["small"]
-    delays = [one["delay_ms"] for one in (neuron, *neuron["choose"])]
+    *points, place = neuron, *neuron["choose"]
+    delays = [one["delay_ms"] for one in points]
     assert delays == sorted(set(delays))
-    for part, those in (("moments", delays[:1]), ("later", delays[1:])):
+    assert (place["inputs"], place["delay_ms"]) == (["places"], delays[0])
+    for part, those in (("moments", delays[:1]), ("later", delays[1:]), ("places", delays[:1])):
         ages = made.encoder.parts[part].ages_ms
         for delay_ms in those:
             begin = ages.index(delay_ms)

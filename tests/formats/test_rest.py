@@ -227,14 +227,14 @@ def test_training_on_values_that_fall_says_what_turns_them(tmp_path, capsys) -> 
     taxel.convert(palm(5, -1, 0.4), tmp_path / "palm.npz")
     rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
     (tmp_path / "labels.csv").write_text("label,t_us\n" + "".join(rows))
-    code, _, said = call(
-        capsys, "train", tmp_path / "palm.npz", "--labels", tmp_path / "labels.csv", "-o", tmp_path / "a"
-    )
-    assert code == 2
-    assert "nothing was felt in the recording up to" in said
-    assert "falls = true" in said
-    assert "palm.layout.toml" in said
-    assert "tare" not in said
+    command = ("train", tmp_path / "palm.npz", "--labels", tmp_path / "labels.csv", "-o")
+    for encoder, fails in ((("--encoder", "contact_area"), True), ((), False)):
+        code, _, said = call(capsys, *command, tmp_path / f"{fails}", *encoder)
+        assert code == 2 * fails
+        assert ("nothing was felt in the recording up to" in said) == fails
+        assert "falls = true" in said
+        assert "palm.layout.toml" in said
+        assert "tare" not in said
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.panel.pages import shown, shows, until
+from tests.panel.pages import press, shown, shows, until
 
 import taxel
 from taxel import Array, Frames, Places
@@ -109,6 +109,7 @@ def test_channels_are_called_as_the_columns_of_their_table(count: int, chromium:
     rows = "".join(f"{k * 20_000}," + ",".join(str(5 * (k > 20)) for _ in names) + "\n" for k in range(60))
     (tmp_path / "glove.csv").write_text(f"t_us,{','.join(names)}\n{rows}")
     with shown(chromium, tmp_path / "glove.csv") as page:
+        press(page, "c", *["ArrowLeft"] * count)
         shows(page, "taxel-name", "^Daumen$")
         ends = "Daumen\nZeigefinger\n2" if count == 3 else "Daumen\ns19"
         assert page.locator("#channel-names").all_inner_texts() == [ends]

@@ -169,6 +169,7 @@ def page(*figures):
     return render(
         "report/listening.html.j2",
         title="a page",
+        felt="",
         judged="",
         readout="none",
         labels=["contact"],
@@ -284,6 +285,7 @@ def test_no_table_of_a_report_is_cut(tmp_path, name, width):
     text = render(
         "report/listening.html.j2",
         title="t",
+        felt="",
         readout="r",
         judged="",
         scored=True,

@@ -14,7 +14,14 @@ CLOCK = taxel.Clock(np.array([0, 1000]), np.array([5, 1_000_005]))
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.Array": plain(
-        taxel.Array, rows=4, columns=4, pitch_mm=1.0, exists=np.ones((4, 4)), name="small", places=None
+        taxel.Array,
+        rows=4,
+        columns=4,
+        pitch_mm=1.0,
+        exists=np.ones((4, 4)),
+        name="small",
+        places=None,
+        names=[f"n{k}" for k in range(16)],
     ),
     "taxel.Places": plain(taxel.Places, x=[0.0, 1.0], y=[0.0, 0.0], area=[1.0, 2.0], unit="mm"),
     "taxel.Array.fits": method(ARRAY, "fits", other=taxel.Array(4, 4)),
