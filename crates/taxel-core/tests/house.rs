@@ -45,6 +45,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
         "taxel-panel",
         &[
             &["assets", "centre", "clients", "connections", "limits", "options", "request", "time_columns", "weights"],
+            &["load"],
             &["array_state", "recorder", "taxel_history"],
             &["keyframe_index"],
             &["encoded_spikes"],

@@ -6,7 +6,6 @@
 use std::sync::Arc;
 
 use super::centre::Coordinates;
-use super::keyframe_index::Pictures;
 use super::load::Load;
 use super::time_columns::{COLUMN_US, MISSING, TimeColumns, column_of};
 use super::weights::Weights;
@@ -175,12 +174,20 @@ impl ArrayState {
         state
     }
 
-    /// The state where these pictures are shown: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change
-    /// without a value is a value that is missing from then on, and pictures are counted as events are.
+    /// The state where pictures are shown: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change without
+    /// a value is a value that is missing from then on, and pictures are counted as events are. The sums have a floor of
+    /// steps above rest, and the columns of the array are of these sources.
     #[must_use]
-    pub(crate) fn of_pictures(mut self, from: &Keyframe, pictures: &dyn Pictures) -> Self {
-        (self.pictures, self.sum_floor) = (Some(pictures.rest_source()), pictures.sum_floor());
-        (self.weights, self.source_of) = (pictures.weights().clone(), pictures.source_of());
+    pub(crate) fn of_pictures(
+        mut self,
+        from: &Keyframe,
+        rest: RestSource,
+        sum_floor: u16,
+        weights: &Weights,
+        source_of: Arc<[usize]>,
+    ) -> Self {
+        (self.pictures, self.sum_floor) = (Some(rest), sum_floor);
+        (self.weights, self.source_of) = (weights.clone(), source_of);
         self.loads = vec![Load::default(); self.source_of.last().map_or(0, |last| last + 1)];
         self.time_columns = self.time_columns.with_sources(self.loads.len());
         (self.tracked, self.track_at) = (None, None);

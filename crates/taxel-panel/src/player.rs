@@ -80,7 +80,8 @@ impl Player {
         let bytes = TimeColumns::bytes_for(index.array(), span / unit_us);
         let mut state = ArrayState::new(index.array(), index.noise_floor(), &keyframe, unit_us, bytes);
         if let Some(pictures) = index.pictures() {
-            state = state.of_pictures(&keyframe, &*pictures);
+            let (rest, floor) = (pictures.rest_source(), pictures.sum_floor());
+            state = state.of_pictures(&keyframe, rest, floor, pictures.weights(), pictures.source_of());
         }
         let first_own = keyframe.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
         let history = options.watched.map(|taxel| {
