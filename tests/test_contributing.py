@@ -123,7 +123,7 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
     assert sorted(pieces()) == sorted([*of(FORMAT), *of(STUDY), *of(ENCODER), *of(LEARNER)])
 
 
-@pytest.mark.parametrize("name", [FORMAT, STUDY])
+@pytest.mark.parametrize("name", [FORMAT, pytest.param(STUDY, marks=pytest.mark.slow)])
 def test_what_contributing_says_is_enough(copy: Path, name: str) -> None:
     for piece in of(name):
         add(copy, piece)

@@ -38,6 +38,7 @@ def test_a_ramp_that_adapts_is_near_the_best_fixed_one_in_each_phase(tmp_path):
     assert min(course["ramp"]) < 150 < max(course["ramp"]) == 510
 
 
+@pytest.mark.slow
 def test_an_asynchronous_array_tells_finer_times_of_the_same_touch(tmp_path):
     summary, statements = found(load("asynchronous"), tmp_path)
     costs = summary["costs"]

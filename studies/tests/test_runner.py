@@ -120,7 +120,7 @@ def test_a_file_of_something_else_is_refused(tmp_path):
         Results(tmp_path / "r.jsonl", "code")
 
 
-@pytest.mark.parametrize("backend", ["here", "loky", "dask", "ray"])
+@pytest.mark.parametrize("backend", ["here", "loky", "dask", pytest.param("ray", marks=pytest.mark.slow)])
 def test_what_was_done_before_an_error_is_kept(tmp_path, backend):
     """A realisation that raises ends the run with its own error; the next run begins where it stood."""
     with pytest.raises(ZeroDivisionError):

@@ -22,6 +22,9 @@ from taxel_studies.page import write_page
 
 #: Studies on recordings have tests of their own.
 MADE_HERE = [name for name in STUDIES if not load(name).data]
+#: The longest of toy size, which take half as long as all others together.
+LONGEST = ("touch", "asynchronous", "fig4.8", "drops")
+EACH = [pytest.param(name, marks=pytest.mark.slow if name in LONGEST else ()) for name in MADE_HERE]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +55,7 @@ def ends(arguments: list[str]) -> int:
     return int(end.value.code or 0)
 
 
-@pytest.mark.parametrize("name", MADE_HERE)
+@pytest.mark.parametrize("name", EACH)
 def test_a_study_of_toy_size_gives_its_statements_and_a_picture(report, first_run, name):
     assert load(name).name == name
     section = first_run(name)
@@ -80,7 +83,7 @@ def test_what_the_thesis_says_holds_at_toy_size(first_run, name):
             assert statement["holds"], statement
 
 
-@pytest.mark.parametrize("name", MADE_HERE)
+@pytest.mark.parametrize("name", EACH)
 def test_a_second_run_reckons_nothing_again_and_says_the_same(report, first_run, name):
     first = first_run(name)
     lines = (report / name / "results.jsonl").read_bytes()
@@ -90,7 +93,7 @@ def test_a_second_run_reckons_nothing_again_and_says_the_same(report, first_run,
     assert second["statements"] == first["statements"]
 
 
-@pytest.mark.parametrize("name", MADE_HERE)
+@pytest.mark.parametrize("name", EACH)
 def test_a_realisation_is_a_pure_function_of_parameters_and_seed(report, first_run, name, courses):
     """Here, alone and after other draws, it gives what the whole study gave among the others."""
     study = load(name)

@@ -80,7 +80,11 @@ OPTIONS = ("--topic", "/hand/palm", "--field", "taxels", "--array", "24x32", "--
 @pytest.mark.parametrize(
     ("name", "written", "options", "extra"),
     # Labels by click are a pixel late or early, for which a picture more may count.
-    [("played.mcap", board, (), 0), ("played.npz", mat, (), 1), ("played.bag", palm, OPTIONS, 1)],
+    [
+        ("played.mcap", board, (), 0),
+        ("played.npz", mat, (), 1),
+        pytest.param("played.bag", palm, OPTIONS, 1, marks=pytest.mark.slow),
+    ],
 )
 def test_play_label_train_and_watch_the_new_readout(
     name: str, written: Any, options: tuple[str, ...], extra: int, chromium: Any, tmp_path: Path
