@@ -134,6 +134,8 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
         (("Heel off",), "counts", (16, 16), "gait_plate"),
         (("contact", "lift", "soft", "hard"), "N", (4, 8), "touch"),
         (("heel strike", "toe-off"), "counts", (16, 16), "gait_plate"),
+        (("left foot", "right foot"), "V", (16, 16), "touch"),
+        (("footfall",), "counts", (16, 16), "gait_plate"),
         (("soft", "hard"), "V", (1, 64), "gait_channel"),
         (("soft", "hard"), "counts", (16, 16), "touch"),
         (("contact", "foot_off"), "kPa", (16, 16), "gait_channel"),

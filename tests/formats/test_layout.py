@@ -386,6 +386,41 @@ def test_tables_as_programs_write_them_open_by_the_layout_that_is_printed(
     assert recording.lost == left.get(more, ())
 
 
+@pytest.mark.parametrize(
+    ("head", "time", "names"),
+    [
+        ("Trial 1,,,\ntime,thumb,index\n", "{t}", ("thumb", "index")),
+        ("Date,Time,thumb,index\n", "2024-05-01,10:00:0{t}", ("thumb", "index")),
+        (",,\n", "{t}", None),
+    ],
+)
+def test_titles_and_days_are_neither_names_nor_times(
+    tmp_path: Path, head: str, time: str, names: tuple[str, ...] | None
+) -> None:
+    rows = [f"{time.format(t=k / 50)},{k},{2 * k}\n" for k in range(30)]
+    (tmp_path / "a.csv").write_text(head + "".join(rows))
+    (tmp_path / "a.layout.toml").write_text(layout_said_of(tmp_path / "a.csv"))
+    recording = taxel.open(tmp_path / "a.csv")
+    assert recording.array.names == names
+    assert recording.frames().values[:, 0].tolist() == [[k, 2 * k] for k in range(30)]
+    assert np.diff(recording.frames().t).tolist() == [20_000] * 29
+
+
+@pytest.mark.parametrize(
+    ("text", "layout", "values"),
+    [
+        # A last channel that is dead, and lines that end in a separator.
+        ("1,2,\n3,4,\n", 'rows = 1\ncolumns = 3\n[table]\nmissing = ""', [[1, 2, np.nan], [3, 4, np.nan]]),
+        ("1,2,\n3,4,\n", "rows = 1\ncolumns = 2", [[1, 2], [3, 4]]),
+        ("a,b\n*,*\n1,2\n", '[table]\nmissing = "*"', [[np.nan, np.nan], [1, 2]]),
+        ('a,b\n1,"NA"\n3,4\n', """[table]\nmissing = '"NA"'""", [[1, np.nan], [3, 4]]),
+        ('a,who\n1,"me, then you"\n2,""\n', '[table]\nleave_out = ["who"]', [[1], [2]]),
+    ],
+)
+def test_cells_are_what_the_layout_says_of_them(tmp_path: Path, text: str, layout: str, values: list[Any]) -> None:
+    np.testing.assert_array_equal(table(tmp_path, text, layout).frames().values[:, 0], values)
+
+
 @pytest.mark.parametrize("at", [0, 3, 20])
 @pytest.mark.parametrize("cell", ["inf", "ERR"])
 def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: int, cell: str) -> None:

@@ -342,6 +342,8 @@ def test_images_that_are_not_read_are_listed_and_refused_by_their_topic(
     assert camera.trouble.startswith(why)
     with pytest.raises(FormatError, match=rf"camera\{ending}: topic /camera: {why}"):
         taxel.open(bag, topic="/camera", ros="humble")
+    with pytest.raises(FormatError, match=rf"camera\{ending}: topic /camera, field x: "):
+        taxel.open(bag, topic="/camera", field="x", ros="humble")
 
 
 def test_a_bag_that_was_cut_off_says_what_makes_it_whole(tmp_path: Path) -> None:

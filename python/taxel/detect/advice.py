@@ -199,7 +199,7 @@ def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advic
             f"nothing was felt of {unfelt} of {counted(labels, 'label')}: they are of another recording, or their "
             "times are off by more than 50 ms, each by another time, or they name what the sensor does not feel",
         )
-    if 2 * unfelt > scored.missed + scored.false:
+    if alignment.train is not None and 2 * unfelt > scored.missed + scored.false:
         return Advice(
             "another tare",
             f"nothing was felt of {counted(unfelt, 'label')}, unless their times are off by more than 50 ms, each by "

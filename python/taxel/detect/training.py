@@ -270,7 +270,7 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
     usual = max(_FEWER, _FEWER_SHARE * count)
     for point, stated in zip(points[1:], recipe._fewer_of(label), strict=True):
         fewer = usual if stated is None else stated
-        wrong, fewer = (count, max(1, fewer)) if best is None else (best.wrong, fewer)
+        wrong, fewer = (count, 1) if best is None else (best.wrong, fewer)
         if wrong < fewer:
             continue
         others = []
@@ -383,10 +383,11 @@ class Fitting:
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
         self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
-        learnt = self._sources if self._graded or self.alignment is None else distinct(self._sources)
-        trains = [_until(source, targets) for source, targets in zip(learnt, self._targets, strict=True)]
+        whole = self._until_targets(self._sources)
+        same = self._graded or self.alignment is None
+        trains = whole if same else self._until_targets(distinct(self._sources))
         self._check_felt(trains)
-        silent = self._silent(followed, sources, trains, ages, learner._on_grid())
+        silent = self._silent(followed, sources, whole, ages, learner._on_grid())
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
         report(self._what)
         try:
@@ -394,6 +395,9 @@ class Fitting:
         except ProblemError as error:
             raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
+
+    def _until_targets(self, sources: Sequence[SpikeTrains]) -> list[SpikeTrains]:
+        return [_until(source, targets) for source, targets in zip(sources, self._targets, strict=True)]
 
     def _silent(
         self,

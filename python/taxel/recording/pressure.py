@@ -468,7 +468,7 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     recording = Recording(Contents(Path(), "", "events", events.array, events=events))
     drawn = _Drawn.of(recording)
     # The rest is found from the first event on.
-    from_first = np.union1d(t, events.t.min()) if len(t) else t
+    from_first = np.union1d(t, min(t[0], events.t.min())) if len(t) else t
     drawn = replace(drawn, t=from_first.astype(np.int64))
     return drawn.pictures(_rest_of(recording, drawn, None), events.array)[len(from_first) - len(t) :]
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -110,7 +112,7 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
         column), an array that is not there
     """
     is_table = path.suffix.lower() not in ARRAYS
-    read = _table(path, layout.table or Table()) if is_table else _data(path, layout.data or Data())
+    read = _table(path, layout) if is_table else _data(path, layout.data or Data())
     values, seconds = read.values, read.seconds
     t = np.arange(len(values)) if seconds is None else ascending_us(path.name, seconds, read.first)
     try:
@@ -119,7 +121,9 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
             what = counted(taxels, "column") if is_table else f"pictures of {' x '.join(map(str, values.shape[1:]))}"
             raise FormatError(f"{path}: {what}; {layout.place} says {layout.rows} x {layout.columns} taxels")
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
-        array = layout.array(taxels, grid or Array(1, taxels, name=path.stem, names=read.names))
+        array = layout.array(
+            taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
+        )
         unpacked(str(path), 4 * values.size)
         frames = Frames(frozen(values.astype(np.float32).reshape(-1, *array.shape)), t, array=array)
     except ProblemError as error:
@@ -166,7 +170,8 @@ class _Read:
     lost: tuple[str, ...] = ()
 
 
-def _table(path: Path, how: Table) -> _Read:
+def _table(path: Path, layout: Layout) -> _Read:
+    how = layout.table or Table()
     first = how.skip_lines + 1
     lines = [line for line in text.lines(path)[how.skip_lines :] if line.strip()]
     if not lines:
@@ -180,12 +185,18 @@ def _table(path: Path, how: Table) -> _Read:
             f"{path.name}, line {first}: one column by the separator {shown(how.separator)}, and {shown(other)} within "
             "it; say in the layout which it is: [table] separator"
         )
-    named = not all(_is_number(cell, how) for cell in names)
+    # An empty cell, as at the end of a line that ends in a separator, makes no name of the others.
+    named = not all(_is_number(cell, how) for cell in names if cell) or not any(names)
     below = lines[1:] if named else lines
     # A line of units may stand between names and numbers.
-    in_units = named and len(below) > 1 and are_units(names, cells(below[0], how.separator))
+    units = cells(below[0], how.separator) if named and len(below) > 1 else []
+    in_units = are_units(names, units) and (how.missing is None or _unquoted(how.missing) not in units)
     below = below[in_units:]
-    if ends_in_separator(names if named else None, below, how.separator):
+    # A last column may be empty everywhere, as of a taxel that is dead.
+    taxels = None if layout.rows is None or layout.columns is None else layout.rows * layout.columns
+    others = len(how.leave_out) + (how.time_column is not None)
+    is_whole = bool(below) and taxels is not None and len(cells(below[0], how.separator)) == taxels + others
+    if not is_whole and ends_in_separator(names if named else None, below, how.separator):
         below = [line.rstrip(" ").removesuffix(how.separator) for line in below]
         names = names[: len(cells(below[0], how.separator))]
     names = names if named else [f"column {k}" for k in range(1, len(names) + 1)]
@@ -202,7 +213,7 @@ def _table(path: Path, how: Table) -> _Read:
             f"time_column = {json.dumps(time, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, skip "
             f"the names: skip_lines = {first - 1}"
         )
-    missing = frozenset() if how.missing is None else frozenset({how.missing, "nan"})
+    missing = frozenset() if how.missing is None else frozenset({_unquoted(how.missing), "nan"})
     rows = (cells(line, how.separator) for line in below)
     if column is not None and how.time_unit == ISO:
         rows = (_with_seconds(row, column, path, line) for line, row in enumerate(rows, first))
@@ -226,19 +237,29 @@ def _table(path: Path, how: Table) -> _Read:
 def cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without blanks and quotes around them; by " " any number of blanks stands between."""
     parts = line.split() if separator == " " else line.split(separator)
-    return [part.strip().strip("\"'") for part in parts]
+    if '"' in line and separator != " ":
+        with suppress(csv.Error):
+            parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    return [_unquoted(part.strip()) for part in parts]
+
+
+def _unquoted(cell: str) -> str:
+    return cell.strip("\"'")
 
 
 def are_units(names: Sequence[str], below: Sequence[str]) -> bool:
-    """Return whether the cells below names say units: as many, none of them a number, as [ms] and N.
+    """Return whether the cells below names say units: as many, each of a name, none a number or the name of times.
 
     Examples
     --------
     >>> are_units(["time", "thumb"], ["[ms]", "N"]), are_units(["time", "thumb"], ["2024-05-01", "0.5"])
     (True, False)
+    >>> are_units(["Trial 1", ""], ["time", "thumb"])
+    False
     """
     are_texts = any(cell not in MISSING for cell in below) and all(_UNITS.fullmatch(cell) for cell in below)
-    return are_texts and len(below) == len(names)
+    of_names = len(below) == len(names) and all(name for name, cell in zip(names, below, strict=True) if cell)
+    return are_texts and of_names and time_of(below) is None
 
 
 def ends_in_separator(names: Sequence[str] | None, lines: Sequence[str], separator: str) -> bool:
@@ -288,7 +309,7 @@ def _is_number(cell: str, how: Table) -> bool:
     try:
         float(cell)
     except ValueError:
-        return cell == how.missing
+        return how.missing is not None and cell == _unquoted(how.missing)
     return True
 
 

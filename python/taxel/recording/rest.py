@@ -247,6 +247,8 @@ def found(
         Whether values fall from the rest with pressure.
     corner : (int, int)
         Row and column of the first taxel, for text.
+    stands_for : int64, shape (pictures,), optional
+        How many equal pictures each one is; default 1.
     """
     rest = _core.TrackedRest(columns, NOISE_FLOOR, np.full(taxels, np.nan), falls)
     begin_us = None

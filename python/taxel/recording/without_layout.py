@@ -148,7 +148,8 @@ class _Found:
             unit = unit if unit_of(unit) else self.names[named]
             return named, [f"time_column = {_quoted(self.names[named])}", *_unit(unit, self.numbers(named))]
         for column in (k for k, is_numeric in enumerate(self.numeric) if not is_numeric):
-            if all(not math.isnan(seconds_of(row[column])) for row in self.body):
+            seconds = np.array([seconds_of(row[column]) for row in self.body])
+            if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():
                 return column, [f"time_column = {self.called(column)}", f"time_unit = {_quoted(ISO)}"]
         if self._ascends and len(self.numeric) > 1:
             said = ["time_column = 1  # it ascends; leave this out if it is a taxel"]

@@ -32,7 +32,7 @@ _ANY = "gait_channel"
 #: More channels than these are many.
 _MOST_CHANNELS = 32
 #: A label with one of these words is of a step, which begins and ends otherwise than a touch.
-_OF_STEPS = {"foot", "heel", "toe"}
+_OF_STEPS = {"foot", "footfall", "heel", "toe", "step", "stride"}
 
 
 @cache
@@ -95,6 +95,9 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
         if unit in of:
             return of[unit], f"pictures in {source.unit}"
+    if grids is not None and many and not known:
+        # The levels of `_ANY`, 22 trains a taxel, take minutes.
+        return grids, what
     return _ANY, f"{what} in {source.unit}"
 
 

@@ -138,7 +138,7 @@ def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
         why = first_line(error)
         if "index" in why.lower() and path.suffix == ".bag":
             why = "its index is missing or damaged, as of a recording that was cut off; rosbag reindex makes it anew"
-        elif "magic" in why.lower() and path.suffix != ".bag":
+        elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):
             why = "its end is missing, as of a recording that was cut off; mcap recover makes a whole file of it"
         raise FormatError(f"{path}: cannot be read as a ROS bag: {why}") from None
 

@@ -130,9 +130,7 @@ class _Held:
             if self.field is None and not is_empty(list(leaves(message))):
                 self.field = self._only_field(message)
             # Before a first reading there may be no field to choose by; such messages are of another length.
-            numbers = np.empty(0) if self.field is None else values(message, self.field)
-        except LookupError:
-            raise FormatError(f"{self.place}: no field with numbers; there are {_there(message)}") from None
+            numbers = np.empty(0) if self.field is None else self._numbers(message, self.field)
         except FormatError as error:
             raise FormatError(f"{self.place}: {error}") from None
         if numbers.size and not any(one.size for one in self.values):
@@ -157,6 +155,13 @@ class _Held:
         if len(there) != 1:
             raise FormatError(f"say which field (--field NAME, field=); there are {_there(message)}")
         return there[0]
+
+    @staticmethod
+    def _numbers(message: Any, field: str) -> NDArray[Any]:
+        try:
+            return values(message, field)
+        except LookupError:
+            raise FormatError(f"no field with numbers; there are {_there(message)}") from None
 
     def read(self, kind: str, unread: tuple[str, ...]) -> Read:
         """Return the pictures of the messages."""
