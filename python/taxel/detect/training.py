@@ -250,7 +250,7 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
     `_FEWER_SHARE` of the labels, as some more or less are chance; with 0 it counts if it leaves no more. Where an
     encoder has quantities that labels may follow, a point is tried with each of the `_FOLLOWED` that follow them best.
     A later point that cannot be learnt is left out. If the first felt nothing, which counts as all labels missed, a
-    later one must leave fewer. Warnings are those of the point that counts.
+    later one must leave as many fewer, or none. Warnings are those of the point that counts.
     """
     points = recipe._choices_of(label)
     known: Known = {}
@@ -270,7 +270,7 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
     usual = max(_FEWER, _FEWER_SHARE * count)
     for point, stated in zip(points[1:], recipe._fewer_of(label), strict=True):
         fewer = usual if stated is None else stated
-        wrong, fewer = (count, 1) if best is None else (best.wrong, fewer)
+        wrong, fewer = (count, min(max(1, fewer), count)) if best is None else (best.wrong, fewer)
         if wrong < fewer:
             continue
         others = []
