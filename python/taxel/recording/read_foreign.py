@@ -46,7 +46,7 @@ __all__ = [
     "read_foreign",
     "seconds_of",
     "shapes_of",
-    "time_of",
+    "times_of",
     "unit_of",
 ]
 
@@ -133,10 +133,10 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
     return Contents(path, path.name, kind, array, frames=frames, untimed=seconds is None, lost=read.lost)
 
 
-def time_of(names: Sequence[str]) -> int | None:
-    """Return which column holds times by its name; None of none."""
+def times_of(names: Sequence[str]) -> list[int]:
+    """Return which columns hold times by their names."""
     # A letter may be the name of a taxel too: t is the time only where it comes first.
-    return next((k for k, name in enumerate(names) if unit_of(name) is not None and (k == 0 or len(name) > 1)), None)
+    return [k for k, name in enumerate(names) if unit_of(name) is not None and (k == 0 or len(name) > 1)]
 
 
 def unit_of(name: str) -> str | None:
@@ -205,9 +205,9 @@ def _table(path: Path, layout: Layout) -> _Read:
     left = {_column(path, "leave_out", one, names, named) for one in how.leave_out}
     if column in left:
         raise FormatError(f"{path.name}: column {shown(names[column or 0])} is time_column, and left out")
-    place = time_of([name if k not in left else "" for k, name in enumerate(names)])
-    if column is None and place is not None:
-        time = names[place]
+    times = times_of([name if k not in left else "" for k, name in enumerate(names)])
+    if column is None and times:
+        time = names[times[0]]
         raise FormatError(
             f"{path.name}, line {first - 1}: column {shown(time)} holds times by its name; say in the layout: [table] "
             f"time_column = {json.dumps(time, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, skip "
@@ -259,7 +259,7 @@ def are_units(names: Sequence[str], below: Sequence[str]) -> bool:
     """
     are_texts = any(cell not in MISSING for cell in below) and all(_UNITS.fullmatch(cell) for cell in below)
     of_names = len(below) == len(names) and all(name for name, cell in zip(names, below, strict=True) if cell)
-    return are_texts and of_names and time_of(below) is None
+    return are_texts and of_names and not times_of(below)
 
 
 def ends_in_separator(names: Sequence[str] | None, lines: Sequence[str], separator: str) -> bool:

@@ -29,7 +29,7 @@ from taxel.recording.read_foreign import (
     listed,
     seconds_of,
     shapes_of,
-    time_of,
+    times_of,
     unit_of,
 )
 
@@ -142,7 +142,7 @@ class _Found:
 
     def time(self) -> tuple[int | None, list[str]]:
         """Return which column holds the times, and the lines that say so."""
-        named = time_of(self.names)
+        named = next(iter(times_of(self.names)), None)
         if named is not None and self.numeric[named]:
             unit = f"{self.names[named]} {self.units[named].strip('[]()')}" if self.units else self.names[named]
             unit = unit if unit_of(unit) else self.names[named]
@@ -164,11 +164,7 @@ class _Found:
 
     def left_out(self, time: int | None) -> list[int]:
         """Return which columns are no taxels: those of texts and of other times, and one that numbers the lines."""
-        times = (
-            []
-            if time is None
-            else [k for k, name in enumerate(self.names) if len(name) > 1 and unit_of(name) is not None]
-        )
+        times = [] if time is None else times_of(self.names)
         left = [k for k, is_numeric in enumerate(self.numeric) if k != time and (not is_numeric or k in times)]
         counts = time and self.names and self._ascends and bool((np.diff(self.numbers(0)) == 1).all())
         return sorted({0, *left}) if counts else left
