@@ -309,9 +309,10 @@ class RequestHandler:
     def _training_words(self, recording: Path, out: Path) -> list[str]:
         """Return the words of a training on a recording; paths are from the folder where taxel was started."""
         here = Path.cwd()
-        named, written = (path.relative_to(here) if path.is_relative_to(here) else path for path in (recording, out))
-        options = self._opening.options_of(recording)
-        return ["train", str(named), "--labels", "notes", "-o", str(written), *options]
+        near = (str(path.relative_to(here) if path.is_relative_to(here) else path) for path in (recording, out))
+        # A name that begins with a dash is no option.
+        named, written = (f"./{name}" if name.startswith("-") else name for name in near)
+        return ["train", named, "--labels", "notes", "-o", written, *self._opening.options_of(recording)]
 
     def end_training(self) -> None:
         """End the training that runs, if one does."""
