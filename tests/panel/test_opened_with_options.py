@@ -78,6 +78,11 @@ def test_the_command_that_trains_in_a_shell_has_the_options_and_quotes_what_need
         assert opened(page, shown.name)["train"] == (
             f"taxel train {shown} --labels notes -o {tmp_path / 'elsewhere.readout.json'}"
         )
+    shown.rename(folder / "-grasp.npz")
+    with viewed(folder, folder / "-grasp.npz") as page:
+        assert opened(page, "-grasp.npz")["train"] == (
+            "taxel train ./-grasp.npz --labels notes -o ./-grasp.readout.json"
+        )
 
 
 def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
