@@ -1,0 +1,251 @@
+"""A table or an array without a layout prints the one that reads it, as programs write them."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import FormatError
+
+from .tables import VALUES, lines, table
+
+
+def layout_said_of(place: Path) -> str:
+    """Return the lines of a layout that the refusal of a file prints, checking the sentence before them."""
+    with pytest.raises(FormatError) as caught:
+        taxel.open(place)
+    said, _, lines = str(caught.value).partition("\n")
+    name = f"{place.name.removesuffix('.gz').rpartition('.')[0]}.layout.toml"
+    assert f", not written by taxel; a layout file beside it, {name}, or one given by --layout, says " in said
+    assert said.endswith(" (docs/files.md):")
+    return lines
+
+
+@pytest.mark.parametrize(
+    "rows", [["s;a", "0,00;1;-", "0,02;1,5;2"], ["", "0,00\t1,5", "0,02\t2"], ["t;a", "0,00;1,5", ""]]
+)
+def test_a_table_with_decimal_commas_and_no_layout_says_that_it_has_them(tmp_path, rows):
+    path = tmp_path / "glove.csv"
+    path.write_text("\n".join(["time;thumb", *rows]) + "\n")
+    with pytest.raises(FormatError, match=r"glove.csv, line 3: column 1 has a decimal comma \('0,0\d'\); export with"):
+        taxel.open(path)
+
+
+@pytest.mark.parametrize("flat", [True, False])
+@pytest.mark.parametrize("time", [None, "time_ms", "timestamp"])
+@pytest.mark.parametrize("ending", [".npy", ".npz", ".h5"])
+def test_arrays_without_a_layout_print_the_one_that_reads_them(
+    tmp_path: Path, ending: str, time: str | None, flat: bool
+) -> None:
+    import h5py
+
+    values, place = VALUES if flat else VALUES.reshape(3, 2, 3), tmp_path / f"a{ending}"
+    arrays = {"palm": values} | ({} if time is None or ending == ".npy" else {time: np.array([0, 250, 750])})
+    if ending == ".npy":
+        np.save(place, values)
+    elif ending == ".npz":
+        np.savez(place, **arrays)
+    else:
+        with h5py.File(place, "w") as h5:
+            h5.update({f"run1/{name}": array for name, array in arrays.items()})
+    lines = layout_said_of(place)
+    (tmp_path / "a.layout.toml").write_text(lines)
+    recording = taxel.open(place)
+    np.testing.assert_array_equal(recording.frames().values.reshape(3, 6), VALUES.astype(np.float32))
+    assert recording.array.shape == ((1, 6) if flat else (2, 3))
+    assert recording.timed == (len(arrays) > 1)
+    if recording.timed:
+        assert recording.frames().t.tolist() == [0, 250_000, 750_000] if time == "time_ms" else [0, 250e6, 750e6]
+    else:
+        (tmp_path / "a.layout.toml").write_text(lines.replace("# rate_hz = 100", "rate_hz = 10"))
+        assert taxel.open(place).frames().t.tolist() == [0, 100_000, 200_000]
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+@pytest.mark.parametrize("mark", ["6.5", "", "NaN", "NA", "nan"])
+@pytest.mark.parametrize("head", ["", "of a hand\n\n"])
+@pytest.mark.parametrize("time", ["", "time (ms)", "t_s", "first"])
+@pytest.mark.parametrize("ending", [".csv", ".txt", ".dat.gz"])
+def test_tables_without_a_layout_print_the_one_that_reads_them(
+    tmp_path: Path, separator: str, mark: str, head: str, time: str, ending: str
+) -> None:
+    if separator == " " and (not mark or " " in time):
+        pytest.skip("cells by blanks are never empty, nor have they blanks")
+    values = np.tile(VALUES, (7, 1))
+    t = np.cumsum(np.arange(len(values)))
+    cells = [[f"{cell:g}".replace("6.5", mark) for cell in row] for row in values]
+    if time:
+        cells = [[str(one), *row] for one, row in zip(t, cells, strict=True)]
+    if time not in ("", "first"):
+        cells = [[time, *"abcdef"], *cells]
+    text, place = head + "".join(separator.join(row) + "\n" for row in cells), tmp_path / f"a{ending}"
+    place.write_bytes(gzip.compress(text.encode()) if ending.endswith(".gz") else text.encode())
+    (tmp_path / "a.layout.toml").write_text(layout_said_of(place))
+    recording = taxel.open(place)
+    expected = np.where((values == 6.5) & (mark != "6.5"), np.nan, values)
+    np.testing.assert_array_equal(recording.frames().values[:, 0], expected.astype(np.float32))
+    assert recording.timed == bool(time)
+    expected_us = t * {"": 0, "time (ms)": 1e3}.get(time, 1e6) if time else np.arange(len(t))
+    assert recording.frames().t.tolist() == expected_us.tolist()
+
+
+TIMES = {
+    "time (ms)": lambda t: f"{1000 * t:.0f}",
+    "timestamp": lambda t: f"{1_714_557_600_000 + 1000 * t:.0f}",
+    "time": lambda t: f"2024-05-01T10:00:{t:09.6f}",
+    "date and time": lambda t: f"2024-05-01 12:00:{t:06.3f}+02:00",
+    "clock": lambda t: f"00:00:{t:06.3f}",
+}
+
+
+@pytest.mark.parametrize("time", TIMES)
+@pytest.mark.parametrize("units", [None, "[N]", "kPa"])
+@pytest.mark.parametrize("ending", ["", ",", "rows"])
+@pytest.mark.parametrize("more", ["", "index", "texts"])
+@pytest.mark.parametrize("quoted", [False, True])
+def test_tables_as_programs_write_them_open_by_the_layout_that_is_printed(
+    tmp_path: Path, time: str, units: str | None, ending: str, more: str, quoted: bool
+) -> None:
+    values = np.tile(VALUES, (8, 1))
+    t = np.arange(len(values)) / 50
+    names, unit = [time, *"abcdef"], ["[ms]" if time == "timestamp" else "", *[str(units)] * 6]
+    rows = [[TIMES[time](at), *map(str, row)] for at, row in zip(t, values, strict=True)]
+    if more == "index":
+        names, unit = ["", *names], ["", *unit]
+        rows = [[str(k), *row] for k, row in enumerate(rows)]
+    elif more == "texts":
+        names, unit = [*names, "who", "note"], [*unit, "", ""]
+        rows = [[*row, "left", "" if k % 3 else "a touch"] for k, row in enumerate(rows)]
+    lines_of = [names, *([unit] if units is not None else []), *rows]
+    if quoted:
+        lines_of = [[f'"{cell}"' for cell in row] for row in lines_of]
+    texts = [",".join(row) for row in lines_of]
+    first = len(texts) - len(rows)
+    texts = [line + "," * (ending == "," or (ending == "rows" and k >= first)) for k, line in enumerate(texts)]
+    (tmp_path / "a.csv").write_text("\n".join(texts) + "\n")
+    said = layout_said_of(tmp_path / "a.csv")
+    (tmp_path / "a.layout.toml").write_text(said)
+    recording = taxel.open(tmp_path / "a.csv")
+    frames = recording.frames()
+    np.testing.assert_array_equal(frames.values[:, 0], values.astype(np.float32))
+    assert recording.array.names == tuple("abcdef")
+    begin = {"time (ms)": 0, "clock": 0}.get(time, 1_714_557_600_000_000)
+    np.testing.assert_allclose(frames.t - begin, t * 1e6, atol=1)
+    assert frames.unit == ("counts" if units is None else units.strip("[]"))
+    left = {"index": ("columns that are no taxels: column 1",), "texts": ("columns that are no taxels: who, note",)}
+    assert recording.lost == left.get(more, ())
+
+
+@pytest.mark.parametrize(
+    ("head", "time", "names"),
+    [
+        ("Trial 1,,,\ntime,thumb,index\n", "{t}", ("thumb", "index")),
+        ("Date,Time,thumb,index\n", "2024-05-01,10:00:0{t}", ("thumb", "index")),
+        (",,\n", "{t}", None),
+    ],
+)
+def test_titles_and_days_are_neither_names_nor_times(
+    tmp_path: Path, head: str, time: str, names: tuple[str, ...] | None
+) -> None:
+    rows = [f"{time.format(t=k / 50)},{k},{2 * k}\n" for k in range(30)]
+    (tmp_path / "a.csv").write_text(head + "".join(rows))
+    (tmp_path / "a.layout.toml").write_text(layout_said_of(tmp_path / "a.csv"))
+    recording = taxel.open(tmp_path / "a.csv")
+    assert recording.array.names == names
+    assert recording.frames().values[:, 0].tolist() == [[k, 2 * k] for k in range(30)]
+    assert np.diff(recording.frames().t).tolist() == [20_000] * 29
+
+
+@pytest.mark.parametrize(
+    ("text", "layout", "values"),
+    [
+        # A last channel that is dead, and lines that end in a separator.
+        ("1,2,\n3,4,\n", 'rows = 1\ncolumns = 3\n[table]\nmissing = ""', [[1, 2, np.nan], [3, 4, np.nan]]),
+        ("1,2,\n3,4,\n", "rows = 1\ncolumns = 2", [[1, 2], [3, 4]]),
+        ("a,b\n*,*\n1,2\n", '[table]\nmissing = "*"', [[np.nan, np.nan], [1, 2]]),
+        ('a,b\n1,"NA"\n3,4\n', """[table]\nmissing = '"NA"'""", [[1, np.nan], [3, 4]]),
+        ('a,who\n1,"me, then you"\n2,""\n', '[table]\nleave_out = ["who"]', [[1], [2]]),
+    ],
+)
+def test_cells_are_what_the_layout_says_of_them(tmp_path: Path, text: str, layout: str, values: list[Any]) -> None:
+    np.testing.assert_array_equal(table(tmp_path, text, layout).frames().values[:, 0], values)
+
+
+@pytest.mark.parametrize("at", [0, 3, 20])
+@pytest.mark.parametrize("cell", ["inf", "ERR"])
+def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: int, cell: str) -> None:
+    rows = [[f"{k / 50}", *"123"] for k in range(30)]
+    rows[at + 2][2] = cell
+    (tmp_path / "a.csv").write_text("time,a,b,c\n" + "".join(",".join(row) + "\n" for row in rows))
+    said = layout_said_of(tmp_path / "a.csv")
+    assert "skip_lines" not in said
+    (tmp_path / "a.layout.toml").write_text(said)
+    with pytest.raises(FormatError, match=rf"a\.csv, line {at + 4}: b is '{cell}'.*missing = '{cell}'"):
+        taxel.open(tmp_path / "a.csv")
+    (tmp_path / "a.layout.toml").write_text(f'{said}\nmissing = "{cell}"')
+    assert taxel.open(tmp_path / "a.csv").frames().missing == 1
+
+
+@pytest.mark.parametrize(
+    ("layout", "match"),
+    [
+        ('leave_out = ["x"]', r"a\.csv: no column 'x'; there are time, a, who"),
+        ("leave_out = [4]", r"a\.csv: 3 columns; leave_out is 4"),
+        ("leave_out = [0]", "leave_out is 0: must be a whole number from 1"),
+        ('leave_out = "who"', "leave_out is 'who': must be a list of columns"),
+        ('leave_out = ["time", "who"]\ntime_column = "time"', "column 'time' is time_column, and left out"),
+        (
+            'leave_out = ["who"]\ntime_column = "time"\ntime_unit = "iso"',
+            r"line 3: time is 'noon'; must be as 2024-05-01T",
+        ),
+        ('leave_out = ["who"]', r"column 'time' holds times by its name"),
+        ('leave_out = ["time", "a"]', "line 2: who is 'me', not a number"),
+    ],
+)
+def test_columns_and_times_that_do_not_fit_their_table_are_refused(tmp_path: Path, layout: str, match: str) -> None:
+    (tmp_path / "a.csv").write_text("time,a,who\n10:00,1,me\nnoon,2,me\n")
+    (tmp_path / "a.layout.toml").write_text(f"[table]\n{layout}\n")
+    with pytest.raises(FormatError, match=match):
+        taxel.open(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("code", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_table_in_utf_16_says_how_to_save_it(tmp_path: Path, code: str) -> None:
+    begin = "" if code == "utf-16" else "\ufeff"
+    (tmp_path / "a.csv").write_bytes(f"{begin}time,a\n0,1\n".encode(code))
+    with pytest.raises(FormatError, match=r"a\.csv, byte \d: a zero byte; it is in UTF-16: save it as UTF-8"):
+        taxel.open(tmp_path / "a.csv")
+
+
+def test_a_line_with_too_few_cells_is_named_where_columns_are_left_out(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,a,b,who\n0,1,2,me\n1,2,me\n")
+    (tmp_path / "a.layout.toml").write_text('[table]\ntime_column = "time"\nleave_out = ["who"]\n')
+    with pytest.raises(FormatError, match=r"a\.csv, line 3: 3 cells, must have 4"):
+        taxel.open(tmp_path / "a.csv")
+
+
+def test_a_table_of_one_picture_without_a_layout_prints_no_rate(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,x,y\n1,2,3\n")
+    said = layout_said_of(tmp_path / "a.csv")
+    assert "pictures/s" not in said
+    (tmp_path / "a.layout.toml").write_text(said)
+    frames = taxel.open(tmp_path / "a.csv").frames()
+    assert (frames.values.tolist(), frames.t.tolist()) == ([[[2.0, 3.0]]], [1_000_000])
+
+
+def test_a_folder_of_tables_without_a_layout_says_the_same(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(lines(VALUES))
+    (tmp_path / "read me.txt").write_text("of a hand")
+    with pytest.raises(FormatError, match=r"a\.csv: holds a table of 6 columns, .*\nrows = 1\ncolumns = 6"):
+        taxel.open(tmp_path)
+
+
+def test_a_text_without_numbers_prints_no_layout(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("of a hand\n")
+    with pytest.raises(FormatError, match=r"no recording; there are .* \(docs/files\.md\)$"):
+        taxel.open(tmp_path / "a.txt")
