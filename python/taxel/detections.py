@@ -20,6 +20,7 @@ from taxel._base.columns import Columns, frozen, own, own_column
 from taxel._base.drawing import draw
 from taxel._base.files import write_whole
 from taxel._base.header_table import HeaderTable, text_of
+from taxel._base.number_text import float_of, int_of
 from taxel._core import FormatError, ProblemError
 
 if TYPE_CHECKING:
@@ -348,9 +349,9 @@ class Detections(Columns):
         rows: list[tuple[str, int, int, float]] = []
         for line, row in table.rows:
             try:
-                rows.append((row[0], int(row[1]), int(row[2]), float(row[3])))
+                rows.append((row[0], int_of(row[1]), int_of(row[2]), float_of(row[3])))
                 for name, value in zip(more, row[4:], strict=True):
-                    more[name].append(int(value))
+                    more[name].append(int_of(value))
             except ValueError as error:
                 raise FormatError(f"{place}, line {line}: {error}") from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())

@@ -176,7 +176,7 @@ class Cable:
 
     def _open(self) -> None:
         self._waiting, place, baud = b"", self.place, self.baud
-        server = re.fullmatch(r"\[?(.+?)\]?:(\d{1,5})", place)
+        server = re.fullmatch(r"\[?(.+?)\]?:([0-9]{1,5})", place)
         if place.startswith("/"):
             self._file = os.open(place, os.O_RDWR | os.O_NOCTTY)
             try:

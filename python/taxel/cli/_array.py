@@ -17,7 +17,7 @@ def geometry(size: str, *, of_wire: bool = True) -> Array:
     """Return the array of a size, rows x columns [x mm]; without mm, the pitch of the board's wire or none."""
     from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
 
-    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", size)
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", size, re.ASCII)
     if match is None:
         raise ProblemError(f"--array {size}: must be rows x columns, as 64x64, or with the pitch in mm, as 64x64x2.67")
     thesis = Array.thesis()

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -125,7 +126,7 @@ def rest_of(value: str | None) -> Tare | float | None:
     if value is None:
         return None
     try:
-        seconds = float(value)
+        seconds = float_of(value)
     except ValueError:
         return Tare.load(value)
     if not 1e-6 <= seconds <= 3600:

@@ -17,6 +17,7 @@ import numpy as np
 import typer
 
 from taxel._base.messages import counted
+from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.spikes import to_ms
@@ -133,7 +134,7 @@ def _warn_of_touch(value: str, recording: Recording, source: Events | Frames, ta
 def _seconds(value: str) -> float | None:
     """Return the seconds that ``--tare`` says; None of a file."""
     try:
-        return float(value)
+        return float_of(value)
     except ValueError:
         return None
 

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from taxel._base.messages import counted
+from taxel._base.number_text import float_of
 from taxel._core import ProblemError
 from taxel.cli._app import App, SecondsOption, app
 from taxel.device import Device, ports
@@ -160,7 +161,7 @@ def _field(assignment: str) -> tuple[str, float]:
     """Return name and value of NAME=VALUE."""
     name, equals, value = assignment.partition("=")
     try:
-        number = float(value)
+        number = float_of(value)
     except ValueError:
         number = {"true": 1.0, "false": 0.0}.get(value, math.nan)
     if not equals or math.isnan(number):

@@ -19,6 +19,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taxel._base.files import try_whole
 from taxel._base.messages import counted
+from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._app import app, with_typed
@@ -311,7 +312,7 @@ def _pairs(option: str, assignments: Iterable[str]) -> dict[str, str]:
 def _number(option: str, name: str, value: str) -> float:
     """Return a number as it was typed: 2 is no 2.0 in an error."""
     try:
-        number = float(value)
+        number = float_of(value)
     except ValueError:
         raise ProblemError(f"--{option} {name}={value}: must be a number") from None
     return int(number) if number.is_integer() else number

@@ -10,6 +10,7 @@ import typer
 
 from taxel._base.arguments import whole
 from taxel._base.messages import counted
+from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._bar import bar, duration
@@ -266,7 +267,7 @@ def _numbers(option: str, text: str | None) -> list[float] | None:
     if text is None:
         return None
     try:
-        return [float(cell) for cell in text.split(",")]
+        return [float_of(cell) for cell in text.split(",")]
     except ValueError:
         raise ProblemError(f"{option} {text}: must be numbers, as 1,2,5") from None
 
@@ -275,6 +276,6 @@ def _whole(option: str, text: str | None) -> list[int] | None:
     if text is None:
         return None
     try:
-        return [int(cell) for cell in text.split(",")]
+        return [int_of(cell) for cell in text.split(",")]
     except ValueError:
         raise ProblemError(f"{option} {text}: must be whole numbers, as 10,30") from None

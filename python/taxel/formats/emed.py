@@ -31,11 +31,11 @@ __all__ = ["files", "trials"]
 _MARGIN = "Force"
 _NUMBER = r"(\d{1,9}(?:\.\d{1,9})?)"
 _HEAD = {
-    "matrix": re.compile(r"Matrix:\s*(\d{1,5})\s*x\s*(\d{1,5})"),
-    "size": re.compile(rf"Sensor size:\s*{_NUMBER}\s*x\s*{_NUMBER}\s*cm"),
-    "period": re.compile(rf"Time/picture:\s*{_NUMBER}\s*ms"),
+    "matrix": re.compile(r"Matrix:\s*(\d{1,5})\s*x\s*(\d{1,5})", re.ASCII),
+    "size": re.compile(rf"Sensor size:\s*{_NUMBER}\s*x\s*{_NUMBER}\s*cm", re.ASCII),
+    "period": re.compile(rf"Time/picture:\s*{_NUMBER}\s*ms", re.ASCII),
 }
-_PICTURE = re.compile(r"Pict-No\.:\s*(\d{1,9})\b")
+_PICTURE = re.compile(r"Pict-No\.:\s*(\d{1,9})\b", re.ASCII)
 #: The force in N of a cell of value 1 and area 1 cm2, by the unit of the cells.
 _NEWTON = {"kPa": 0.1, "N/cm2": 1.0}
 

@@ -73,7 +73,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
         person = file.stem
         with H5File(file) as h5:
             for name in sorted(h5.entries):
-                match = re.fullmatch(r"img(\d+)", name)
+                match = re.fullmatch(r"img([0-9]{1,18})", name)
                 if match is None:
                     raise FormatError(f"{file.name}: data set {name!r}; must be named imgNNN")
                 number, image = int(match[1]), _image(h5, name, file)

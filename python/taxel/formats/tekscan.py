@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from taxel._base import arguments
 from taxel._base.limits import TIME_US, VALUE, unpacked
+from taxel._base.number_text import refuse_digits
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
@@ -35,7 +36,7 @@ _LENGTHS_MM = {
 #: Tekscan's names of units, and ours; any other name is not changed.
 _UNITS = {"kpa": "kPa", "raw": "counts"}
 _KEY = re.compile(r"([A-Z][A-Z0-9_]*)[ \t]+(\S.*?)\s*")
-_FRAME = re.compile(r"Frame\s+(\d+)\s*(?:,\s*([^,\s]*)\s*,.*?)?")
+_FRAME = re.compile(r"Frame\s+(\d+)\s*(?:,\s*([^,\s]*)\s*,.*?)?", re.ASCII)
 _RAW_SUM = re.compile(r"Raw Sum=\s*,*\s*([^,\s]+)")
 
 
@@ -264,7 +265,9 @@ def _cells(file: Path, lines: Sequence[str], first_line: int, columns: int) -> N
 def _numbers(file: Path, cells: NDArray[np.str_], there: NDArray[np.bool_], first_line: int) -> NDArray[np.float64]:
     """Return the numbers of the cells that exist."""
     try:
-        values = cells[there].astype(np.float64)
+        found = cells[there]
+        refuse_digits(["".join(found.tolist())])
+        values = found.astype(np.float64)
         if (np.abs(values) <= VALUE).all():
             return values
     except ValueError:

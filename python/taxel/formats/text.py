@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import shown
 from taxel._base.header_table import HeaderTable
 from taxel._base.limits import TEXT, VALUE
+from taxel._base.number_text import float_of, refuse_digits
 from taxel._core import FormatError
 
 __all__ = ["beginning", "head", "lines", "number", "numbers", "table"]
@@ -23,7 +24,7 @@ __all__ = ["beginning", "head", "lines", "number", "numbers", "table"]
 _AT_ONCE = 4096
 #: Bytes of the beginning of a text.
 _BEGINNING = 1 << 16
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 
 
 def lines(path: Path) -> list[str]:
@@ -95,7 +96,7 @@ def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = Fals
     text = cell.strip()
     remedy = f"; if it marks a missing value, say in a layout file: [table] missing = {shown(text)}" if unmarked else ""
     try:
-        value = float(text)
+        value = float_of(text)
     except ValueError:
         if _DECIMAL_COMMA.fullmatch(text):
             problem = f"has a decimal comma ({shown(text)}); export with decimal points"
@@ -104,7 +105,7 @@ def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = Fals
             problem += remedy
         raise FormatError(f"{path.name}, line {line}: {what} {problem}") from None
     # Values of pictures have 32 bits.
-    if not abs(value) <= VALUE or "_" in text:
+    if not abs(value) <= VALUE:
         raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number{remedy}")
     return value
 
@@ -150,6 +151,7 @@ def _block(
     if missing:
         rows = [["0" if cell in missing else cell for cell in row] for row in rows]
     try:
+        refuse_digits("".join(row) for row in rows)
         values = np.array(rows, dtype=np.float64).reshape(len(rows), columns)
         sound = bool((np.abs(values) <= VALUE).all())
     except ValueError:

@@ -234,7 +234,7 @@ def _where(to: object) -> dict[str, Any]:
     kind = KINDS.get(what)
     if kind is not None and not colon:
         return {"what": what, "host": "127.0.0.1", "port": kind.port}
-    plain = None if kind is None else re.fullmatch(r"(.+):(\d{1,5})" if kind.has_host else r"()(\d{1,5})", place)
+    plain = None if kind is None else re.fullmatch(r"(.+):([0-9]{1,5})" if kind.has_host else r"()([0-9]{1,5})", place)
     if plain is None or int(plain[2]) > _MOST_PORT:
         forms = [form for n, k in KINDS.items() for form in (n, f"{n}:{'HOST:' * k.has_host}PORT")]
         raise ProblemError(f"to is {shown(to)}: must be {', '.join(forms[:-1])} or {forms[-1]}")

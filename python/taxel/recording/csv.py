@@ -34,7 +34,7 @@ __all__ = ["array_in_csv", "check_head", "read_csv", "write_csv"]
 
 _EVENTS = ("t_us", "x", "y", "p")
 _MORE = ("intensity", "repaired")
-_TAXEL = re.compile(r"x(\d{1,5})y(\d{1,5})")
+_TAXEL = re.compile(r"x([0-9]{1,5})y([0-9]{1,5})")
 #: Columns of events: the least and the largest number in the file, and the type in memory. -1 is an absent intensity.
 _LIMITS: dict[str, tuple[int, int, type[Any]]] = {
     "p": (0, 1, np.uint8),

@@ -484,4 +484,4 @@ def _is_own(file: Path) -> bool:
 
 def _order(path: Path) -> list[tuple[bool, int, str]]:
     """Return the sort key of a name in natural order: 2 before 10."""
-    return [(part.isdigit(), int(part) if part.isdigit() else 0, part) for part in re.split(r"(\d+)", str(path))]
+    return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in re.split(r"([0-9]+)", str(path))]

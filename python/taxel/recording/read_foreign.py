@@ -22,6 +22,7 @@ from taxel._base.columns import frozen
 from taxel._base.h5_file import H5File
 from taxel._base.limits import COLUMNS, VALUE, unpacked
 from taxel._base.messages import counted, first_line
+from taxel._base.number_text import float_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
@@ -307,7 +308,7 @@ def _without(row: list[str], left: Collection[int], columns: int, path: Path, li
 
 def _is_number(cell: str, how: Table) -> bool:
     try:
-        float(cell)
+        float_of(cell)
     except ValueError:
         return how.missing is not None and cell == _unquoted(how.missing)
     return True

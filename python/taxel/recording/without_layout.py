@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from taxel._base.archive import stored_names
 from taxel._base.limits import TIME_US
 from taxel._base.messages import counted
+from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
@@ -247,7 +248,7 @@ def _are_numbers(cells: Sequence[str]) -> bool:
 
 def _number(cell: str) -> float:
     try:
-        return float(cell)
+        return float_of(cell)
     except ValueError:
         return math.nan
 

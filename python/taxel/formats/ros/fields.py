@@ -72,7 +72,7 @@ def values(message: Any, path: str) -> NDArray[Any]:
     """
     step, _, rest = path.partition(".")
     if isinstance(message, list):
-        if step.isdigit():
+        if step.isascii() and step.isdigit():
             return values(message[int(step)], rest)
         each = [values(one, path).reshape(-1) for one in message]
         return np.concatenate(each) if each else np.empty(0)
