@@ -50,6 +50,11 @@ def checked_examples(
             raise ProblemError(f"pattern {p}: {counted(len(pattern), 'train')}, must be the {trains} of the fit")
         if pattern.kind == "signed":
             raise ProblemError(f"pattern {p}: spikes are signed, split them into ON and OFF trains first")
+        for k in np.flatnonzero(~((pattern.start <= times[p]) & (times[p] <= pattern.stop)))[:1]:
+            window = f"{pattern.start:g} to {pattern.stop:g} ms"
+            raise ProblemError(
+                f"pattern {p}, target {k}: {shown(times[p][k].item())} ms lies outside the pattern's window {window}"
+            )
         if (np.diff(times[p]) <= 0).any():
             raise ProblemError(f"targets of pattern {p}: must ascend")
     for name, bound in (("lb", cone.lb), ("ub", cone.ub)):
