@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown, text
-from taxel._base.files import whole_file
+from taxel._base.files import beside as beside_file
+from taxel._base.files import named, whole_file
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import counted
+from taxel._base.number_text import int_of
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
@@ -260,7 +262,7 @@ def beside(recording: str | os.PathLike[str]) -> Path:
     'walk.notes.csv'
     """
     place = Path(checked_path("recording", recording))
-    return place.with_name(f"{place.stem}.notes.csv")
+    return beside_file(place, f"{named(place).stem}.notes.csv")
 
 
 def write_labels(
@@ -339,7 +341,7 @@ def _row(place: str, cells: Mapping[str, str]) -> Note:
         if not written and name != "t_us":
             continue
         try:
-            times[name] = int(written)
+            times[name] = int_of(written)
         except ValueError:
             raise FormatError(f"{place}: {name} is {shown(written)}; must be whole {name[-2:]}") from None
     replaces = times.get("replaces_us")

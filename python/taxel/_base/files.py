@@ -13,7 +13,23 @@ from typing import BinaryIO
 from taxel._base.arguments import flag
 from taxel._base.arguments import path as checked_path
 
-__all__ = ["try_whole", "whole_file", "write_whole"]
+__all__ = ["beside", "named", "try_whole", "whole_file", "write_whole"]
+
+
+def beside(path: Path, name: str) -> Path:
+    """Return the place of a file of this name in the folder that a file or folder lies in.
+
+    Examples
+    --------
+    >>> str(beside(Path("data/walk.mcap"), "walk.notes.csv"))
+    'data/walk.notes.csv'
+    """
+    return named(path).parent / name
+
+
+def named(path: Path) -> Path:
+    """Return a path whose last part is a name: "." and ".." as the folder that they stand for."""
+    return path if path.name not in ("", "..") else path.resolve()
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object], *, overwrite: bool = False) -> Path:

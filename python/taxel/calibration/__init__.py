@@ -17,7 +17,7 @@ from taxel import _core
 from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
-from taxel._base.files import write_whole
+from taxel._base.files import beside, named, write_whole
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -493,10 +493,8 @@ class Calibration:
         True
         """
         place = Path(checked_path("recording", recording))
-        for name in (f"{place.stem}.calibration.json", "calibration.json"):
-            if place.with_name(name).is_file():
-                return place.with_name(name)
-        return None
+        own = f"{named(place).stem}.calibration.json"
+        return next((file for name in (own, "calibration.json") if (file := beside(place, name)).is_file()), None)
 
     def described(self) -> str:
         """Return what it is in a line: the curve, its day, its residual."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from taxel._base.files import beside, named
 from taxel._core import FormatError, ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
@@ -103,7 +104,7 @@ def calibrate(
         if wrong:
             raise ProblemError(why)
     opened = files.one(recording)
-    place = recording.with_name(f"{recording.stem}.calibration.json") if out is None else out
+    place = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)
     with progress(as_json):
         read = _read(opened, tare)

@@ -179,7 +179,7 @@ def _write_rules(plain: PlainScore | None, place: Path | None, *, overwrite: boo
 
 def _of_label(place: Path, label: str) -> Path:
     """Return the file of the rule of one of several labels."""
-    return place.with_name(f"{place.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{place.suffix}")
+    return place.parent / f"{place.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{place.suffix}"
 
 
 def _taken(examples: Sequence[Example]) -> list[tuple[int, int, int]]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from taxel._base.arguments import instance, mapping, number, path, several, shown, text, whole
 from taxel._base.header_table import HeaderTable, text_of
+from taxel._base.number_text import float_of, int_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -215,6 +216,8 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
     ------
     ProblemError : a recording without anything in it or without times, or one that is there twice
     """
+    if window_ms is not None:
+        _window_us(window_ms)
     trials = []
     for one in _once(recordings):
         source = _source(one)
@@ -316,10 +319,10 @@ def _rows(place: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[
 def _whole(where: str, column: str, cell: str) -> int:
     value: int | None
     try:
-        value = int(cell)
+        value = int_of(cell)
     except ValueError:
         try:
-            real = float(cell)
+            real = float_of(cell)
         except ValueError:
             real = np.nan
         value = int(real) if np.isfinite(real) and real.is_integer() else None
