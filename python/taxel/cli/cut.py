@@ -103,7 +103,7 @@ def _check_time(recording: Recording, start: float | None, stop: float | None) -
 def _range(option: str, text: str | None) -> slice | None:
     if text is None:
         return None
-    match = re.fullmatch(r"(\d{0,5}):(\d{0,5})", text)
+    match = re.fullmatch(r"([0-9]{0,5}):([0-9]{0,5})", text)
     if match is None:
         raise ProblemError(f"{option} is {text!r}: must be A:B, of which B is not included, as 0:32")
     return slice(*(int(n) if n else None for n in match.groups()))

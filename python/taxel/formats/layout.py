@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base.arguments import finite, flag, mapping, several, shown, text, whole
+from taxel._base.files import beside, named
+from taxel._base.limits import VALUE
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
@@ -167,13 +169,12 @@ class Layout:
         if self.heel:
             text("heel", self.heel, ("top", "bottom"))
         if not isinstance(self.falls, bool):
-            object.__setattr__(self, "falls", finite("falls", self.falls))
+            # Pictures have 32 bits.
+            object.__setattr__(self, "falls", finite("falls", self.falls, least=-VALUE, most=VALUE))
         if self.unit is not None and not text("unit", self.unit):
             raise ProblemError("unit is '': must say what the readings are in")
         if self.rate_hz is not None:
-            rate = finite("rate_hz", self.rate_hz, "Hz")
-            if not 1e-9 <= rate <= 1e6:
-                raise ProblemError(f"rate_hz is {shown(self.rate_hz)}: must be above 0, at most 1000000")
+            finite("rate_hz", self.rate_hz, "Hz", least=1e-9, most=1e6)
         # Refuses a pitch beside places, and places of another number than rows x columns.
         self.array(self.places.x.size if self.places is not None else 1)
 
@@ -216,9 +217,7 @@ class Layout:
         True
         """
         folder = [path / "layout.toml"] if path.is_dir() else []
-        # "." and ".." have no name beside which a file could lie.
-        named = path if path.name not in ("", "..") else path.resolve()
-        for candidate in (named.with_name(_name(named)), *folder, named.with_name("layout.toml")):
+        for candidate in (beside(path, _name(named(path))), *folder, beside(path, "layout.toml")):
             if candidate.is_file():
                 return candidate
         return None

@@ -34,8 +34,8 @@ def cut(
     start_us, stop_us : float, us
         The interval to keep, by the board's clock: ``start_us <= t < stop_us``.
     columns, rows : slice, optional
-        The rectangle to keep; it becomes a sensor of its own, whose columns and rows count from 0. With all columns and
-        rows the recording is unchanged.
+        The rectangle to keep, within the array; it becomes a sensor of its own, whose columns and rows count from 0.
+        With all columns and rows the recording is unchanged.
     label : str, optional
         Cut around each note of this text; the result is one recording a note, and may be empty.
     before_us, after_us : float, us
@@ -49,7 +49,8 @@ def cut(
 
     Raises
     ------
-    ProblemError : a start after its stop, a time before or after a label below 0, or a region without a taxel
+    ProblemError : a start after its stop, a time before or after a label below 0, or a region without a taxel or beyond
+        the array
 
     Examples
     --------
@@ -79,18 +80,25 @@ def cut(
     return [Recording(region(part._contents, across, down)) for part in parts]
 
 
+def _asked(chosen: slice) -> str:
+    return f"{chosen.start or 0} to {'the last' if chosen.stop is None else chosen.stop}"
+
+
 def region(of: Contents, columns: slice, rows: slice) -> Contents:
     """Return the part of a recording within a rectangle, as a sensor of its own; unchanged if that is all.
 
     Raises
     ------
-    ProblemError : no taxel lies in the rectangle, or the file holds several boards
+    ProblemError : an end beyond the array, no taxel in the rectangle, or the file holds several boards
     """
     array = of.array
     (left, right), (top, bottom) = array.region(columns, rows)
+    for name, chosen, count in (("columns", columns, array.columns), ("rows", rows, array.rows)):
+        if any(not -count <= end <= count for end in (chosen.start, chosen.stop) if end is not None):
+            raise ProblemError(f"{name} {_asked(chosen)}: there are {count} {name}, 0 to {count - 1}")
     if right <= left or bottom <= top:
         asked = " and ".join(
-            f"{name} {chosen.start or 0} to {'the last' if chosen.stop is None else chosen.stop}"
+            f"{name} {_asked(chosen)}"
             for name, chosen in (("columns", columns), ("rows", rows))
             if chosen != slice(None)
         )

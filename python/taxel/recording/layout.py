@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from taxel._base.arguments import shown
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -121,7 +122,13 @@ def _read(own: Frames, layout: Layout, name: str) -> Frames:
             raise FormatError(f"{layout.place}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
     if layout.falls is not False:
         full = 0.0 if layout.falls is True else layout.falls
-        values = np.float32(full) - values
+        with np.errstate(over="ignore"):
+            values = np.float32(full) - values
+        if (large := np.isinf(values)).any():
+            raise FormatError(
+                f"{layout.place}: falls is {layout.falls}; {name} reads {shown(own.values[large][0].item())}, and the "
+                "difference does not fit 32 bits"
+            )
     return Frames(values, t, unit=unit, array=own.array)
 
 
