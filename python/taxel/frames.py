@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, number, shown, text, whole, window
+from taxel._base.arguments import finite, instance, shown, text, whole, window
 from taxel._base.columns import Columns, frozen, own_column, own_numbers
 from taxel._base.drawing import draw
 from taxel._base.messages import counted
@@ -33,6 +32,7 @@ class Frames(Columns):
     Parameters
     ----------
     values : float32, shape (n, rows, columns)
+        Finite, or NaN where a value is missing.
     t : int64, shape (n,), us
         Ascending.
     unit : str
@@ -42,7 +42,7 @@ class Frames(Columns):
 
     Raises
     ------
-    ProblemError : shapes that do not fit, or times that do not ascend (names the picture)
+    ProblemError : shapes that do not fit, an infinite value, or times that do not ascend (names the picture)
 
     Notes
     -----
@@ -57,6 +57,9 @@ class Frames(Columns):
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
         self.values: NDArray[np.float32] = own_numbers("values", values, np.float32)
+        # What is not copied is read-only, a part of other frames or what a reader has checked.
+        if not (isinstance(values, np.ndarray) and np.may_share_memory(self.values, values)):
+            _refuse_infinite("values", self.values)
         self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
         if self.values.ndim != 3:
             found = counted(self.values.ndim, "dimension")
@@ -130,6 +133,8 @@ class Frames(Columns):
         begins = None if held is None else own_numbers("held", held, np.float32)
         if begins is not None and begins.shape != array.shape:
             raise ProblemError(f"held has shape {begins.shape}: must have the array's, {array.shape}")
+        if begins is not None:
+            _refuse_infinite("held", begins)
         values = _core.HeldValues(events._parts(), None, None if begins is None else begins.reshape(-1)).at(t)
         return cls(frozen(values).reshape(len(t), *array.shape), frozen(t), unit="ticks", array=array)
 
@@ -309,7 +314,7 @@ class Frames(Columns):
         >>> Frames([[[0.0, 2.0], [0.0, 2.0]]], [0]).centre()
         array([[1. , 0.5]])
         """
-        if not number("above", above) >= 0:
+        if finite("above", above) < 0:
             raise ProblemError(f"above is {shown(above)}: must be 0 or more, as values are weights")
         weights = np.where(self._loaded(above), self.values, 0.0)
         x, y = self.array.positions()
@@ -331,10 +336,7 @@ class Frames(Columns):
         return Frames(above.reshape(self.values.shape), self.t, unit=self.unit, array=self.array)
 
     def _loaded(self, above: float) -> NDArray[np.bool_]:
-        threshold = number("above", above)
-        if math.isnan(threshold):
-            raise ProblemError("above is NaN: must be a number that values can be compared with")
-        return np.asarray(self.values > np.float64(threshold))
+        return np.asarray(self.values > np.float64(finite("above", above)))
 
     def to_pandas(self) -> Any:
         """Return a table of one row a picture, indexed by its time ``t_us``, and one column a taxel, ``(row, column)``.
@@ -379,3 +381,10 @@ class Frames(Columns):
         time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
         size = f"{self.array.rows} x {self.array.columns} taxels"
         return f"Frames({counted(len(self), 'picture')} of {size}, {time}, {self.unit})"
+
+
+def _refuse_infinite(name: str, values: NDArray[np.float32]) -> None:
+    """Refuse readings that are infinite; NaN is a missing one."""
+    if np.isinf(values).any():
+        place = ", ".join(map(str, np.argwhere(np.isinf(values))[0].tolist()))
+        raise ProblemError(f"{name}[{place}] is infinite: must be finite, or NaN where it is missing")

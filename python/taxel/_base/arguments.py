@@ -23,6 +23,7 @@ __all__ = [
     "column",
     "fields",
     "finite",
+    "finite_numbers",
     "flag",
     "floats",
     "instance",
@@ -127,6 +128,8 @@ def mapping(name: str, value: object) -> dict[str, Any]:
     return {text(f"a name in {name}", key): entry for key, entry in value.items()}
 
 
+#: Classes of which NumPy makes floats although they are no numbers.
+_NO_NUMBERS = (str, bytes, type(None), np.timedelta64, np.datetime64)
 #: The greatest depth of nested lists, above NumPy's limit of dimensions.
 DEPTH = 65
 #: The most frequent classes of arguments, which have no unit and no entries; they skip the slow inspection.
@@ -213,13 +216,21 @@ def _one(values: NDArray[np.float64]) -> object:
 
 
 def number(name: str, value: object, unit: str | None = None) -> float:
-    """Return a float, for a quantity its value in `unit`; refuse any other value."""
+    """Return a float, which may be infinite, for a quantity its value in `unit`; refuse any other value, and NaN."""
+    real = _real(name, value, unit)
+    if math.isnan(real):
+        raise ProblemError(f"{name} is NaN: must be a number")
+    return real
+
+
+def _real(name: str, value: object, unit: str | None = None) -> float:
+    """Return a float, NaN too; refuse any other value. -0.0 becomes 0.0, as no argument means anything else by it."""
     if _has_unit(type(value)):
         value = _one(bare(name, value, unit))
     if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | float | np.integer | np.floating):
         raise ProblemError(f"{name} is {shown(value)}: must be a number")
     try:
-        return float(value)
+        return float(value) + 0.0
     except OverflowError:
         raise ProblemError(f"{name} is {shown(value)}: must fit a float") from None
 
@@ -228,7 +239,7 @@ def finite(
     name: str, value: object, unit: str | None = None, *, least: float = -math.inf, most: float = math.inf
 ) -> float:
     """Return a finite float from `least` to `most`; refuse any other value."""
-    real = number(name, value, unit)
+    real = _real(name, value, unit)
     if not (math.isfinite(real) and least <= real <= most):
         low, high = math.isfinite(least), math.isfinite(most)
         right = f"from {least:g} to {most:g}" if low and high else f"{least:g} or more and finite" if low else "finite"
@@ -294,6 +305,8 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
     _refuse_repeated(name, plain)
     try:
         received = np.asarray(plain)
+        if received.dtype == object:
+            _refuse_others(name, received)
         if received.size == 0 and received.dtype.kind not in "biuf":
             received = received.astype(dtype)
         if received.dtype.kind not in "biufO":
@@ -321,10 +334,28 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
     return array
 
 
+def _refuse_others(name: str, values: NDArray[Any]) -> None:
+    """Refuse entries of an array of objects that NumPy converts although they are no numbers: texts, None, spans."""
+    if any(issubclass(kind, _NO_NUMBERS) for kind in set(map(type, values.flat))):
+        place, value = next((at, one) for at, one in np.ndenumerate(values) if isinstance(one, _NO_NUMBERS))
+        where = f"[{', '.join(map(str, place))}]" if place else ""
+        raise ProblemError(f"{name}{where} is {shown(value)}: must be a number")
+
+
 def _refuse_repeated(name: str, values: object) -> None:
     """Refuse a broadcast array whose copy would exceed the memory limit."""
     if isinstance(values, np.ndarray) and values.size > _MOST_REPEATED and 0 in values.strides:
         raise ProblemError(f"{name} holds {values.size} values, repeated: must be at most {_MOST_REPEATED}")
+
+
+def finite_numbers(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.float64]:
+    """Return a contiguous float64 array of any shape; refuse other values, infinity and NaN."""
+    array = numbers(name, values, np.float64, unit)
+    if not np.isfinite(array).all():
+        place = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        where = f"[{', '.join(map(str, place))}]" if place else ""
+        raise ProblemError(f"{name}{where} is {shown(array[place].item())}: must be finite")
+    return array
 
 
 def column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
@@ -372,7 +403,9 @@ def nth(what: str, chosen: SupportsIndex, length: int) -> int:
 
 def fields(records: object, required: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of a record array's fields; refuse an array without a required field."""
-    names = getattr(getattr(records, "dtype", None), "names", None) or ()
+    dtype = getattr(records, "dtype", None)
+    # The attribute of a class or a module describes no records.
+    names = (dtype.names if isinstance(dtype, np.dtype) else None) or ()
     missing = [name for name in required if name not in names]
     if missing:
         raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
@@ -405,9 +438,6 @@ def parameters(values: Mapping[str, object]) -> str:
             return text(name, value)
         if isinstance(value, int | np.integer):
             return whole(name, value)
-        real = number(name, value)
-        if not math.isfinite(real):
-            raise ProblemError(f"{name} is {real}: must be finite")
-        return real
+        return finite(name, value)
 
     return json.dumps({name: plain(name, value, 0) for name, value in values.items()})

@@ -448,8 +448,7 @@ def _reporting(progress: Callable[[str], object] | None) -> Callable[[str], obje
 def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequence[Fold], str]:
     """Return folds, made or given, and what they hold out."""
     if isinstance(k, Sequence) and not isinstance(k, str):
-        _sound(k, len(examples))
-        return k, f"{len(k)} given folds"
+        return _sound(k, len(examples)), f"{len(k)} given folds"
     count = whole("folds", k, 2, 2**31)
     parts = [Part(n) for n in range(len(examples))]
     recordings = len(_grouped(examples, parts))
@@ -467,29 +466,34 @@ def _grouped(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Pa
     return list(groups.values())
 
 
-def _sound(folds: Sequence[Fold], examples: int) -> None:
-    """Refuse folds that make no sense."""
+def _sound(folds: Sequence[Fold], examples: int) -> list[Fold]:
+    """Return folds with the places of examples as whole numbers; refuse those that make no sense."""
     if not len(folds):
         raise ProblemError("folds is empty: must be one Fold or more")
     tested: dict[int, list[Part]] = {}
+    sound = []
     for n, fold in enumerate(folds):
         if not isinstance(fold, Fold):
             raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold")
         train, test, inner = (several(f"fold {n}: {name}", getattr(fold, name)) for name in fold._fields)
         if not train or not test:
             raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold with parts to train on and parts to test")
-        for part in (*train, *test):
-            if not isinstance(part, Part) or not 0 <= whole(f"fold {n}: example", part.example) < examples:
-                raise ProblemError(f"fold {n}: {shown(part)} is no Part of {examples} examples")
-            start, stop = window("us", part.start, part.stop)
-            if not start < stop:
-                raise ProblemError(f"fold {n}: {shown(part)} must start before it stops")
+        train, test = ([_sound_part(f"fold {n}", part, examples) for part in parts] for parts in (train, test))
         for part in test:
             if any(part.start < other.stop and other.start < part.stop for other in tested.get(part.example, ())):
                 raise ProblemError(f"fold {n}: {shown(part)} is tested twice")
             tested.setdefault(part.example, []).append(part)
-        if inner:
-            _sound(inner, examples)
+        sound.append(Fold(train, test, _sound(inner, examples) if inner else inner))
+    return sound
+
+
+def _sound_part(where: str, part: object, examples: int) -> Part:
+    if not isinstance(part, Part) or not 0 <= (example := whole(f"{where}: example", part.example)) < examples:
+        raise ProblemError(f"{where}: {shown(part)} is no Part of {examples} examples")
+    start, stop = window("us", part.start, part.stop)
+    if not start < stop:
+        raise ProblemError(f"{where}: {shown(part)} must start before it stops")
+    return Part(example, start, stop)
 
 
 def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> list[Fold]:

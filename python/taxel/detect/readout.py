@@ -107,6 +107,8 @@ class Readout(_Detector):
         instance("encoder", encoder, Encoder)
         if not isinstance(neurons, Mapping) or not neurons:
             raise ProblemError(f"neurons is {shown(neurons)}: must be trained neurons by label, one or more")
+        if not isinstance(delay_ms, Mapping):
+            delay_ms = number("delay_ms", delay_ms, "ms")
         named = {} if inputs is None else mapping("inputs", inputs)
         for label in named:
             if label not in neurons:

@@ -372,7 +372,8 @@ def with_floor(values: Mapping[str, Any], noise_floor: float) -> dict[str, Any]:
 
     The least noise of a taxel belongs to the floor: it is a tenth of it, as .3 is of the board's 3 ticks.
     """
-    own = {"noise_floor": number("noise_floor", noise_floor), "least_noise": number("noise_floor", noise_floor) / 10.0}
+    floor = finite("noise_floor", noise_floor)
+    own = {"noise_floor": floor, "least_noise": floor / 10.0}
 
     def stated(table: Mapping[str, Any]) -> dict[str, Any]:
         known = inspect.signature(Encoder._by_name.get(str(table.get("name")), Encoder)).parameters

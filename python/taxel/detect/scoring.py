@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import column, floats, instance, numbers, shown
+from taxel._base.arguments import column, finite_numbers, instance, numbers, shown
 from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
 from taxel.detections import Detections
@@ -62,7 +62,9 @@ class Spread(NamedTuple):
         >>> Spread.of([1.0, 2.0, 3.0, 4.0])
         2.5 ± 1.29 (median 2.5, 95 % in 1.07 to 3.92)
         """
-        given = floats("values", values)
+        given = finite_numbers("values", values)
+        if given.ndim != 1:
+            raise ProblemError(f"values has {given.ndim} dimensions: must have one")
         spread = cls(*_core.spread(given))
         # The mean of equal values is rounded, so that they seem to vary by some 1e-17.
         return spread._replace(mean=float(given[0]), sd=0.0) if len(given) > 1 and np.ptp(given) == 0.0 else spread

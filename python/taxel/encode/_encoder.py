@@ -6,10 +6,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
-import numpy as np
-
 from taxel import _core
-from taxel._base.arguments import instance, several, shown
+from taxel._base.arguments import instance, several, shown, whole
 from taxel._base.arguments import text as checked_text
 from taxel._base.parameters import Value
 from taxel._core import ProblemError
@@ -370,9 +368,8 @@ class EncoderStream:
         >>> len(stream.push(values).times), stream.advance(2000).times
         (0, array([0.5]))
         """
-        if isinstance(t_us, bool) or not isinstance(t_us, int | np.integer) or not -(2**60) <= t_us <= 2**60:
-            raise ProblemError(f"t_us is {shown(t_us)}: must be a whole number of us")
-        return self._spikes(None if self._core is None else self._core.advance(int(t_us)))
+        t = whole("t_us", t_us, -(2**60), 2**60, "us")
+        return self._spikes(None if self._core is None else self._core.advance(t))
 
     def finish(self) -> SpikeTrains:
         """End the stream; the last values are held for the encoder's latency, so that all spikes are returned.

@@ -7,9 +7,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Self
 
-import numpy as np
-
-from taxel._base.arguments import number, parameters, shown, whole
+from taxel._base.arguments import finite, parameters, shown, whole
 from taxel._core import ProblemError
 from taxel.encode._encoder import Encoder
 from taxel.events import Events
@@ -43,8 +41,10 @@ class Tared(Encoder):
         """Return whether `tare` is a `Tare`; otherwise check that it is a valid number of seconds."""
         if self.tare is None or isinstance(self.tare, Tare):
             return self.tare is not None
-        if isinstance(self.tare, bool) or not isinstance(self.tare, int | float | np.integer | np.floating):
-            raise ProblemError(f"tare is {shown(self.tare)}: must be a taxel.Tare, or seconds")
+        try:
+            finite("tare", self.tare, "s")
+        except ProblemError:
+            raise ProblemError(f"tare is {shown(self.tare)}: must be a taxel.Tare, or seconds") from None
         return False
 
     def _plain(self) -> dict[str, Any]:
@@ -68,7 +68,7 @@ class Tared(Encoder):
         if not isinstance(held, Events | Frames) or not len(held.t):
             return self, held
         first, last = int(held.t[0]), int(held.t[-1])
-        rest_us = whole("tare, us", round(1e6 * number("tare", self.tare)), 1, 2**53)
+        rest_us = whole("tare, us", round(1e6 * finite("tare", self.tare, "s")), 1, 2**53)
         if 2 * rest_us > last - first:
             lasts = f"the recording lasts {(last - first) / 1e6:g} s"
             raise ProblemError(f"tare is {self.tare} s: more than half of it would be rest, {lasts}")

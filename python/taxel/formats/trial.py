@@ -100,6 +100,9 @@ class Trial:
         if self.scored is None:
             t = self.recorded.t
             object.__setattr__(self, "scored", (int(t.min()), int(t.max())) if len(t) else (0, 0))
+        else:
+            first, last = arguments.window("us", *arguments.several("scored", self.scored))
+            object.__setattr__(self, "scored", (arguments.whole("scored", first), arguments.whole("scored", last)))
 
     @property
     def frames(self) -> Frames:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import floats, instance, mapping, number, several, shown
+from taxel._base.arguments import finite_numbers, floats, instance, mapping, number, several, shown
 from taxel._core import ProblemError
 from taxel.information.estimate import Estimate, estimate
 from taxel.information.nested import nested_predictions
@@ -316,7 +316,8 @@ def compare_codes(
         raise ProblemError("codes is empty: name at least one")
     if not patterns or len({len(one) for one in patterns}) > 1:
         raise ProblemError("trials must be one or more, with equally many trains each")
-    onsets = [one.start for one in patterns] if onsets_ms is None else floats("onsets_ms", onsets_ms).tolist()
+    given = [one.start for one in patterns] if onsets_ms is None else onsets_ms
+    onsets = finite_numbers("onsets_ms", given, "ms").ravel().tolist()
     if len(onsets) != len(patterns):
         raise ProblemError(f"onsets_ms has {len(onsets)} entries: must be {len(patterns)}, one a trial")
     estimates = {}

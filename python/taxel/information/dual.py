@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import numbers
+from taxel._base.arguments import finite_numbers
 from taxel._core import ProblemError
 
-__all__ = ["Regressions", "gram_matrix", "residual", "solved_without_ridge"]
+__all__ = ["LARGEST_RIDGE", "Regressions", "gram_matrix", "residual", "solved_without_ridge"]
 
+#: The largest ridge, in units of the mean variance.
+LARGEST_RIDGE = 1e100
 #: Directions in which classes vary less than this share of the largest count as none.
 _CUT = 1e-10
 #: Decimal digits to which the regression's predictions and the discriminants are rounded.
@@ -39,8 +43,14 @@ def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     """
     from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
 
-    trials = len(square)
-    factor, fault = lapack.dpotrf(_centred(square) / level + np.eye(trials), lower=1, clean=1)
+    trials, centred = len(square), _centred(square)
+    least = trials * np.finfo(float).eps * float(np.abs(centred).max())
+    if level < least:
+        raise ProblemError(
+            f"ridge: {level:.3g} of inner products is lost in their rounding; must be {least:.3g} at least, so "
+            f"{least / level if level else math.inf:.2g} times as large"
+        )
+    factor, fault = lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
     if fault:
         raise ProblemError("grams: a matrix has a direction of negative length, so it is of no inner product")
     inverse = lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
@@ -196,11 +206,9 @@ def gram_matrix(gram: ArrayLike) -> NDArray[np.float64]:
     ------
     ProblemError : not square, not finite or not symmetric
     """
-    square: NDArray[np.float64] = numbers("gram", gram, np.float64)
+    square = finite_numbers("gram", gram)
     if square.ndim != 2 or square.shape[0] != square.shape[1] or not len(square):
         raise ProblemError(f"gram has shape {square.shape}: must be (trials, trials)")
-    if not np.isfinite(square).all():
-        raise ProblemError("gram is not finite")
     if np.abs(square - square.T).max() > 1e-6 * max(np.abs(square).max(), 1e-300):
         raise ProblemError("gram is not symmetric: entry i, j is the inner product of trials i and j")
     return square

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import callback, number, shown, whole
+from taxel._base.arguments import callback, finite, number, shown, whole
 from taxel._core import ProblemError
 from taxel.information._labels import belonging, distinct, numbered, one_label_a_group, words
 from taxel.information.bits import (
@@ -268,7 +268,7 @@ def zero_test(
     callback("answer", answer)
     truth, random = words("labels", labels), np.random.default_rng(whole("seed", seed, 0))
     belongs = None if groups is None else belonging(groups, len(truth))
-    there = number("found", found)
+    there = finite("found", found)
     if not len(truth):
         raise ProblemError("labels is []: must hold a trial at least")
     classes, row = np.unique(truth, return_inverse=True)

@@ -8,10 +8,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import number, numbers, shown, text, whole
+from taxel._base.arguments import finite, finite_numbers, text, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
-from taxel.information.dual import Regressions, gram_matrix, residual, solved_without_ridge
+from taxel.information.dual import LARGEST_RIDGE, Regressions, gram_matrix, residual, solved_without_ridge
 from taxel.information.primal import ClassMoments, blocks, feature_table, solved
 
 __all__ = ["LDA", "GramLDA"]
@@ -285,7 +285,7 @@ class GramLDA(Classifier):
         ProblemError : not fitted, or another number of training trials
         """
         weights = self._fitted("dual_")
-        across = numbers("gram", gram, np.float64)
+        across = finite_numbers("gram", gram)
         if across.ndim != 2 or across.shape[1] != len(weights):
             raise ProblemError(f"gram has shape {across.shape}: must be (trials, {len(weights)})")
         return np.asarray(across @ weights + self.intercept_)
@@ -316,7 +316,4 @@ class GramLDA(Classifier):
 
 
 def _ridge(ridge: object) -> float:
-    value = number("ridge", ridge)
-    if not 0 <= value < np.inf:
-        raise ProblemError(f"ridge is {shown(ridge)}: must be 0 or more, and finite")
-    return value
+    return finite("ridge", ridge, least=0.0, most=LARGEST_RIDGE)

@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import numbers, whole
+from taxel._base.arguments import finite_numbers, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.dual import gram_matrix
@@ -66,7 +66,7 @@ class NearestNeighbours(Classifier):
         ------
         ProblemError : a matrix that is not square, or labels that are invalid
         """
-        square = numbers("distances", distances, np.float64)
+        square = finite_numbers("distances", distances)
         if square.ndim != 2 or square.shape[0] != square.shape[1]:
             raise ProblemError(f"distances has shape {square.shape}: must be (trials, trials)")
         self.classes_, self.row_ = labelled(y, len(square))
@@ -91,7 +91,7 @@ class NearestNeighbours(Classifier):
         ['b']
         """
         row = self._fitted("row_")
-        across = numbers("distances", distances, np.float64)
+        across = finite_numbers("distances", distances)
         if across.ndim != 2 or across.shape[1] != len(row):
             raise ProblemError(f"distances has shape {across.shape}: must be (trials, {len(row)})")
         near = np.argsort(across, axis=1, kind="stable")[:, : self.neighbours]
@@ -118,7 +118,11 @@ def distances_of(gram: ArrayLike) -> NDArray[np.float64]:
     >>> distances_of([[1.0, 0.0], [0.0, 1.0]]).round(3).tolist()
     [[0.0, 1.414], [1.414, 0.0]]
     """
-    return np.asarray(np.sqrt(np.maximum(squared_distances(gram_matrix(gram)), 0.0)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        squared = squared_distances(gram_matrix(gram))
+    if not np.isfinite(squared).all():
+        raise ProblemError("gram: its numbers are too large to be subtracted from each other")
+    return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
 
 
 def squared_distances(square: NDArray[np.float64]) -> NDArray[np.float64]:

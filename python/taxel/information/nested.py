@@ -13,7 +13,7 @@ from taxel._base.arguments import instance, numbers, several, shown, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
 from taxel.information._threads import threads
-from taxel.information.dual import Regressions, gram_matrix, residual
+from taxel.information.dual import LARGEST_RIDGE, Regressions, gram_matrix, residual
 from taxel.information.folds import Split, split
 from taxel.information.neighbours import majority, squared_distances
 
@@ -93,8 +93,8 @@ def nested_predictions(
     """
     matrices = Matrices(grams, features)
     levels = numbers("ridges", ridges, np.float64)
-    if levels.ndim != 1 or not len(levels) or not ((levels > 0) & np.isfinite(levels)).all():
-        raise ProblemError(f"ridges is {shown(ridges)}: must be numbers above 0")
+    if levels.ndim != 1 or not len(levels) or not ((levels > 0) & (levels <= LARGEST_RIDGE)).all():
+        raise ProblemError(f"ridges is {shown(ridges)}: must be numbers above 0, at most {LARGEST_RIDGE:g}")
     nearest = tuple(whole("neighbours", k, 1) for k in several("neighbours", neighbours))
     parts = whole("inner", inner, 2)
     dealt = split(y, matrices.trials, count=count, inner=parts, groups=groups, seed=seed)

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import flag, number, numbers, parameters, text, whole
+from taxel._base.arguments import flag, number, numbers, parameters, shown, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.limits import VALUE
 from taxel._base.messages import counted
 from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
@@ -325,7 +326,7 @@ class Live:
         name : str
             Of the source, as in `sources`.
         values : float, shape (columns,), each in the unit of its column (s, m/s2 ...)
-            One for each column, with its own time stamp.
+            One for each column, with its own time stamp; NaN where a value is missing.
         arrived_ns : int, ns since 1970, optional
             When they arrived. Default: now.
 
@@ -335,7 +336,12 @@ class Live:
         OSError : the disk is full
         """
         arrival = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
-        self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), arrival)
+        given = numbers("values", values, np.float64).reshape(-1)
+        for k in np.flatnonzero(np.abs(given) > VALUE)[:1]:
+            raise ProblemError(
+                f"values[{k}] is {shown(given[k].item())}: must fit 32 bits, or be NaN where it is missing"
+            )
+        self._core.sample(text("name", name), given.tolist(), arrival)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
         """Use the values that taxels hold now as their rest from now on: for taxels that drift.

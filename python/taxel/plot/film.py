@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from taxel._base.arguments import number
+from taxel._base.arguments import finite
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -68,7 +68,7 @@ def film(
     FileExistsError : the file is there already
     """
     place = Path(path)
-    if not number("slower", slower) > 0:
+    if not finite("slower", slower) > 0:
         raise ProblemError(f"slower is {slower:g}: must be above 0")
     writer = writer_of(place)
     if not len(events) or events.intensity is None:

@@ -45,6 +45,8 @@ def html(noun: Drawn) -> str:
     >>> html(taxel.SpikeTrains.from_lists([[1.0, 5.0], [3.0]], stop=10.0)).startswith("<code>SpikeTrains(")
     True
     """
+    if not isinstance(noun, Drawn):
+        raise ProblemError(f"noun is {shown(noun)}: must be one that draws itself, as taxel.Events")
     line = f"<code>{escape(repr(noun))}</code>"
     # A figure without pyplot, so that no window or notebook shows it a second time.
     figure = Figure(figsize=(7.0, 2.6) if isinstance(noun, Recording) else (4.2, 2.8), layout="constrained")
@@ -63,8 +65,6 @@ def html(noun: Drawn) -> str:
             detections(noun, figure.add_subplot())
         case Health():
             health_map(noun, figure.add_subplot())
-        case _:
-            raise ProblemError(f"noun is {shown(noun)}: must be one that draws itself, as taxel.Events")
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=80)
     picture = base64.b64encode(file.getvalue()).decode()

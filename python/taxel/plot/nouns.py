@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-from taxel._base.arguments import instance, number, shown
+from taxel._base.arguments import finite, instance, shown
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.detections import Detections
@@ -98,7 +98,7 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
     ('1.500 ms', '0.000 ms')
     """
     instance("frames", frames, Frames)
-    until = None if at is None else number("at", at)
+    until = None if at is None else finite("at", at, "us")
     if not len(frames):
         raise ProblemError("no picture to draw: the frames are empty")
     ax = axes(ax, (5, 4.4))

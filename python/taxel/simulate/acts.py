@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import flag, number, numbers, parameters, shown, whole
+from taxel._base.arguments import finite, flag, number, numbers, parameters, shown, whole
 from taxel._base.messages import plain
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -346,7 +346,7 @@ class Pictures:
             raise ProblemError(f"values have shape {self.values.shape}: must be (n, rows, columns)")
         if not (np.all(self.values >= 0) and np.all(self.values <= 1)):
             raise ProblemError("values: must be shares of the ramp, 0 to 1")
-        self.period_us = number("period_us", period_us, "us")
+        self.period_us = finite("period_us", period_us, "us", least=0.0)
 
     def _part(self) -> Any:
         return self.values.reshape(-1), self.period_us

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import floats, number, numbers, shown
+from taxel._base.arguments import finite_numbers, floats, number
 from taxel._base.parameters import Value, defaults
 from taxel._core import ProblemError
 
@@ -24,6 +24,8 @@ __all__ = ["AdaptiveRamp", "Circuit", "Converted", "Converter", "Divider", "Fabr
 
 Values = NDArray[np.float64]
 
+#: The largest voltage that a comparator is asked about, V.
+_MOST_V = 1e6
 _FABRIC = defaults("fabric")
 _GROUND = defaults("virtual_ground")
 _DIVIDER = defaults("divider")
@@ -85,7 +87,7 @@ class Fabric(Value):
         >>> Fabric().conductance([0.0]) == Fabric().rest_us
         array([ True])
         """
-        checked = _finite("force_n", force_n, "N")
+        checked = finite_numbers("force_n", force_n, "N")
         return _core.fabric(self._json(), checked.ravel(), False).reshape(checked.shape)
 
     def force(self, conductance_us: ArrayLike) -> Values:
@@ -109,7 +111,7 @@ class Fabric(Value):
         >>> fabric.force(fabric.conductance([0.0, 2.0])).round(6)
         array([0., 2.])
         """
-        checked = _finite("conductance_us", conductance_us, "uS")
+        checked = finite_numbers("conductance_us", conductance_us, "uS")
         return _core.fabric(self._json(), checked.ravel(), True).reshape(checked.shape)
 
 
@@ -151,7 +153,7 @@ class _Lines(Value):
         ------
         ProblemError : conductances that are not finite
         """
-        checked = _finite("conductance_us", conductance_us, "uS")
+        checked = finite_numbers("conductance_us", conductance_us, "uS")
         return _core.circuit_volts_alone(self._kind, self._json(), checked.ravel()).reshape(checked.shape)
 
 
@@ -348,7 +350,7 @@ class Converter(Value):
 
         Parameters
         ----------
-        volts : float64, V, (rows, columns) or (n, rows, columns)
+        volts : float64, V, (rows, columns) or (n, rows, columns), from -1e6 to 1e6
 
         Returns
         -------
@@ -360,6 +362,8 @@ class Converter(Value):
         ProblemError : voltages that are not finite, or another shape
         """
         checked = _pictures("volts", volts, "V")
+        if (np.abs(checked) > _MOST_V).any():
+            raise ProblemError(f"volts: must be from -{_MOST_V:g} to {_MOST_V:g} V")
         shape: tuple[int, int] = checked.shape[-2:]
         return _core.converter_ticks(self._json(), shape, checked.ravel()).reshape(checked.shape)
 
@@ -384,7 +388,7 @@ class Converter(Value):
         >>> converter.ramp_ticks(converter.ramp_volts([50.0])).round(6)
         array([50.])
         """
-        checked = _finite("ticks", ticks)
+        checked = finite_numbers("ticks", ticks)
         return _core.converter_ramp(self._json(), checked.ravel(), False).reshape(checked.shape)
 
     def ramp_ticks(self, volts: ArrayLike) -> Values:
@@ -403,7 +407,7 @@ class Converter(Value):
         ------
         ProblemError : voltages that are not finite
         """
-        checked = _finite("volts", volts, "V")
+        checked = finite_numbers("volts", volts, "V")
         return _core.converter_ramp(self._json(), checked.ravel(), True).reshape(checked.shape)
 
     def trace(self, line_v: Sequence[float], *, every_us: float = 0.01, stop_us: float = 3.0) -> Trace:
@@ -572,15 +576,8 @@ class Circuit(Value):
         return (self.converter or Converter()).ticks(volts)
 
 
-def _finite(name: str, values: ArrayLike, unit: str | None = None) -> Values:
-    checked = numbers(name, values, np.float64, unit)
-    if not np.isfinite(checked).all():
-        raise ProblemError(f"{name}: must be finite, {shown(checked[~np.isfinite(checked)][0].item())} is not")
-    return checked
-
-
 def _pictures(name: str, values: ArrayLike, unit: str) -> Values:
-    checked = _finite(name, values, unit)
+    checked = finite_numbers(name, values, unit)
     if checked.ndim not in (2, 3) or 0 in checked.shape[-2:]:
         raise ProblemError(f"{name} has shape {checked.shape}: must be (rows, columns) or (n, rows, columns)")
     return checked

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import mapping, number, numbers, parameters, whole
+from taxel._base.arguments import finite_numbers, mapping, number, parameters, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -177,12 +177,10 @@ class Layer:
         >>> Layer().press(np.zeros((64, 64))).force_n
         0.0
         """
-        sunk = numbers("sunk_mm", sunk_mm, np.float64)
+        sunk = finite_numbers("sunk_mm", sunk_mm)
         cells = (self.array.rows * self.cells_per_pitch, self.array.columns * self.cells_per_pitch)
         if sunk.shape != cells:
             raise ProblemError(f"sunk_mm has shape {sunk.shape}: the array has {cells}")
-        if not np.all(np.isfinite(sunk)):
-            raise ProblemError("sunk_mm: must be finite")
         pressure, base = self._core.press(sunk.reshape(-1))
         on = _KPA * pressure.reshape(self.array.shape)
         # MPa mm^2 is N.
@@ -198,7 +196,7 @@ class Layer:
 
 
 def _waves(waves: ArrayLike) -> NDArray[np.float64]:
-    checked = numbers("waves", waves, np.float64).reshape(-1)
+    checked = finite_numbers("waves", waves).reshape(-1)
     if not np.all(checked >= 0):
         raise ProblemError("waves: must be 0 or more")
     return checked

@@ -103,6 +103,7 @@ class EmulateOptions:
     def for_rust(self) -> dict[str, Any]:
         """Return the completed options as Rust reads them."""
         registers = instance("registers", self.registers, Registers)
+        baud, overwrite = whole("baud", self.baud, 300, 4_000_000), flag("overwrite", self.overwrite)
         return {
             "registers": registers._held,
             "tare_ms": None if isinstance(self.touch, Replay | Pipe) else number("tare_ms", self.tare_ms),
@@ -112,8 +113,8 @@ class EmulateOptions:
                 instance("version_2", Version2() if self.version_2 is None else self.version_2, Version2)
             ),
             "control": None if self.control is None else text("control", self.control),
-            "line": None if self.line is None else (_path("line", self.line), whole("baud", self.baud, 300, 4_000_000)),
-            "sync": None if self.sync is None else (_path("sync", self.sync), flag("overwrite", self.overwrite)),
+            "line": None if self.line is None else (_path("line", self.line), baud),
+            "sync": None if self.sync is None else (_path("sync", self.sync), overwrite),
             **reading(self.circuit, self.asynchronous),
             "flaws": None if self.flaws is None else instance("flaws", self.flaws, Flaws)._parts(),
             "faults": None if self.faults is None else instance("faults", self.faults, Faults)._parts(),
