@@ -5,7 +5,13 @@
 
 use std::fmt;
 
-use crate::{Result, problem};
+use crate::{Error, Result, problem};
+
+/// The least value above 0 of a parameter: its square and what is divided by it stay within what a float holds.
+const LEAST: f64 = 1e-100;
+
+/// The largest weight of a neuron: no sum of weighted kernels overflows.
+const LARGEST_WEIGHT: f64 = 1e100;
 
 /// A range of values. If an infinite end is excluded, the value must be finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,9 +65,13 @@ impl Range {
         Self { most, most_in: false, ..self }
     }
 
-    /// Whether a value is in the range; NaN never is.
+    /// Whether a value is in the range; NaN never is, nor what is nearer to 0 than [`LEAST`].
     #[must_use]
     pub fn holds(&self, value: f64) -> bool {
+        (value == 0.0 || value.abs() >= LEAST) && self.spans(value)
+    }
+
+    fn spans(&self, value: f64) -> bool {
         (if self.least_in { value >= self.least } else { value > self.least })
             && (if self.most_in { value <= self.most } else { value < self.most })
             && (self.step == 0.0 || {
@@ -121,11 +131,16 @@ impl Parameter {
             if outcome.is_ok() && !self.range.holds(value) {
                 let place = place.map_or(String::new(), |k| format!("[{k}]"));
                 let (name, unit, range) = (self.name, self.unit, self.range);
+                let near = if range.spans(value) {
+                    format!(", and if not 0 at least {LEAST:e} from it")
+                } else {
+                    String::new()
+                };
                 let value = written(value);
                 outcome = Err(match unit.strip_prefix('1') {
-                    Some(per) => problem!("{name}{place} is {value}{per}: must be {range}"),
-                    None if unit.is_empty() => problem!("{name}{place} is {value}: must be {range}"),
-                    None => problem!("{name}{place} is {value} {unit}: must be {range}"),
+                    Some(per) => problem!("{name}{place} is {value}{per}: must be {range}{near}"),
+                    None if unit.is_empty() => problem!("{name}{place} is {value}: must be {range}{near}"),
+                    None => problem!("{name}{place} is {value} {unit}: must be {range}{near}"),
                 });
             }
         });
@@ -207,7 +222,13 @@ pub fn above_0(name: &'static str, value: f64, unit: &'static str) -> Result<()>
     Parameter { name, unit, range: Range::ABOVE_0 }.check(&value)
 }
 
-/// Refuses weights unless there is one finite weight per train.
+/// Whether a weight is one that a neuron can sum, mV; NaN is none.
+#[must_use]
+pub fn is_weight(weight: f64) -> bool {
+    weight.abs() <= LARGEST_WEIGHT
+}
+
+/// Refuses weights unless there is one per train that a neuron can sum.
 ///
 /// # Errors
 ///
@@ -216,10 +237,18 @@ pub fn one_weight_a_train(weights: &[f64], trains: usize) -> Result<()> {
     if weights.len() != trains {
         return Err(problem!("weights: {} for {trains} trains, must be one a train", weights.len()));
     }
-    if let Some(n) = weights.iter().position(|w| !w.is_finite()) {
-        return Err(problem!("weights[{n}] is {}: must be finite", weights[n]));
-    }
-    Ok(())
+    weights.iter().position(|&w| !is_weight(w)).map_or(Ok(()), |n| Err(no_weight(&format!("weights[{n}]"), weights[n])))
+}
+
+/// The error of what is no weight.
+#[must_use]
+pub fn no_weight(place: &str, weight: f64) -> Error {
+    let right = if weight.is_finite() {
+        format!("from -{LARGEST_WEIGHT:e} to {LARGEST_WEIGHT:e}")
+    } else {
+        "finite".to_owned()
+    };
+    problem!("{place} is {}: must be {right}", written(weight))
 }
 
 #[cfg(test)]
@@ -230,8 +259,10 @@ mod tests {
     fn a_range_says_what_it_holds() {
         for (range, text, inside, outside) in [
             (Range::FINITE, "finite", -1e300, f64::INFINITY),
-            (Range::ABOVE_0, "above 0 and finite", 5e-324, 0.0),
+            (Range::ABOVE_0, "above 0 and finite", 1e-100, 0.0),
+            (Range::ABOVE_0, "above 0 and finite", 1.0, 5e-324),
             (Range::FROM_0, "0 or more and finite", 0.0, -5e-324),
+            (Range::FROM_0, "0 or more and finite", -0.0, 9e-101),
             (Range::COST, "0 or more", f64::INFINITY, -1.0),
             (Range::ABOVE_0.at_most(4.0), "above 0 and at most 4", 4.0, 4.1),
             (Range::FROM_0.below(1.0), "0 or more and below 1", 0.0, 1.0),
@@ -251,6 +282,10 @@ mod tests {
         assert_eq!(message("", &f64::NAN), "tau is NaN: must be above 0 and finite");
         assert_eq!(message("1/ms", &-1.0), "tau is -1/ms: must be above 0 and finite");
         assert_eq!(message("mV", &[1.0, -2.0]), "tau[1] is -2 mV: must be above 0 and finite");
+        assert_eq!(
+            message("ms", &5e-324),
+            "tau is 5e-324 ms: must be above 0 and finite, and if not 0 at least 1e-100 from it"
+        );
         assert!(parameter("ms").check(&None::<f64>).is_ok());
     }
 }

@@ -18,12 +18,13 @@ pyo3::create_exception!(taxel, DeviceError, Error, "The board, its registers or 
 pyo3::create_exception!(taxel, SceneError, Error, "A simulated scene that cannot be played.");
 
 pub(crate) fn core(error: CoreError) -> PyErr {
+    let text = error.to_string();
     // No wildcard arm: a new kind does not compile until it has a class.
     match error {
-        CoreError::Format(text) => FormatError::new_err(text),
-        CoreError::Problem(text) => ProblemError::new_err(text),
-        CoreError::Device(text) => DeviceError::new_err(text),
-        CoreError::Scene(text) => SceneError::new_err(text),
+        CoreError::Format(_) => FormatError::new_err(text),
+        CoreError::Problem(_) => ProblemError::new_err(text),
+        CoreError::Device(_) => DeviceError::new_err(text),
+        CoreError::Scene(_) => SceneError::new_err(text),
         CoreError::Interrupted => PyKeyboardInterrupt::new_err(()),
     }
 }

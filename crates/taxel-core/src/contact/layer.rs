@@ -1,5 +1,8 @@
 //! What lies between the foam's upper face, where the ball presses, and its lower one, where the taxels are.
 
+/// From this wave number times the thickness on `e^-x` is 0.
+const SHORT: f64 = 1e3;
+
 /// The share of a pressure wave on the upper face of a bonded elastic layer that arrives at its base.
 ///
 /// `x` is the wave number times the thickness. The layer is bonded at its base and pressed without shear above:
@@ -9,7 +12,8 @@
 #[must_use]
 pub fn base_stress(x: f64, poisson: f64) -> f64 {
     let m = 2.0 * (1.0 - poisson);
-    // Above and below divided by cosh^2, so that nothing overflows.
+    // Above and below divided by cosh^2, so that nothing overflows; shorter waves do not arrive either.
+    let x = x.min(SHORT);
     let (tanh, one_over_cosh) = (x.tanh(), 1.0 / x.cosh());
     let above = m * (m + x * tanh) * one_over_cosh;
     above / (m * m - (m - 1.0).powi(2) * tanh * tanh + (x * one_over_cosh).powi(2))
@@ -28,16 +32,35 @@ pub fn surface_compliance(x: f64, poisson: f64) -> f64 {
         // Both parts of the fraction vanish; what is left out is of the order of x^2.
         return (1.0 + poisson) * (1.0 - 2.0 * poisson) / (1.0 - poisson);
     }
-    // Above and below times e^-2x, so that nothing overflows.
-    let decay = (-2.0 * x).exp();
-    let above = k * (1.0 - decay * decay) - 4.0 * x * decay;
-    let below = k * (1.0 + decay * decay) + (4.0 * x * x + 1.0 + k * k) * decay;
+    // Above and below times e^-2x, so that nothing overflows; of shorter waves both are k.
+    let short = x.min(SHORT);
+    let decay = (-2.0 * short).exp();
+    let above = k * (1.0 - decay * decay) - 4.0 * short * decay;
+    let below = k * (1.0 + decay * decay) + (4.0 * short * short + 1.0 + k * k) * decay;
     2.0 * plane / x * above / below
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn waves_of_any_length_have_a_number() {
+        for nu in [0.0, 0.3, 0.5] {
+            let mut before = (f64::INFINITY, f64::INFINITY);
+            for power in -320..=308 {
+                let x = format!("1e{power}").parse().unwrap();
+                let now = (surface_compliance(x, nu), base_stress(x, nu));
+                assert!(now.0 >= 0.0 && now.1 >= 0.0 && now.1 <= before.1 + 1e-12, "{x}: {now:?}, before {before:?}");
+                if x > 100.0 {
+                    // A half-space.
+                    assert!((now.0 * x / (2.0 * (1.0 - nu * nu)) - 1.0).abs() < 1e-9, "{x}: {now:?}");
+                }
+                before = now;
+            }
+            assert_eq!((surface_compliance(f64::INFINITY, nu), base_stress(f64::INFINITY, nu)), (0.0, 0.0));
+        }
+    }
 
     type Matrix = [[f64; 4]; 4];
 

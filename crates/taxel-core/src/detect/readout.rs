@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::above_0;
+use crate::allowed::{above_0, is_weight, no_weight};
 use crate::detect::stream::{Inputs, NamedNeuron, Neurons, Ranges};
 use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
 use crate::encode::{Composite, Encoder, Tare};
@@ -102,8 +102,8 @@ impl Readout {
                     one.delay_ms
                 ));
             }
-            if let Some(n) = one.weights.iter().position(|w| !w.is_finite()) {
-                return Err(problem!("{label}: weights[{n}] is {}: must be finite", one.weights[n]));
+            if let Some(n) = one.weights.iter().position(|&w| !is_weight(w)) {
+                return Err(no_weight(&format!("{label}: weights[{n}]"), one.weights[n]));
             }
             if let Some(array) = &self.array {
                 self.check_weights(label, one, array)?;

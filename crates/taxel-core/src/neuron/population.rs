@@ -13,6 +13,7 @@ pub use lanes::Weight;
 use lanes::LANES;
 
 use super::model::{Neuron, Time};
+use crate::allowed::{is_weight, no_weight};
 use crate::{Result, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The input sequence, computed once for all neurons.
@@ -67,11 +68,10 @@ impl Neuron {
             let count = LANES.min(neurons - first);
             gather(&weights[first * trains.len()..(first + count) * trains.len()], &mut block);
             if let Some((train, row)) =
-                block.iter().enumerate().find(|(_, row)| !row.iter().all(|&w| w.into().is_finite()))
+                block.iter().enumerate().find(|(_, row)| !row.iter().all(|&w| is_weight(w.into())))
             {
-                let lane = row.iter().position(|&w| !w.into().is_finite()).unwrap_or(0);
-                let value: f64 = row[lane].into();
-                return Err(problem!("weights[{}, {train}] is {value}: must be finite", first + lane));
+                let lane = row.iter().position(|&w| !is_weight(w.into())).unwrap_or(0);
+                return Err(no_weight(&format!("weights[{}, {train}]", first + lane), row[lane].into()));
             }
             match &script {
                 Script::Continuous(script) => continuous::run(self, script, &block, &mut fired, stop)?,

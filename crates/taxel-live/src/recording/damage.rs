@@ -102,6 +102,8 @@ pub(crate) const JUMPS: &str = "jumps_of_time";
 /// and how often the clock left that of arrival little by little.
 pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
 pub(super) const ANEW: &str = "clock_began_anew";
+/// Of a stream of numbers: values that a line says are missing (`nan`).
+pub(super) const MISSING: &str = "missing_values";
 pub(super) const BACK: &str = "stamps_out_of_order";
 pub(super) const DRIFTS: &str = "drifts_from_arrival";
 /// Datagrams of version 1 without bytes.

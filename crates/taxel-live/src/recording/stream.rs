@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
-use super::damage::{Found, STRANGE};
+use super::damage::{Found, MISSING, STRANGE};
 use super::limits;
 use clock::StreamClock;
 
@@ -79,11 +79,12 @@ impl Stream {
         values.len() == self.columns.len()
     }
 
-    /// Parses a line of numbers separated by commas, semicolons, tabs or blanks; `None` if a field is not a number, or
-    /// if the number of fields differs from that of columns.
+    /// Parses a line of numbers separated by commas, semicolons, tabs or blanks; `None` if a field is not a number that
+    /// is held, or if the number of fields differs from that of columns.
     #[must_use]
     pub fn parse(&self, line: &str) -> Option<Vec<f64>> {
-        let values = fields(line).map(|field| field.parse().ok()).collect::<Option<Vec<f64>>>()?;
+        let number = |field: &str| field.parse().ok().filter(|&value| is_held(value));
+        let values = fields(line).map(number).collect::<Option<Vec<f64>>>()?;
         self.fits(&values).then_some(values)
     }
 
@@ -94,6 +95,11 @@ impl Stream {
             self.columns.iter().zip(values).map(|(name, &value)| (name.clone(), Value::from(value))).collect();
         serde_json::json!({ "values": named })
     }
+}
+
+/// Whether a number is a value that pictures hold, which have 32 bits, or NaN, a missing one; infinity is none.
+fn is_held(value: f64) -> bool {
+    value.is_nan() || value.abs() <= f64::from(f32::MAX)
 }
 
 /// The fields of a line of text.
@@ -146,12 +152,14 @@ impl<'a> Sampling<'a> {
         let message: Value = serde_json::from_slice(data).ok()?;
         let named = message.get("values")?.as_object()?;
         let values = self.stream.values().map(|name| Some(named.get(name)?.as_f64().unwrap_or(f64::NAN)));
-        let values = values.collect::<Option<_>>()?;
+        let values = values.collect::<Option<Vec<f64>>>().filter(|values| values.iter().copied().all(is_held))?;
         let stamp = match &self.stream.time {
             None => None,
             Some(time) => Some(named.get(time)?.as_f64()?),
         };
-        Some((self.faults.time(stamp, at_ns)?, values))
+        let t = self.faults.time(stamp, at_ns)?;
+        self.faults.missing(&values);
+        Some((t, values))
     }
 
     pub(super) fn finish(self) -> Samples {
@@ -163,6 +171,7 @@ impl<'a> Sampling<'a> {
 #[derive(Debug, Clone)]
 pub struct Faults {
     strange: u64,
+    missing: u64,
     clock: StreamClock,
 }
 
@@ -170,12 +179,17 @@ impl Faults {
     /// None so far.
     #[must_use]
     pub fn new(stream: &Stream) -> Self {
-        Self { strange: 0, clock: StreamClock::new(stream.unit_us) }
+        Self { strange: 0, missing: 0, clock: StreamClock::new(stream.unit_us) }
     }
 
     /// Counts a line that could not be read.
     pub fn strange(&mut self) {
         self.strange += 1;
+    }
+
+    /// Counts the values of a line that are missing.
+    fn missing(&mut self, values: &[f64]) {
+        self.missing += values.iter().filter(|value| value.is_nan()).count() as u64;
     }
 
     /// The time, us, of a line with this stamp or none that arrived at `at_ns`; none if the stamp is no time.
@@ -189,8 +203,9 @@ impl Faults {
     /// Counts a line of values, with the clock's stamp among them.
     pub fn line(&mut self, stream: &Stream, values: &[f64], at_ns: i64) {
         let clock = stream.columns.iter().position(|name| Some(name) == stream.time.as_ref());
-        if self.time(clock.map(|column| values[column]), at_ns).is_none() {
-            self.strange();
+        match self.time(clock.map(|column| values[column]), at_ns) {
+            Some(_) => self.missing(values),
+            None => self.strange(),
         }
     }
 
@@ -198,7 +213,7 @@ impl Faults {
     #[must_use]
     pub fn found(&self) -> Found {
         let mut found = self.clock.found();
-        found.damage.insert(STRANGE.to_owned(), self.strange);
+        found.damage.extend([(STRANGE.to_owned(), self.strange), (MISSING.to_owned(), self.missing)]);
         found
     }
 }
@@ -255,7 +270,8 @@ mod tests {
         for line in ["1,2.5,-3e2", "1; 2.5; -3e2", "1\t2.5\t-300", " 1 2.5  -300 "] {
             assert_eq!(stream.parse(line), Some(vec![1.0, 2.5, -300.0]), "{line:?}");
         }
-        for line in ["", "1,2", "1,2,3,4", "1,2,x", "t_us,ax,ay"] {
+        let nothing_held = ["1,2,inf", "1,-Infinity,3", "1,2,1e400", "inf,2,3", "1,2,1e39", "1_0,2,3", "1,2,\u{663}"];
+        for line in ["", "1,2", "1,2,3,4", "1,2,x", "t_us,ax,ay"].into_iter().chain(nothing_held) {
             assert_eq!(stream.parse(line), None, "{line:?}");
         }
     }
@@ -370,13 +386,39 @@ mod tests {
         let stream = stream(&["t_us", "a"]);
         let mut sampling = Sampling::new(&stream);
         let mut live = Faults::new(&stream);
-        for (k, stamp) in [1.0, f64::NAN, 1e300, 2.0].into_iter().enumerate() {
+        for (k, stamp) in [1.0, f64::NAN, 1e300, 4_503_599_627_370_497.0, -5e15, 2.0].into_iter().enumerate() {
             sampling.push(k as i64, k as u64, stream.message(&[stamp, 1.0]).to_string().as_bytes());
             live.line(&stream, &[stamp, 1.0], k as i64);
         }
         let samples = sampling.finish();
-        assert_eq!((&samples.t[..], samples.found.damage[STRANGE]), (&[1, 2][..], 2));
+        assert_eq!((&samples.t[..], samples.found.damage[STRANGE]), (&[1, 2][..], 4));
         assert_eq!(live.found(), samples.found);
+    }
+
+    #[test]
+    fn a_missing_value_is_counted_live_and_in_the_file_and_is_no_damage() {
+        let stream = stream(&["t_us", "a", "b"]);
+        let (mut sampling, mut live) = (Sampling::new(&stream), Faults::new(&stream));
+        for (k, line) in ["1,nan,2", "2,3,4", "3,NaN,nan", "nan,nan,1"].into_iter().enumerate() {
+            let values = stream.parse(line).unwrap();
+            sampling.push(k as i64 * 1000, k as u64, stream.message(&values).to_string().as_bytes());
+            live.line(&stream, &values, k as i64 * 1000);
+        }
+        let samples = sampling.finish();
+        assert_eq!(samples.values.iter().filter(|value| value.is_nan()).count(), 3);
+        assert_eq!((samples.found.damage[MISSING], samples.found.damage[STRANGE]), (3, 1));
+        assert_eq!(live.found(), samples.found);
+    }
+
+    #[test]
+    fn a_value_of_a_file_that_no_picture_holds_makes_its_line_strange() {
+        let stream = stream(&["a"]);
+        let mut sampling = Sampling::new(&stream);
+        for (k, data) in [r#"{"values":{"a":1e39}}"#, r#"{"values":{"a":-1e300}}"#].into_iter().enumerate() {
+            sampling.push(k as i64, k as u64, data.as_bytes());
+        }
+        let samples = sampling.finish();
+        assert_eq!((samples.values.len(), samples.found.damage[STRANGE]), (0, 2));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::damage::{
-    ADDRESS, ANEW, BOARD_DROPPED, BOARD_RESET, EVENTS_DROPPED, Found, OTHER_BOARD, REPAIRED, REPEATED,
+    ADDRESS, ANEW, BOARD_DROPPED, BOARD_RESET, EVENTS_DROPPED, Found, MISSING, OTHER_BOARD, REPAIRED, REPEATED,
 };
 use super::topic::Topic;
 use crate::bridged::Bridged;
@@ -349,6 +349,7 @@ impl Verdict {
             (of_board(REPAIRED), REPAIRED, "values repaired from the board's refresh"),
             (of_board(BOARD_RESET), BOARD_RESET, "resets of the board"),
             (of_board(ANEW), ANEW, "restarts of its clock"),
+            (of_board(MISSING), MISSING, "missing values"),
             (of_board(ADDRESS), ADDRESS, "changes of the sender's address"),
         ] {
             if n > 0 {
@@ -371,7 +372,7 @@ impl Verdict {
 
     /// Adds what a decoder could not use; returns its line.
     fn damage_of(&mut self, decoder: &BTreeMap<String, u64>) -> Option<String> {
-        let no_damage = [BOARD_DROPPED, EVENTS_DROPPED, BOARD_RESET, REPAIRED, ANEW, ADDRESS];
+        let no_damage = [BOARD_DROPPED, EVENTS_DROPPED, BOARD_RESET, REPAIRED, ANEW, MISSING, ADDRESS];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
             // Of version 2 each is decoded once.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::Numbers;
+use crate::allowed::{Numbers, is_weight};
 use crate::{Result, problem};
 
 /// A lower or an upper bound on the weights, mV.
@@ -85,9 +85,9 @@ pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
     }
     for n in 0..each.unwrap_or(1) {
         let (low, high) = (lb.at(n), ub.at(n));
-        if !(low.is_finite() && high.is_finite() && low <= high) {
+        if !(is_weight(low) && is_weight(high) && low <= high) {
             let place = if each.is_some() { format!("bounds of synapse {n}:") } else { "bounds".to_owned() };
-            return Err(problem!("{place} {low} to {high} mV: lb must not lie above ub, both finite"));
+            return Err(problem!("{place} {low} to {high} mV: lb must not lie above ub, both within 1e100"));
         }
     }
     Ok(())

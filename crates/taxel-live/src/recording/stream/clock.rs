@@ -13,8 +13,8 @@ const STEP_US: f64 = 1e6;
 /// The part of what has passed by which the clock may be off, as no oscillator is.
 const DRIFT: f64 = 1e-2;
 
-/// Times are held in 64 bits: a stamp beyond this is no time, us.
-const FARTHEST_US: f64 = 4.6e18;
+/// A stamp beyond this is no time, us: 142 years, as in all files, so that times also fit in 64 bits as ns.
+const FARTHEST_US: f64 = 4_503_599_627_370_496.0;
 
 /// Turns stamps into times, us, unwrapped over turns of a 32-bit counter and continued over restarts.
 #[derive(Debug, Clone)]
