@@ -27,10 +27,22 @@ mpl.use("Agg")
 #: Phrases of parsers that must not occur in taxel's errors.
 PARSERS = r"invalid (type|value|length)|(unknown|missing|duplicate) (variant|field)|, expected |did not match|`"
 
+
+class Endless:
+    """What nobody can show: its representation calls itself."""
+
+    def __repr__(self) -> str:
+        return repr(self)
+
+
 NONSENSE: dict[str, Any] = {
     "None": None,
     "NaN": math.nan,
-    "infinity": -math.inf,
+    "infinity": math.inf,
+    "minus infinity": -math.inf,
+    "minus zero": -0.0,
+    "a tiny float": 1e-300,
+    "a large float": 1e300,
     "minus one": -1,
     "zero": 0,
     "a half": 0.5,
@@ -40,12 +52,27 @@ NONSENSE: dict[str, Any] = {
     "true": True,
     "text": "nonsense",
     "text with a zero": "\0",
+    "a number in text": "1_000",
+    "a number in Arabic digits": "\u0663",
+    "this folder": ".",
+    "the folder above": "..",
+    "the root folder": "/",
     "bytes": b"\x80\xff",
     "an object": object(),
     "a class": int,
+    "a class of numbers": np.float64,
+    "a class of taxel": taxel.Frames,
+    "a module": np,
+    "an endless representation": Endless(),
     "a function": len,
     "nothing in a list": [],
     "NaN in a list": [math.nan],
+    "infinity in a list": [math.inf],
+    "a huge float in a list": [1e308],
+    "the least float in a list": [5e-324],
+    "a text in a list": ["1.5"],
+    "a text in a list in a list": [["1.5"]],
+    "endless representations in a list": [Endless()],
     "None in a list": [None],
     "a ragged list": [[1.0, 2.0], [3.0]],
     "three dimensions": np.zeros((2, 3, 4)),
@@ -198,3 +225,93 @@ def test_nonsense_in_each_argument_is_one_clear_error(name: str) -> None:
             except BaseException as error:  # what else comes out is a fault, a panic too
                 faults.append(f"{argument} = {kind}: {type(error).__name__}: {error}")
     assert not faults, "\n".join(["", *faults])
+
+
+#: What NaN or infinity means where it is taken as a number, as the docstrings say, and where.
+MEANS = [
+    ("NaN", "a value is missing", ["Frames(values)", "Frames.from_events(held)", "live.Live.sample(values)"]),
+    ("NaN", "there is no taxel", ["Places(x)", "Places(y)", "Places(area)"]),
+    ("infinity", "there is no taxel", ["Places(x)", "Places(y)", "Places(area)"]),
+    ("infinity", "to the end", ["Events.between(stop)", "Frames.between(stop)", "Detections.between(stop)"]),
+    ("infinity", "to the end", ["Recording.between(stop)", "cut(stop_us)", "detect.Part(stop)"]),
+    ("infinity", "for ever", ["device.Cable.reopen(within)", "device.Device(patience)"]),
+    ("infinity", "no spike is moved", ["metrics.victor_purpura(q)"]),
+    ("infinity", "no spike is moved", ["metrics.victor_purpura_multi_unit(q)", "metrics.victor_purpura_multi_unit(k)"]),
+    ("NaN", "its reader has checked the row", ["Note(t)", "Note(at_ns)", "Note(replaces)"]),
+    ("infinity", "its reader has checked the row", ["Note(t)", "Note(at_ns)", "Note(replaces)"]),
+]
+
+
+def with_number(value: Any, number: float) -> Any:
+    """An argument with a number in the place of its first one; None if it holds none."""
+    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+        return number
+    if isinstance(value, list) and any(isinstance(entry, list | np.ndarray) for entry in value):
+        place, first = next(
+            ((k, one) for k, entry in enumerate(value) if (one := with_number(entry, number)) is not None), (0, None)
+        )
+        return None if first is None else [*value[:place], first, *value[place + 1 :]]
+    if isinstance(value, list | tuple | np.ndarray):
+        array = np.array(value)
+        if array.dtype.kind in "iuf" and array.size:
+            array = array.astype(np.float64)
+            array.flat[0] = number
+            return array
+    return None
+
+
+def nans(value: Any) -> int:
+    """The number of NaN in a result of numbers."""
+    if isinstance(value, tuple | list):
+        return sum(map(nans, value))
+    array = value if isinstance(value, np.ndarray) else np.array(value if isinstance(value, float) else 0.0)
+    return int(np.isnan(array).sum()) if array.dtype.kind == "f" else 0
+
+
+@pytest.mark.usefixtures("somewhere")
+@pytest.mark.parametrize("name", SOUND)
+def test_nan_and_infinity_are_refused_where_they_mean_nothing(name: str) -> None:
+    taken = []
+    for argument in SOUND[name]()[1]:
+        for kind, number in (("NaN", math.nan), ("infinity", math.inf)):
+            function, arguments = SOUND[name]()
+            wrong = with_number(arguments[argument], number)
+            if wrong is None:
+                continue
+            try:
+                function(**{**arguments, argument: wrong})
+                taken.append((f"{name}({argument})", kind))
+            except (taxel.Error, OSError):
+                pass
+    meant = [(f"taxel.{place}", kind) for kind, _, places in MEANS for place in places]
+    assert sorted(taken) == sorted(one for one in meant if one[0].startswith(f"{name}("))
+
+
+#: Results that are not a number of sound arguments too, as their docstrings say.
+NO_NUMBER = {
+    "taxel.Frames.centre": "no taxel counts",
+    "taxel.simulate.circuit.Converter.ticks": "a comparator had not returned",
+}
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.usefixtures("somewhere")
+@pytest.mark.parametrize("name", set(SOUND) - set(NO_NUMBER))
+def test_numbers_give_numbers(name: str) -> None:
+    """Finite arguments, however large or small, are refused or give a result without NaN, where the sound call has."""
+    faults = []
+    function, arguments = SOUND[name]()
+    least = nans(function(**arguments))
+    for argument in arguments:
+        for number in (1e308, -1e308, 1e200, 5e-324, 1e-300, -0.0):
+            function, arguments = SOUND[name]()
+            wrong = with_number(arguments[argument], number)
+            if wrong is None:
+                continue
+            try:
+                if nans(function(**{**arguments, argument: wrong})) > least:
+                    faults.append(f"{argument} = {number}")
+            except (taxel.Error, OSError) as error:
+                if len(str(error)) > 400:
+                    faults.append(f"{argument} = {number}: {error}")
+    assert not faults, faults
