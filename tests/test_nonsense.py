@@ -251,12 +251,11 @@ def with_number(value: Any, number: float) -> Any:
             ((k, one) for k, entry in enumerate(value) if (one := with_number(entry, number)) is not None), (0, None)
         )
         return None if first is None else [*value[:place], first, *value[place + 1 :]]
-    if isinstance(value, list | tuple | np.ndarray):
-        array = np.array(value)
-        if array.dtype.kind in "iuf" and array.size:
-            array = array.astype(np.float64)
-            array.flat[0] = number
-            return array
+    numbers = isinstance(value, list | tuple) and all(isinstance(one, int | float | np.number) for one in value)
+    if numbers or (isinstance(value, np.ndarray) and value.dtype.kind in "iuf"):
+        array = np.array(value, np.float64)
+        array.flat[:1] = number
+        return array if array.size else None
     return None
 
 

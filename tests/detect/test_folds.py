@@ -174,6 +174,13 @@ def test_folds_that_are_stated_are_those_that_are_judged() -> None:
         assert set(made.learners) == {"contact", "lift"}
 
 
+def test_the_place_of_an_example_may_be_a_float() -> None:
+    data = examples(1, 2)
+    stated, floats = ([Fold([Part(one)], [Part(other)])] for one, other in ((0, 1), (-0.0, 1.0)))  # type: ignore[arg-type]
+    one, other = (judge(data, recipe(), folds, window_ms=10.0) for folds in (stated, floats))
+    assert [score.to_dict() for score in one.scores] == [score.to_dict() for score in other.scores]
+
+
 def test_only_what_a_fold_tests_is_scored() -> None:
     data = examples(1, 2)
     times = np.sort(np.concatenate(list(data[1].labels.values())))

@@ -131,6 +131,17 @@ def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
     assert taxel.open(tmp_path / "turned" / "kept.npz").frames() == recording.frames()
 
 
+def test_pictures_that_would_come_after_the_times_of_files_are_refused(tmp_path: Path) -> None:
+    table(tmp_path, lines(np.ones((5, 6))), "rate_hz = 1e-9")
+    with pytest.raises(FormatError, match="1e-09 Hz: picture 9 comes at 9e.09 s; must lie within 142 years"):
+        table(tmp_path, lines(np.ones((10, 6))), "rate_hz = 1e-9")
+
+
+def test_readings_whose_difference_no_picture_holds_are_named(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"step\.layout\.toml: falls is -3.*; step.* reads 3.*does not fit 32 bits"):
+        table(tmp_path, lines(np.full((3, 6), 3.0e38)), "falls = -3e38\nrate_hz = 100")
+
+
 @pytest.mark.parametrize("falls", ["", "falls = true\n", "falls = 300\n"])
 def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls: str) -> None:
     values = np.random.default_rng(1).integers(0, 3, (400, 6)).astype(float)
@@ -325,8 +336,14 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("side = 'up'", "side"),
         ("heel = 'left'", "heel"),
         ("falls = 'yes'", "falls"),
+        ("falls = 1e300", r"falls is .*: must be from -3.40282e\+38 to 3.40282e\+38"),
+        ("falls = -1e300", "falls is -"),
+        ("falls = inf", "falls is inf"),
+        ("falls = nan", "falls is nan"),
         ("unit = ''", "unit"),
-        ("rate_hz = 0", "rate_hz is 0: must be above 0"),
+        ("rate_hz = 0", r"rate_hz is 0: must be from 1e-09 to 1e\+06"),
+        ("rate_hz = 1e-300", "rate_hz is 1e-300: must be from 1e-09"),
+        ("rate_hz = nan", "rate_hz is nan"),
         ("table = 3", "table"),
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
         ("[table]\nskip_lines = 40", "no line after 40 skipped ones"),

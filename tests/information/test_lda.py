@@ -49,6 +49,35 @@ def test_discriminants_are_scikit_learns_svd(trials, features, classes):
     assert np.array_equal(ours.predict(new), theirs.predict(new))
 
 
+@pytest.mark.parametrize("scale", [1e-100, 1.0, 1e100])
+@pytest.mark.parametrize("ridge", [5e-324, 1e-310, 1e-200, 1e-17])
+def test_a_ridge_that_rounding_loses_is_named(ridge, scale):
+    x, y = np.random.default_rng(3).normal(size=(30, 4)), np.repeat([0, 1, 2], 10)
+    gram = scale * (x @ x.T)
+    with pytest.raises(ProblemError, match=r"^ridge: .* is lost in their rounding; must be .* at least"):
+        nested_predictions([gram], [4], y, ridges=[1.0, ridge])
+    with pytest.raises(ProblemError, match=r"^ridge: .* is lost in their rounding"):
+        GramLDA(features=4, ridge=ridge).fit(gram, y)
+
+
+@pytest.mark.parametrize("trials", [10, 200])
+@pytest.mark.parametrize("power", [-4, -8, -12])
+def test_a_ridge_above_rounding_is_solved(trials, power):
+    x, y = np.random.default_rng(4).normal(size=(trials, 4)), np.arange(trials) % 2
+    assert nested_predictions([x @ x.T], [4], y, ridges=[10.0**power], count=3).responses.shape == (trials,)
+
+
+def test_what_is_no_inner_product_is_refused_where_it_is_classified():
+    x, y = np.random.default_rng(3).normal(size=(10, 4)), np.arange(10) % 2
+    lda = GramLDA(features=4).fit(x @ x.T, y)
+    for wrong in (np.nan, np.inf, -np.inf):
+        across = x @ x.T
+        across[2, 3] = wrong
+        for ask in (lda.decision_function, lda.predict):
+            with pytest.raises(ProblemError, match=r"gram\[2, 3\] is"):
+                ask(across)
+
+
 @pytest.mark.parametrize("ridge", [0.01, 0.5, 20.0])
 def test_a_ridge_is_scikit_learns_shrinkage_also_from_inner_products(ridge):
     for trials, features in ((90, 12), (60, 300)):
@@ -260,7 +289,7 @@ def test_a_class_that_a_training_set_lacks_is_said():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: LDA(ridge=-1), "0 or more"),
+        (lambda: LDA(ridge=-1), "from 0 to"),
         (lambda: LDA().fit([[1.0, np.nan], [2.0, 3.0]], [0, 1]), r"x\[0, 1\] is not finite"),
         (lambda: LDA().fit(np.ones((6, 2)), [0, 1] * 3), "no feature varies"),
         (lambda: LDA().fit(np.ones((6, 2)), [0] * 6), "must be two at least"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -153,6 +154,23 @@ def test_what_is_cut_along_a_column_and_put_beside_is_whole_again(tmp_path: Path
         order = [np.lexsort((e.p, e.y, e.x, e.t)) for e in (mine, theirs)]
         for name in ("t", "x", "y", "p"):
             assert np.array_equal(getattr(mine, name)[order[0]], getattr(theirs, name)[order[1]])
+
+
+@pytest.mark.parametrize(
+    ("asked", "there"),
+    [
+        ({"columns": slice(3, 99)}, "columns 3 to 99: there are 6 columns, 0 to 5"),
+        ({"columns": slice(7, None)}, "columns 7 to the last: there are 6 columns"),
+        ({"rows": slice(None, 5)}, "rows 0 to 5: there are 4 rows, 0 to 3"),
+        ({"rows": slice(-9, 2)}, "rows -9 to 2: there are 4 rows"),
+    ],
+)
+def test_a_part_beyond_the_array_is_refused(tmp_path: Path, asked: dict[str, slice], there: str) -> None:
+    frames = taxel.Frames(np.zeros((2, 4, 6)), [0, 100])
+    rec = opened(frames, tmp_path)
+    with pytest.raises(taxel.ProblemError, match=re.escape(there)):
+        taxel.cut(rec, **asked)
+    assert taxel.cut(rec, columns=slice(3, 6), rows=slice(-2, None))[0].array.shape == (2, 3)
 
 
 def test_pictures_are_cut_and_put_beside_to_the_last_bit(tmp_path: Path) -> None:

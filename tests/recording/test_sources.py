@@ -248,6 +248,28 @@ def test_columns_are_learnt_from_the_first_line_of_a_pipe(tmp_path: Path) -> Non
     np.testing.assert_array_equal(imu.frames().values.ravel(), [2, 1, 3])
 
 
+def test_what_a_line_does_not_hold_is_counted_and_a_missing_value_too(tmp_path: Path) -> None:
+    pipe = tmp_path / "imu"
+    os.mkfifo(pipe)
+    writer = os.open(pipe, os.O_RDWR)
+    os.write(writer, b"t_us,ax,ay\n")
+    sound = b"1000,1,2\n2000,nan,2\n3000,nan,NaN\n4000,-3e38,4\n"
+    strange = b"2500,inf,1\n2500,-Infinity,1\n2500,1e400,1\n2500,1e39,1\n2500,1_0,1\n"
+    no_time = b"5000000000000000,1,1\nnan,1,1\n-1e300,1,1\n"
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"pipe:{pipe}"}) as live:
+        os.write(writer, sound + strange + "2500,\u0663,1\n".encode() + no_time)
+        until(lambda: lines(live, "imu") == 13)
+    os.close(writer)
+    imu = taxel.open(tmp_path / "imu.mcap").sources["imu"]
+    np.testing.assert_array_equal(imu.frames().t, [1000, 2000, 3000, 4000])
+    np.testing.assert_array_equal(
+        imu.frames().values[:, 0], np.float32([[1, 2], [np.nan, 2], [np.nan, np.nan], [-3e38, 4]])
+    )
+    assert imu.verdict.damaged == {"lines_that_could_not_be_read": 9}
+    assert imu.verdict.noted == {"missing_values": 3}
+    assert "9 lines that could not be read; 3 missing values" in imu.verdict
+
+
 @pytest.mark.parametrize("first", ["t_s,ax\n", ""])
 def test_what_comes_with_the_first_line_is_kept_and_its_writer_lives(tmp_path: Path, first: str) -> None:
     pipe, said, done = tmp_path / "imu", threading.Event(), threading.Event()

@@ -59,6 +59,10 @@ def test_a_seed_gives_the_same_again_and_another_gives_another(played: Events) -
     assert worn(played, SINCE, seed=7, **how) != worn(played, SINCE, seed=8, **how)
 
 
+def test_minus_zero_is_zero(played: Events) -> None:
+    assert worn(played, 0, seed=1, drift=-0.0, age_min=-0.0) == worn(played, 0, seed=1)
+
+
 def test_nonsense_is_refused_by_name(played: Events) -> None:
     few = Events([0, 0], [0, 1], [0, 0], [True] * 2, array=Array(1, 2), intensity=np.array([5, 6]))
     for wrong, text in (

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,6 +12,8 @@ __all__ = ["LARGEST_RIDGE", "Regressions", "gram_matrix", "residual", "solved_wi
 
 #: The largest ridge, in units of the mean variance.
 LARGEST_RIDGE = 1e100
+#: The largest inner product: squares of sums of them do not overflow.
+_LARGEST = 1e140
 #: Directions in which classes vary less than this share of the largest count as none.
 _CUT = 1e-10
 #: Decimal digits to which the regression's predictions and the discriminants are rounded.
@@ -47,8 +47,7 @@ def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     least = trials * np.finfo(float).eps * float(np.abs(centred).max())
     if level < least:
         raise ProblemError(
-            f"ridge: {level:.3g} of inner products is lost in their rounding; must be {least:.3g} at least, so "
-            f"{least / level if level else math.inf:.2g} times as large"
+            f"ridge: {level:.3g} in the unit of inner products is lost in their rounding; must be {least:.3g} at least"
         )
     factor, fault = lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
     if fault:
@@ -204,12 +203,14 @@ def gram_matrix(gram: ArrayLike) -> NDArray[np.float64]:
 
     Raises
     ------
-    ProblemError : not square, not finite or not symmetric
+    ProblemError : not square, not finite, too large or not symmetric
     """
     square = finite_numbers("gram", gram)
     if square.ndim != 2 or square.shape[0] != square.shape[1] or not len(square):
         raise ProblemError(f"gram has shape {square.shape}: must be (trials, trials)")
-    if np.abs(square - square.T).max() > 1e-6 * max(np.abs(square).max(), 1e-300):
+    if (largest := float(np.abs(square).max())) > _LARGEST:
+        raise ProblemError(f"gram reaches {largest:.3g}: must be at most {_LARGEST:g}")
+    if np.abs(square - square.T).max() > 1e-6 * max(largest, 1e-300):
         raise ProblemError("gram is not symmetric: entry i, j is the inner product of trials i and j")
     return square
 

@@ -118,11 +118,7 @@ def distances_of(gram: ArrayLike) -> NDArray[np.float64]:
     >>> distances_of([[1.0, 0.0], [0.0, 1.0]]).round(3).tolist()
     [[0.0, 1.414], [1.414, 0.0]]
     """
-    with np.errstate(over="ignore", invalid="ignore"):
-        squared = squared_distances(gram_matrix(gram))
-    if not np.isfinite(squared).all():
-        raise ProblemError("gram: its numbers are too large to be subtracted from each other")
-    return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+    return np.asarray(np.sqrt(np.maximum(squared_distances(gram_matrix(gram)), 0.0)))
 
 
 def squared_distances(square: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ from taxel.events import Events
 from taxel.formats.layout import Layout, packaged
 from taxel.frames import Frames
 from taxel.recording.contents import Contents, alone, once
+from taxel.recording.pictures import times_at
 
 __all__ = ["check_size", "laid_out", "on_array"]
 
@@ -117,7 +118,10 @@ def _read(own: Frames, layout: Layout, name: str) -> Frames:
     if layout.rate_hz is not None:
         counted = np.arange(len(t))
         if np.array_equal(t, counted):
-            t = np.rint(counted * (1e6 / layout.rate_hz)).astype(np.int64)
+            try:
+                t = times_at(counted, layout.rate_hz)
+            except ProblemError as error:
+                raise FormatError(f"{layout.place}: {name}: {error}") from None
         elif len(t) > 1 and abs(layout.rate_hz * (step := float(np.median(np.diff(t)))) / 1e6 - 1) > _SLACK:
             raise FormatError(f"{layout.place}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
     if layout.falls is not False:

@@ -6,16 +6,18 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel._base.arguments import number
 from taxel._base.columns import frozen
+from taxel._base.limits import TIME_US
 from taxel._core import ProblemError
 from taxel.frames import Frames
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
 from taxel.tare import Tare
 
-__all__ = ["FRAMES_HZ", "at_rate", "calibrated", "period_us", "pictures"]
+__all__ = ["FRAMES_HZ", "at_rate", "calibrated", "period_us", "pictures", "times_at"]
 
 #: The default rate of pictures of a recording of events, Hz.
 FRAMES_HZ = 100.0
@@ -34,6 +36,22 @@ def period_us(name: str, rate_hz: float) -> int:
     if rate < 1e-9:
         raise ProblemError(f"{name} is {rate}: must be 1e-9 or more, a picture in 31 years")
     return round(1e6 / rate)
+
+
+def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
+    """Return the times of numbered pictures at a rate, us.
+
+    Raises
+    ------
+    ProblemError : a time that does not lie within 142 years of 0
+    """
+    us = number * (1e6 / rate_hz)
+    if len(us) and np.abs(us).max() > TIME_US:
+        raise ProblemError(
+            f"{rate_hz:g} Hz: picture {number[-1]} comes at {us[-1] / 1e6:.3g} s; must lie within 142 years"
+        )
+    t: NDArray[np.int64] = np.rint(us).astype(np.int64)
+    return t
 
 
 def pictures(of: Contents, rate_hz: float | None = None, *, name: str = "rate_hz") -> Contents:
@@ -107,7 +125,7 @@ def at_rate(of: Contents, rate_hz: float) -> Contents:
         own = of.frames
         if own is None:
             return None
-        t = np.rint(own.t * (1e6 / rate_hz)).astype(np.int64)
+        t = times_at(own.t, rate_hz)
         return Frames(own.values, frozen(t), unit=own.unit, array=own.array)
 
     def sources() -> Mapping[str, Contents]:
