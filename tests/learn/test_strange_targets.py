@@ -25,10 +25,18 @@ def test_a_target_outside_its_pattern_is_refused(check, learner, time, target):
 
 
 @pytest.mark.parametrize("trains", [TRAINS, GRADED])
-@pytest.mark.parametrize("time", ["continuous", "grid"])
-@pytest.mark.parametrize("kernel", ["alpha", "double_exponential", "exponential"])
+@pytest.mark.parametrize(
+    ("kernel", "time"),
+    [
+        ("alpha", "continuous"),
+        ("double_exponential", "continuous"),
+        ("alpha", "grid"),
+        ("double_exponential", "grid"),
+        ("exponential", "grid"),
+    ],
+)
 @pytest.mark.parametrize("scale", [1e308, 1e200, 1.0001e100, 1e100, 1.0, 1e-308, 5e-324, -0.0])
-def test_weights_have_a_potential_or_are_refused(trains, time, kernel, scale):
+def test_weights_have_a_potential_or_are_refused(trains, kernel, time, scale):
     neuron, times = Neuron(tau=10.0, kernel=kernel, time=time), np.arange(2.0, 60.0)
     weights = [scale, -scale, scale]
     if scale > 1e100:
@@ -47,5 +55,5 @@ def test_weights_have_a_potential_or_are_refused(trains, time, kernel, scale):
 @pytest.mark.parametrize("name", ["tau", "theta_0", "tau_rec", "step_ms"])
 @pytest.mark.parametrize("value", [5e-324, 1e-308, 1e-300, 1e-101])
 def test_a_parameter_by_which_nothing_can_be_divided_is_refused(name, value):
-    with pytest.raises(ProblemError, match=rf"{name} is .*: must be above 0 and finite, and if not 0 at least 1e-100"):
+    with pytest.raises(ProblemError, match=rf"{name} is .*: must be above 0 and finite, 1e-100 at least"):
         Neuron(**{name: value})

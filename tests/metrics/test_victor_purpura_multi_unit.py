@@ -70,7 +70,7 @@ def test_arguments_that_make_no_sense_are_one_clear_error_each():
     for parameters, said in (
         ({"a": a, "b": b, "q": 1.0, "k": 1.0}, "a has 2 trains, b has 1: must be equally many"),
         ({"a": a, "b": a, "q": -1.0, "k": 1.0}, "q is -1/ms: must be 0 or more"),
-        ({"a": a, "b": a, "q": 1.0, "k": float("nan")}, "k is NaN: must be 0 or more"),
+        ({"a": a, "b": a, "q": 1.0, "k": float("nan")}, "k is nan: must be a number"),
         ({"a": [1.0], "b": a, "q": 1.0, "k": 1.0}, "a is .*: must be a taxel.SpikeTrains"),
     ):
         with pytest.raises(ProblemError, match=said):

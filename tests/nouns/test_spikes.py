@@ -226,7 +226,7 @@ def test_trains_draw_themselves() -> None:
         (([[5.0, 3.0]],), "train 0, spike 1"),
         (([[5.0]], 6.0), "window"),
         (([[5.0]], 0.0, 4.0), "outside the window"),
-        (([[5.0]], 0.0, float("nan")), "window"),
+        (([[5.0]], 0.0, float("nan")), "stop is nan"),
         (([[5.0]], float("-inf"), 9.0), "window"),
         (([[5.0]], "0"), "start is '0'"),
         (([[5.0]], 0.0, "9"), "stop is '9'"),
@@ -234,7 +234,7 @@ def test_trains_draw_themselves() -> None:
         (([[[1.0, 2.0]]],), r"times\[0\]"),
         ((3,), "times is 3"),
         ((None,), "times is None"),
-        (([None],), "train 0, spike 0"),
+        (([None],), r"times\[0\]\[0\] is None: must be a number"),
         (([[1.0]], 0.0, 2.0, [[1.0, 2.0]]), "values"),
         (([[1.0]], 0.0, 2.0, 3), "values is 3"),
         (([[1.0]], 0.0, 2.0, [["a"]]), r"values\[0\]"),
@@ -253,7 +253,7 @@ def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.Mo
         trains = SpikeTrains.from_lists(lists, stop=3.0, values=[[1.0] * len(entry) for entry in lists])
         assert list(map(list, trains)) == [list(map(float, entry)) for entry in lists]
     assert set(seen) == {"times", "values", "offsets"}
-    with pytest.raises(ProblemError, match=r"times\[700\]: "):
+    with pytest.raises(ProblemError, match=r"times\[700\]\[0\] is 'soon': must be a number"):
         SpikeTrains.from_lists([[0.5]] * 700 + [["soon"]] + [[0.5]] * 300)
 
 

@@ -7,7 +7,7 @@ use std::fmt;
 
 use crate::{Error, Result, problem};
 
-/// The least value above 0 of a parameter: its square and what is divided by it stay within what a float holds.
+/// The least value of a parameter that must be above 0: its square and what is divided by it stay within a float.
 const LEAST: f64 = 1e-100;
 
 /// The largest weight of a neuron: no sum of weighted kernels overflows.
@@ -65,10 +65,10 @@ impl Range {
         Self { most, most_in: false, ..self }
     }
 
-    /// Whether a value is in the range; NaN never is, nor what is nearer to 0 than [`LEAST`].
+    /// Whether a value is in the range; NaN never is, nor, where 0 is not, what is nearer to it than [`LEAST`].
     #[must_use]
     pub fn holds(&self, value: f64) -> bool {
-        (value == 0.0 || value.abs() >= LEAST) && self.spans(value)
+        self.spans(value) && (value.abs() >= LEAST || self.spans(0.0))
     }
 
     fn spans(&self, value: f64) -> bool {
@@ -131,11 +131,7 @@ impl Parameter {
             if outcome.is_ok() && !self.range.holds(value) {
                 let place = place.map_or(String::new(), |k| format!("[{k}]"));
                 let (name, unit, range) = (self.name, self.unit, self.range);
-                let near = if range.spans(value) {
-                    format!(", and if not 0 at least {LEAST:e} from it")
-                } else {
-                    String::new()
-                };
+                let near = if range.spans(value) { format!(", {LEAST:e} at least") } else { String::new() };
                 let value = written(value);
                 outcome = Err(match unit.strip_prefix('1') {
                     Some(per) => problem!("{name}{place} is {value}{per}: must be {range}{near}"),
@@ -262,7 +258,7 @@ mod tests {
             (Range::ABOVE_0, "above 0 and finite", 1e-100, 0.0),
             (Range::ABOVE_0, "above 0 and finite", 1.0, 5e-324),
             (Range::FROM_0, "0 or more and finite", 0.0, -5e-324),
-            (Range::FROM_0, "0 or more and finite", -0.0, 9e-101),
+            (Range::FROM_0, "0 or more and finite", 5e-324, -1.0),
             (Range::COST, "0 or more", f64::INFINITY, -1.0),
             (Range::ABOVE_0.at_most(4.0), "above 0 and at most 4", 4.0, 4.1),
             (Range::FROM_0.below(1.0), "0 or more and below 1", 0.0, 1.0),
@@ -282,10 +278,7 @@ mod tests {
         assert_eq!(message("", &f64::NAN), "tau is NaN: must be above 0 and finite");
         assert_eq!(message("1/ms", &-1.0), "tau is -1/ms: must be above 0 and finite");
         assert_eq!(message("mV", &[1.0, -2.0]), "tau[1] is -2 mV: must be above 0 and finite");
-        assert_eq!(
-            message("ms", &5e-324),
-            "tau is 5e-324 ms: must be above 0 and finite, and if not 0 at least 1e-100 from it"
-        );
+        assert_eq!(message("ms", &5e-324), "tau is 5e-324 ms: must be above 0 and finite, 1e-100 at least");
         assert!(parameter("ms").check(&None::<f64>).is_ok());
     }
 }

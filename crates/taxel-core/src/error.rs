@@ -94,8 +94,6 @@ impl<'a> Stop<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     #[test]
     fn a_number_that_nobody_reads_digit_by_digit_is_in_scientific_notation() {
         let told = |value: f64| problem!("tau is {value} ms: must lie below 1.5").to_string();

@@ -219,7 +219,7 @@ def number(name: str, value: object, unit: str | None = None) -> float:
     """Return a float, which may be infinite, for a quantity its value in `unit`; refuse any other value, and NaN."""
     real = _real(name, value, unit)
     if math.isnan(real):
-        raise ProblemError(f"{name} is NaN: must be a number")
+        raise ProblemError(f"{name} is nan: must be a number")
     return real
 
 

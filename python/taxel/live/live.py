@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import flag, number, numbers, parameters, shown, text, whole
+from taxel._base.arguments import finite, flag, number, numbers, parameters, shown, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted
@@ -213,7 +213,7 @@ class Live:
         ...     live.next(0.0) is None
         True
         """
-        values = self._core.next(number("timeout", timeout))
+        values = self._core.next(finite("timeout", timeout, "s", least=0.0, most=1e9))
         return None if values is None else Detection(*values)
 
     def __iter__(self) -> Iterator[Detection]:

@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from taxel import _core
-from taxel._base.arguments import number, shown, text
+from taxel._base.arguments import finite, shown, text
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 
@@ -136,7 +136,7 @@ class Remote:
         self.congestion = congestion
         self._zenoh = with_taxel_errors(wheel().Subscriber, [self.address.place])
         try:
-            self.name, self._about = self._find(number("timeout", timeout))
+            self.name, self._about = self._find(finite("timeout", timeout, "s", least=0.0, most=1e9))
         except BaseException:
             self._zenoh.close()
             raise
