@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +17,7 @@ from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown, text
 from taxel._base.files import whole_file
 from taxel._base.header_table import HeaderTable, text_of
-from taxel._base.messages import counted
+from taxel._base.messages import counted, warn
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
@@ -84,7 +83,7 @@ _OF_LABEL = {"label": "text", "t_us": "t", "host_ns": "at_ns"}
 
 
 def _warn(text: str) -> None:
-    warnings.warn(text, DeprecationWarning, stacklevel=3)
+    warn(text, DeprecationWarning, stacklevel=3)
 
 
 def _label(recording: str, label: str, t_us: int, host_ns: int | None = None) -> Note:
