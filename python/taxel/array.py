@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, number, numbers, several, shown, text, whole
-from taxel._base.messages import counted, warn
+from taxel._base.messages import counted, escaped, warn
 from taxel._core import ProblemError
 
 __all__ = ["Array", "Places", "names_beside"]
@@ -476,7 +476,7 @@ class Array:
 
     def __repr__(self) -> str:
         size = f"{counted(self.rows, 'row')} x {counted(self.columns, 'column')}, {counted(self.taxels, 'taxel')}"
-        return f"Array({self.name}: {size}, {self._apart()})"
+        return escaped(f"Array({self.name}: {size}, {self._apart()})")
 
 
 def names_beside(arrays: Sequence[Array], lefts: Sequence[int], shape: tuple[int, int]) -> list[str] | None:

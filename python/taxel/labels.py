@@ -17,7 +17,7 @@ from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown, text
 from taxel._base.files import whole_file
 from taxel._base.header_table import HeaderTable, text_of
-from taxel._base.messages import counted, warn
+from taxel._base.messages import counted, escaped, warn
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
@@ -212,7 +212,7 @@ class Labels:
 
     def __repr__(self) -> str:
         recordings = ", ".join(self.recordings) or "one recording"
-        return f"Labels({counted(len(self.rows), 'event')} of {recordings}, {self.path})"
+        return escaped(f"Labels({counted(len(self.rows), 'event')} of {recordings}, {self.path})")
 
 
 def trial_of(name: str, source: str) -> str:

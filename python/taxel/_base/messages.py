@@ -2,7 +2,7 @@
 
 Names in files of strangers may hold control characters, which move a terminal's cursor, or reverse the order of what is
 read. Files and JSON keep such names; what people read shows them escaped. The places where text leaves taxel escape it,
-so that a message needs no care of its own: `taxel.Error` (here), `warn` (here), `taxel.cli.say`, the `Console` of `taxel.cli.console`, the
+so that no message has to: `taxel.Error` and `warn` (here), `taxel.cli.say`, the `Console` of `taxel.cli.console`, the
 pages of reports, and the page's `dom.js`. A `__repr__` that shows a text escapes it itself.
 """
 
@@ -13,7 +13,7 @@ import warnings
 
 from taxel._core import Error
 
-__all__ = ["counted", "escaped", "first_line", "installing", "plain", "warn"]
+__all__ = ["counted", "escaped", "escaped_lines", "first_line", "installing", "plain", "warn"]
 
 #: C0, DEL and C1, the marks and overrides of direction, the separators of lines and paragraphs, and halves of surrogate
 #: pairs, which stand for bytes of file names that are no UTF-8. `crates/taxel-panel/web/dom.js` has the same.
@@ -31,6 +31,11 @@ def escaped(text: object) -> str:
     return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), str(text))
 
 
+def escaped_lines(text: object) -> str:
+    """Return a text of several lines without control characters but its line breaks."""
+    return "\n".join(map(escaped, str(text).split("\n")))
+
+
 def warn(text: str, category: type[Warning] = UserWarning, *, stacklevel: int = 1) -> None:
     """Issue a warning of Python, without control characters; `stacklevel` counts as in `warnings.warn`."""
     warnings.warn(escaped(text), category, stacklevel=stacklevel + 1)  # noqa: TID251  the place where it is allowed
@@ -39,7 +44,7 @@ def warn(text: str, category: type[Warning] = UserWarning, *, stacklevel: int = 
 def _shown(error: Error) -> str:
     """Return the text of an error: one line, and below it the lines that it gives to be copied, if there are any."""
     line, *below = error.args or ("",)
-    return "\n".join(map(escaped, [line, *(copied for part in below for copied in str(part).split("\n"))]))
+    return "\n".join([escaped(line), *map(escaped_lines, below)])
 
 
 # The class is of the core; it needs Python 3.12 to have a method of its own there.

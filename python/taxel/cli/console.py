@@ -9,7 +9,7 @@ import rich.console
 from rich.segment import Segment
 from rich.text import Text
 
-from taxel._base.messages import escaped
+from taxel._base.messages import escaped, escaped_lines
 
 __all__ = ["Console"]
 
@@ -27,5 +27,5 @@ class Console(rich.console.Console):  # noqa: TID251  the place where it is allo
     def render(self, renderable: Any, options: Any = None) -> Iterable[Segment]:
         """Yield the segments of anything that is shown, each without control characters but rich's own."""
         for segment in super().render(renderable, options):
-            text = segment.text if segment.control else "\n".join(map(escaped, segment.text.split("\n")))
+            text = segment.text if segment.control else escaped_lines(segment.text)
             yield segment if text == segment.text else segment._replace(text=text)

@@ -10,8 +10,14 @@ import jinja2
 from markupsafe import Markup
 
 from taxel import _core
+from taxel._base.messages import escaped_lines
 
 __all__ = ["render"]
+
+
+def _shown(value: object) -> object:
+    """Return what a template shows: texts without control characters; figures and scripts are no texts."""
+    return value if hasattr(value, "__html__") else escaped_lines(value)
 
 
 @cache
@@ -22,6 +28,7 @@ def _environment(package: str) -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
+        finalize=_shown,
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import flag, number, numbers, parameters, shown, whole
-from taxel._base.messages import plain, warn
+from taxel._base.messages import escaped, plain, warn
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -281,7 +281,7 @@ class Scene:
     def __repr__(self) -> str:
         bodies = self.parameters.get("bodies", [])
         kinds = [f"{_only(body, 'shape')} {_only(body, 'motion')}" for body in bodies]
-        return f"Scene({', '.join(kinds)})"
+        return escaped(f"Scene({', '.join(kinds)})")
 
 
 #: Optional parameters of a body.
