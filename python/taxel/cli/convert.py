@@ -13,7 +13,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app, with_out
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import of_source
+from taxel.cli._recordings import of_source, progress
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def convert(
 
     if target.suffix:
         try_whole(target, overwrite=overwrite)
-    with bar(as_json) as show:
+    with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {source}", 0, 0)
         opened = [of_source(one, part) for one in files.joined(source)]
         if target.suffix and len(opened) > 1:

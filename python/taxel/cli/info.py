@@ -18,7 +18,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, tare_of
+from taxel.cli._recordings import TARE_HELP, progress, tare_of
 from taxel.cli._say import say
 from taxel.cli._topics import listed
 from taxel.clock import doubt
@@ -82,7 +82,7 @@ def info(
     if are_spike_trains(file):
         say(*_spikes(file, as_json, drawn=picture is not None or table is not None))
         return
-    with bar(as_json) as show:
+    with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {file}", 0, 0)
         if file.exists() and is_bag(file) and not files.names_topic(file):
             say(*listed(file, topics(file, files.types, files.ros), as_json))
@@ -234,7 +234,9 @@ def _page(facts: dict[str, Any]) -> list[str]:
     head = f"{facts['file']}: {kind_of_file(facts['kind'])}" + f", from {facts['source']}" * bool(facts["source"])
     rows = [*_contents(facts), *_rates(facts), *_losses(facts), ("verdict", facts["verdict"])]
     rows += [("remark", line) for line in facts["remarks"]]
-    rows += [("left behind", line) for line in facts["lost"]]
+    left = [("left behind", line) for line in facts["lost"]]
+    # What was left out of a bag, or has other times, concerns all that follows.
+    rows = [*left, *rows] if facts["kind"] == "ros" else [*rows, *left]
     lines = [head, *(f"  {name:<20}{value}" for name, value in rows)]
     return [*lines, *(f"{what} written to {facts[what]}" for what in ("picture", "table") if what in facts)]
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import read_arrays, shapes, stored_names
+from taxel._base.archive import read_array, read_arrays, shapes, stored_names
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.h5_file import H5File
@@ -335,10 +335,7 @@ def _data(path: Path, how: Data) -> _Read:
             size = as_size(getattr(how, key))
             right = f"a size is said by {size}" if size else "leave it out"
             raise FormatError(f"{path}: one array without a name; the layout says [data] {key}: {right}")
-        try:
-            arrays = {"": np.load(path, allow_pickle=False)}
-        except (ValueError, EOFError) as error:
-            raise FormatError(f"{path}: {first_line(error)}; must be a NumPy array of numbers") from None
+        arrays = {"": read_array(path)}
         there: list[str] = [""]
         wanted = there
     else:
