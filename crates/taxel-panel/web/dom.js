@@ -14,7 +14,7 @@ const SHORT = { "\t": "\\t", "\n": "\\n", "\r": "\\r" };
 export function escaped(text) {
   return text.replace(CONTROL, (found) => {
     const code = found.charCodeAt(0);
-    return SHORT[found] ?? (code < 0x100 ? `\\x${code.toString(16).padStart(2, "0")}` : `\\u${code.toString(16).padStart(4, "0")}`);
+    return SHORT[found] ?? (code < 0x7f ? `\\x${code.toString(16).padStart(2, "0")}` : `\\u${code.toString(16).padStart(4, "0")}`);
   });
 }
 

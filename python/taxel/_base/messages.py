@@ -28,7 +28,12 @@ def escaped(text: object) -> str:
     >>> print(escaped("thumb\x1b[2J\nleft\u202e"))
     thumb\x1b[2J\nleft\u202e
     """
-    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), str(text))
+    return _CONTROL.sub(_escape, str(text))
+
+
+def _escape(found: re.Match[str]) -> str:
+    # TOML and JSON, whose lines may be copied from a message, know no \\x, but escape C0 themselves.
+    return repr(found[0])[1:-1] if found[0] < "\x7f" else f"\\u{ord(found[0]):04x}"
 
 
 def escaped_lines(text: object) -> str:

@@ -371,7 +371,10 @@ def _data(path: Path, how: Data) -> _Read:
         )
     if len(wanted) == 1:
         return _Read(values, None, lost=lost)
-    times = arrays[wanted[1]].astype(np.float64)
+    times = arrays[wanted[1]]
+    if times.dtype.kind not in "uif":
+        raise FormatError(f"{path}, {wanted[1]}: {times.dtype}; must be times as numbers")
+    times = times.astype(np.float64)
     if times.shape != values.shape[:1]:
         raise FormatError(f"{path}, {wanted[1]}: {counted(times.size, 'time')} for {counted(len(values), 'picture')}")
     return _Read(values, times * UNITS_US[how.time_unit] / 1e6, lost=lost)
