@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import csv
 import json
 import os
 import pty
@@ -284,6 +286,17 @@ def test_json_and_files_keep_the_names(places: dict[str, Path], tmp_path: Path) 
     assert list(taxel.Readout.load(places["readout"]).labels) == [NAME, CELL]
 
 
+def test_a_label_of_any_character_is_read_as_it_was_written(tmp_path: Path) -> None:
+    """Other line ends than those of a table, as U+2028, once ended its rows."""
+    controls = [chr(k) for k in (*range(1, 0x20), *range(0x7F, 0xA0), 0x2028, 0x2029, 0x202E) if chr(k) not in "\n\r"]
+    table = tmp_path / "labels.csv"
+    with table.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([("label", "t_us"), *((f"a{one}b", 10 * k) for k, one in enumerate(controls))])
+    assert [row.label for row in taxel.Labels(table).rows] == [f"a{one}b" for one in controls]
+    found = taxel.Detections([f"a{one}b" for one in controls], range(len(controls)), range(len(controls)))
+    assert taxel.Detections.from_csv(found.to_csv(tmp_path / "found.csv")) == found
+
+
 def test_what_python_shows_of_them_is_escaped(places: dict[str, Path]) -> None:
     opened = taxel.open(places[".mcap"])
     readout, labels = taxel.Readout.load(places["readout"]), taxel.Labels(places["labels"])
@@ -320,3 +333,40 @@ def test_each_control_character_is_escaped_and_nothing_else() -> None:
         assert escaped(escaped(one)) == escaped(one)
         assert escaped_lines(one) == (one if one == "\n" else escaped(one))
     assert CONTROL.sub("", every) == escaped_lines("".join(map(chr, sorted(left | {10}))))
+
+
+#: Classes whose `__repr__` shows numbers and words of taxel's own alone.
+OWN_WORDS = {
+    "Certificate",
+    "Clock",
+    "Columns",
+    "Datagrams",
+    "Decoder",
+    "Estimate",
+    "Events",
+    "Health",
+    "Learner",
+    "Multipliers",
+    "Panel",
+    "Parameters",
+    "Pictures",
+    "Places",
+    "Registers",
+    "Source",
+    "SpikeTrains",
+    "Spread",
+}
+
+
+def test_no_repr_shows_a_text_unescaped() -> None:
+    """A `__repr__` that puts a text into its line calls `escaped`, or puts the text's own `repr` there (`!r`)."""
+    found = set()
+    for file in Path(taxel.__file__).parent.rglob("*.py"):
+        for kind in ast.walk(ast.parse(file.read_text())):
+            for method in kind.body if isinstance(kind, ast.ClassDef) else ():
+                if isinstance(method, ast.FunctionDef) and method.name == "__repr__":
+                    inside = list(ast.walk(method))
+                    is_raw = any(isinstance(one, ast.FormattedValue) and one.conversion != ord("r") for one in inside)
+                    if is_raw and not any(isinstance(one, ast.Name) and one.id == "escaped" for one in inside):
+                        found.add(kind.name)
+    assert found == OWN_WORDS

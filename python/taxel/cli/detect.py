@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 from contextlib import contextmanager
 from math import isnan
@@ -216,14 +218,20 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     """Return the detections as a table; of several recordings each row begins with its recording's name."""
     if len(outcomes) == 1:
         return outcomes[0].found._csv()
-    lines: list[str] = []
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
     # All recordings share one header.
     repaired = any(one.found.repaired.any() for one in outcomes)
     for one in outcomes:
-        head, *rows = one.found._csv(repaired=repaired).splitlines()
+        # A label may hold line breaks.
+        head, *rows = csv.reader(io.StringIO(one.found._csv(repaired=repaired), newline=""))
         name = '"' + Path(one.name).name.replace('"', '""') + '"'
-        lines += [*([] if lines else [f"recording,{head}"]), *(f"{name},{row}" for row in rows)]
-    return "\n".join(lines) + "\n"
+        if not text.tell():
+            table.writerow(["recording", *head])
+        for row in rows:
+            text.write(f"{name},")
+            table.writerow(row)
+    return text.getvalue()
 
 
 def _not_scored(events: Sequence[Mapping[str, object] | None], labels: Sequence[str]) -> list[str]:
