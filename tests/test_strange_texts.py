@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import csv
+import io
 import json
 import os
 import pty
@@ -22,12 +23,18 @@ import pytest
 import strange
 import typer
 from loopback import free_port
+from rich.console import Group
+from rich.panel import Panel
+from rich.progress import Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
 from shell import run
 from strange import CELL, CONTROL, FILE, NAME
 
 import taxel
 from taxel._base.messages import escaped, escaped_lines, warn
 from taxel.cli import app
+from taxel.cli.console import Console
 
 #: What rich moves and colours with on a terminal: no name may bring more.
 OWN = re.compile(r"\x1b\[(?:[\d;]*m|\?25[lh]|\d*[ABGK]|2K)|\r")
@@ -178,6 +185,7 @@ def record(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
     lines.write_text("".join(f"{10 * k},{CELL if k == 9 else k}\n" for k in range(50)), newline="")
     for what in (f"pipe:{lines},columns=t_ms:a", f"pipe:{lines},columns=t_ms:{CELL}", f"pipe:{NAME}", NAME):
         yield ["record", out / f"{FILE}.mcap", *to, "--source", f"line={what}", "--overwrite"]
+    yield ["record", out / f"{FILE}2.mcap", *to]
     yield ["record", out / f"{FILE}.mcap", *to, "--source", f"{NAME}=udp:127.0.0.1:{free_port()}"]
     yield ["record", out / NAME / "a.mcap", *to]
 
@@ -268,6 +276,33 @@ def test_on_a_terminal_nothing_but_the_commands_own_sequences_arrives(
     text = OWN.sub("", said.decode("utf-8", "surrogateescape"))
     assert "owned" in text
     assert not strange.wrong(text)
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_the_console_shows_texts_of_every_kind_escaped_and_takes_no_markup_of_them(terminal: bool) -> None:
+    shown = io.StringIO()
+    console = Console(file=shown, force_terminal=terminal, width=1000)
+    table = Table(title=NAME)
+    table.add_column(NAME)
+    table.add_row(NAME)
+    table.add_row(Text(CELL))
+    for one in (
+        NAME,
+        f"[/{NAME}] [bold]{NAME}[/bold]",
+        table,
+        Text(CELL),
+        Panel(NAME, title=CELL),
+        Group(NAME, Text(CELL)),
+    ):
+        console.print(one)
+    with Progress(TextColumn("{task.description}", markup=False), console=console) as bar:
+        bar.add_task(escaped(NAME))
+    with console.status(Text(CELL)):
+        pass
+    text = OWN.sub("", shown.getvalue())
+    assert not strange.wrong(text)
+    assert "[bold]a" in text
+    assert text.count("owned") > 8
 
 
 def test_json_and_files_keep_the_names(places: dict[str, Path], tmp_path: Path) -> None:
