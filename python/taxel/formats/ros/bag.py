@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taxel._base.messages import first_line, installing
+from taxel._base.messages import escaped, first_line, installing
 from taxel._core import Error, FormatError, ProblemError
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
     try:
         from rosbags import rosbag1, rosbag2  # noqa: PLC0415  an extra
     except ImportError:
-        raise ImportError(f"{path}: a ROS bag, and rosbags is not installed: {installing('ros')}") from None
+        raise ImportError(f"{escaped(path)}: a ROS bag, and rosbags is not installed: {installing('ros')}") from None
     try:
         is_ros1 = path.is_file() and _begins(path, len(_ROS1)) == _ROS1
         reader: Any = (rosbag1 if is_ros1 else rosbag2).Reader(path)
