@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, number, numbers, several, shown, text, whole
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped, warn
 from taxel._core import ProblemError
 
 __all__ = ["Array", "Places", "names_beside"]
@@ -386,7 +385,7 @@ class Array:
             differ = f"two sensors named {self.name} have their taxels at different places"
         else:
             differ = f"{other.name} has its taxels at other places than {self.name}"
-        warnings.warn(f"{what}: {differ}", stacklevel=stacklevel + 1)
+        warn(f"{what}: {differ}", stacklevel=stacklevel + 1)
         return True
 
     def _part(self, x: slice, y: slice) -> Array:
@@ -477,7 +476,7 @@ class Array:
 
     def __repr__(self) -> str:
         size = f"{counted(self.rows, 'row')} x {counted(self.columns, 'column')}, {counted(self.taxels, 'taxel')}"
-        return f"Array({self.name}: {size}, {self._apart()})"
+        return escaped(f"Array({self.name}: {size}, {self._apart()})")
 
 
 def names_beside(arrays: Sequence[Array], lefts: Sequence[int], shape: tuple[int, int]) -> list[str] | None:

@@ -20,6 +20,7 @@ from taxel._base.columns import Columns, frozen, own, own_column
 from taxel._base.drawing import draw
 from taxel._base.files import write_whole
 from taxel._base.header_table import HeaderTable, text_of
+from taxel._base.messages import escaped
 from taxel._base.number_text import float_of, int_of
 from taxel._core import FormatError, ProblemError
 
@@ -425,7 +426,7 @@ class Detections(Columns):
         if not len(self):
             return "Detections(none)"
         counts = ", ".join(f"{name} {np.count_nonzero(self.label == name)}" for name in self.labels)
-        return f"Detections({len(self)}: {counts}; {self.t.min()} to {self.t.max()} us)"
+        return escaped(f"Detections({len(self)}: {counts}; {self.t.min()} to {self.t.max()} us)")
 
 
 def _slopes(slope: ArrayLike) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ from typing import Self, TypeVar
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, number, shown, text, whole
+from taxel._base.messages import escaped
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.wire import Command, Registers
@@ -385,7 +386,7 @@ class Cable:
         self.close()
 
     def __repr__(self) -> str:
-        return f"Cable({self.place})"
+        return escaped(f"Cable({self.place})")
 
     def _answers(self, command: Command) -> Iterator[str]:
         """Send a command; yield the lines that the board sends after it."""
@@ -599,7 +600,7 @@ class Device:
 
     def __repr__(self) -> str:
         g = self.greeting
-        return f"Device({self.cable.place}, {g.rows} x {g.columns} taxels, {g.channels} channels)"
+        return escaped(f"Device({self.cable.place}, {g.rows} x {g.columns} taxels, {g.channels} channels)")
 
     def _try(self, work: Callable[[], T]) -> T:
         """Call a function; call it once more if the cable was pulled during the first call."""

@@ -12,7 +12,7 @@ from taxel import _core
 from taxel._base.arguments import finite, instance, shown, text, whole, window
 from taxel._base.columns import Columns, frozen, own_column, own_numbers
 from taxel._base.drawing import draw
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -380,7 +380,7 @@ class Frames(Columns):
     def __repr__(self) -> str:
         time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
         size = f"{self.array.rows} x {self.array.columns} taxels"
-        return f"Frames({counted(len(self), 'picture')} of {size}, {time}, {self.unit})"
+        return escaped(f"Frames({counted(len(self), 'picture')} of {size}, {time}, {self.unit})")
 
 
 def _refuse_infinite(name: str, values: NDArray[np.float32]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +18,7 @@ from taxel._base.arguments import shown, text
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named, whole_file
 from taxel._base.header_table import HeaderTable, text_of
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped, warn
 from taxel._base.number_text import int_of
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
@@ -86,7 +85,7 @@ _OF_LABEL = {"label": "text", "t_us": "t", "host_ns": "at_ns"}
 
 
 def _warn(text: str) -> None:
-    warnings.warn(text, DeprecationWarning, stacklevel=3)
+    warn(text, DeprecationWarning, stacklevel=3)
 
 
 def _label(recording: str, label: str, t_us: int, host_ns: int | None = None) -> Note:
@@ -215,7 +214,7 @@ class Labels:
 
     def __repr__(self) -> str:
         recordings = ", ".join(self.recordings) or "one recording"
-        return f"Labels({counted(len(self.rows), 'event')} of {recordings}, {self.path})"
+        return escaped(f"Labels({counted(len(self.rows), 'event')} of {recordings}, {self.path})")
 
 
 def trial_of(name: str, source: str) -> str:

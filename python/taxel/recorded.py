@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.messages import counted
+from taxel._base.messages import counted, warn
 from taxel._core import ProblemError
 from taxel.clock import Clock
 from taxel.events import Events, repaired_of
@@ -81,7 +80,7 @@ def recorded(x: Events | Frames | Recorded | T, *, hold: bool = True) -> Events 
 def _filled(frames: Frames, path: Path) -> Frames:
     """Return pictures without missing values; say how many were filled."""
     never = int(np.count_nonzero(np.isnan(frames.values).all(axis=0)))
-    warnings.warn(
+    warn(
         f"{path}: {frames.missing} of {frames.values.size} values are missing (NaN): each is held at the taxel's last "
         "value" + f"; {counted(never, 'taxel')} without any value {'reads' if never == 1 else 'read'} 0" * bool(never),
         stacklevel=3,

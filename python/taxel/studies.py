@@ -6,7 +6,7 @@ from importlib import import_module
 
 from taxel._base.messages import installing
 
-warnings.warn("taxel.studies is taxel_studies now: import that", FutureWarning, stacklevel=2)
+warnings.warn("taxel.studies is taxel_studies now: import that", FutureWarning, stacklevel=2)  # noqa: TID251  a fixed text
 try:
     sys.modules[__name__] = import_module("taxel_studies")
 except ModuleNotFoundError as error:

@@ -16,7 +16,7 @@ from taxel._base.arguments import instance, shown, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -215,7 +215,9 @@ class Tare:
     def __repr__(self) -> str:
         known = int(np.count_nonzero(~np.isnan(self.rest)))
         note = f", {self.note}" if self.note else ""
-        return f"Tare({known} of {counted(self.array.taxels, 'taxel')}, {self.start_us} to {self.stop_us} us{note})"
+        return escaped(
+            f"Tare({known} of {counted(self.array.taxels, 'taxel')}, {self.start_us} to {self.stop_us} us{note})"
+        )
 
 
 def _of_taxels(values: list[float | None], array: Array) -> NDArray[np.float64]:

@@ -60,7 +60,7 @@ def __getattr__(name: str) -> Any:
     if name not in _MOVED:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     old, new = _MOVED[name]
-    warnings.warn(f"taxel.wire_v2.{name} is now taxel.wire.{new}", DeprecationWarning, stacklevel=2)
+    warnings.warn(f"taxel.wire_v2.{name} is now taxel.wire.{new}", DeprecationWarning, stacklevel=2)  # noqa: TID251  a fixed text
     return old
 
 

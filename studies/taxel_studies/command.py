@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from taxel import ProblemError
-from taxel.cli import SET_HELP, App, assignments
+from taxel.cli import SET_HELP, App, assignments, say
 from taxel_studies import DRAWN, FIGURES, STUDIES, load
 
 if TYPE_CHECKING:
@@ -73,14 +73,14 @@ def _root(
         outdated = stale_figures(figures)
         for name, parts in outdated.items():
             more = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
-            typer.echo(f"{name}: {', '.join(parts[:MOST_NAMED])}{more}")
-        typer.echo(
+            say(f"{name}: {', '.join(parts[:MOST_NAMED])}{more}")
+        say(
             f"{len(outdated)} kept figures are stale; taxel study NAME --confirm, or run them again"
             if outdated
             else "no kept figure is stale"
         )
     elif context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+        say(*context.get_help().split("\n"))
 
 
 @app.command(name="all")
@@ -114,7 +114,7 @@ def every(
                     _confirm(name, figures, data, strict)
                 except ProblemError as error:
                     moved.append(name)
-                    typer.echo(str(error), err=True)
+                    say(str(error), err=True)
         if moved:
             raise ProblemError(
                 f"not confirmed: {', '.join(moved)}; run them again at full size, and say why they moved"
@@ -142,11 +142,11 @@ def every(
         # The page is written however the run ends: it shows what was run, and names the rest.
         page = _page(report)
     if as_json:
-        typer.echo(json.dumps(sections))
+        say(json.dumps(sections))
         return
     for section in sections.values():
         tell(section)
-    typer.echo(f"page: {page}")
+    say(f"page: {page}")
 
 
 def _left_out(name: str, data: Path | None) -> str | None:
@@ -156,14 +156,14 @@ def _left_out(name: str, data: Path | None) -> str | None:
     if study.data and (data is None or not any((data / folder).is_dir() for folder in study.data)):
         why = f"it needs any of {', '.join(study.data)} (--data)"
     if why is not None:
-        typer.echo(f"{name}: left out, {why}", err=True)
+        say(f"{name}: left out, {why}", err=True)
     return why
 
 
 def _confirm(name: str, figures: Path, data: Path | None, strict: bool) -> None:
     from taxel_studies.kept import confirm  # noqa: PLC0415  the command line starts quickly
 
-    typer.echo(f"{name}: {confirm(name, figures, data=_data(data), strict=strict)}")
+    say(f"{name}: {confirm(name, figures, data=_data(data), strict=strict)}")
 
 
 def _add(name: str, title: str) -> Callable[..., None]:
@@ -207,10 +207,10 @@ def _run(
     )
     page = _page(report)
     if as_json:
-        typer.echo(json.dumps(section))
+        say(json.dumps(section))
         return
     tell(section)
-    typer.echo(f"page: {page}  picture: {report / name}  numbers: {report / name / 'summary.json'}")
+    say(f"page: {page}  picture: {report / name}  numbers: {report / name / 'summary.json'}")
 
 
 def _workers(jobs: int, backend: str, scheduler: str | None) -> Workers:
@@ -236,20 +236,21 @@ def _changes(given: list[str], realisations: int | None) -> dict[str, Any]:
 
 def tell(section: dict[str, Any]) -> None:
     """Print what a study found: its statements and tables."""
-    from rich.console import Console  # noqa: PLC0415  the command line starts quickly
     from rich.table import Table  # noqa: PLC0415
 
-    typer.echo(f"\n{section['name']}, size {section['size']}: {section['title']}")
+    from taxel.cli.console import Console  # noqa: PLC0415  the command line starts quickly
+
+    say("", f"{section['name']}, size {section['size']}: {section['title']}")
     for s in section["statements"]:
         holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
-        typer.echo(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
-        typer.echo(f"    published: {s['published']}\n    ours: {s['ours']}")
+        say(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
+        say(f"    published: {s['published']}", f"    ours: {s['ours']}")
     console = Console()
     if not console.is_terminal:
         console.width = 10_000  # a file breaks and cuts nothing
     for shown in section["tables"]:
         if not shown["folded"]:
-            typer.echo(f"\n{shown['title']}")
+            say("", shown["title"])
             table = Table(box=None, pad_edge=False)
             for k, name in enumerate(shown["head"]):
                 table.add_column(name, justify="right" if k else "left", no_wrap=not k, overflow="fold")
@@ -257,7 +258,7 @@ def tell(section: dict[str, Any]) -> None:
                 table.add_row(*row)
             console.print(table)
     for file, why in section["unread"].items():
-        typer.echo(f"could not be read, so left out: {file}: {why}")
+        say(f"could not be read, so left out: {file}: {why}")
 
 
 @app.command(short_help=STUDIES["gait"])
@@ -305,7 +306,7 @@ def gait(
 def _add_figure(figure: str, study: str, run: Callable[..., None]) -> None:
     @wraps(run)
     def one(**given: Any) -> None:
-        typer.echo(f"{figure} is held by the study {study}", err=True)
+        say(f"{figure} is held by the study {study}", err=True)
         run(**given)
 
     app.command(name=figure, help=f"The study {study}, which holds {figure}.", hidden=True)(one)

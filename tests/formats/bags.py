@@ -121,8 +121,11 @@ def skin(patches: Sequence[tuple[Sequence[int], Sequence[float]]]) -> Make:
 Message = tuple[str, str, float, float | None, Make]
 
 
-def write(path: Path, messages: Iterable[Message]) -> Path:
-    """Write a bag of the kind that the ending says; without an ending a folder of a .db3."""
+def write(path: Path, messages: Iterable[Message], *, pack: str = "") -> Path:
+    """Write a bag of the kind that the ending says; without an ending a folder of a .db3.
+
+    `pack` is "bz2" or "lz4" of a .bag, "storage" of a .mcap, "file" or "message" of a folder.
+    """
     ros1 = path.suffix == ".bag"
     types = store(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     if ros1:
@@ -131,6 +134,10 @@ def write(path: Path, messages: Iterable[Message]) -> Path:
         plugin = rosbag2.StoragePlugin.MCAP if path.suffix == ".mcap" else rosbag2.StoragePlugin.SQLITE3
         folder = path.with_name(f"{path.stem} parts") if path.suffix else path
         writer = rosbag2.Writer(folder, version=9, storage_plugin=plugin)
+    if pack and ros1:
+        writer.set_compression(rosbag1.Writer.CompressionFormat[pack.upper()])
+    elif pack:
+        writer.set_compression(rosbag2.CompressionMode[pack.upper()], rosbag2.CompressionFormat.ZSTD)
     serialize = types.serialize_ros1 if ros1 else types.serialize_cdr
     with writer:
         connections: dict[str, Any] = {}

@@ -26,7 +26,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from formats import bags
 from formats import making as other  # the loaders' files
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 
 import taxel
 from recording.making import record, some_events, some_frames
@@ -96,6 +99,66 @@ def _h5(folder: Path) -> Path:
     record(folder / "walk.mcap", some_events())
     taxel.convert(folder / "walk.mcap", folder / "walk.h5")
     return folder / "walk.h5"
+
+
+def _bag(path: Path, pack: str) -> Path:
+    """Write a small bag, and the layout file that says its topic."""
+    rng = np.random.default_rng(9)
+    palms = [("/palm", bags.PALM, 10 * k + 2, 10 * k, bags.palm(rng.integers(0, 99, 768))) for k in range(12)]
+    hands = [("/hand", bags.HAND, 10 * k + 3, 10 * k, bags.hand([1, 2, k], [4, 5])) for k in range(12)]
+    bags.write(path, sorted([*palms, *hands], key=lambda one: one[2]), pack=pack)
+    path.with_name(f"{path.stem}.layout.toml").write_text('rows = 24\ncolumns = 32\n[ros]\ntopic = "/palm"\n')
+    return path
+
+
+for _name, _pack in (
+    ("bag", ""), ("bag", "bz2"), ("bag", "lz4"), ("mcap", ""), ("mcap", "storage"), ("db3", ""),
+):  # fmt: skip
+
+    @kind(f"bag-{_name}-{_pack or 'none'}")
+    def _bags(folder: Path, name: str = _name, pack: str = _pack) -> Path:
+        return _bag(folder / f"grasp.{name}", pack)
+
+
+@kind("bag-mcap-lz4")
+def _bag_lz4(folder: Path) -> Path:
+    path = _bag(folder / "grasp.mcap", "")
+    with path.open("rb") as file:
+        every = list(make_reader(file).iter_messages())
+    with path.open("wb") as out:
+        writer = Writer(out, compression=CompressionType.LZ4)
+        writer.start(profile="ros2")
+        ids: dict[int, int] = {}
+        for schema, channel, message in every:
+            if channel.id not in ids:
+                made = writer.register_schema(schema.name, schema.encoding, schema.data)
+                ids[channel.id] = writer.register_channel(channel.topic, "cdr", made, dict(channel.metadata))
+            writer.add_message(ids[channel.id], message.log_time, message.data, message.publish_time)
+        writer.finish()
+    return path
+
+
+@kind("npy-layout")
+def _npy_layout(folder: Path) -> Path:
+    np.save(folder / "press.npy", np.random.default_rng(9).integers(0, 99, (50, 4, 5)))
+    (folder / "press.layout.toml").write_text("rows = 4\ncolumns = 5\nrate_hz = 100\n")
+    return folder / "press.npy"
+
+
+@kind("npz-layout")
+def _npz_layout(folder: Path) -> Path:
+    values = np.random.default_rng(9).integers(0, 99, (50, 4, 5))
+    np.savez(folder / "press.npz", pressure=values, seconds=np.arange(50) / 100)
+    (folder / "press.layout.toml").write_text('[data]\narray = "pressure"\ntime = "seconds"\n')
+    return folder / "press.npz"
+
+
+@kind("table-layout")
+def _table_layout(folder: Path) -> Path:
+    rows = (f"{k / 100:g};{k % 7};{k % 5}\n" for k in range(50))
+    (folder / "press.txt").write_text("time;thumb;index\n" + "".join(rows))
+    (folder / "press.layout.toml").write_text('[table]\nseparator = ";"\ntime_column = "time"\n')
+    return folder / "press.txt"
 
 
 for _name in formats.FORMATS:
@@ -230,6 +293,23 @@ def _header(member: bytes, shape: str | None = None, descr: str | None = None) -
     return member[:8] + struct.pack("<H", len(said)) + said.encode() + member[10 + size :]
 
 
+def spoil_npy(rng: np.random.Generator, data: bytes) -> bytes:
+    """Write nonsense into the description of an array, whose length stays right."""
+    end = 10 + struct.unpack("<H", data[8:10])[0]
+    said = spoil_text(rng, spoil_bytes(rng, data[10:end]) if rng.random() < 0.5 else data[10:end])[: end - 10]
+    return data[:10] + said.ljust(end - 10) + data[end:]
+
+
+def spoil_sizes(rng: np.random.Generator, data: bytes) -> bytes:
+    """Write other sizes into a .bag, whose records and fields each begin with one of four bytes."""
+    spoilt = bytearray(data)
+    places = [m.start() - 4 for m in re.finditer(rb"(?:op|conn|time|size|count|compression|chunk_pos|topic)=", data)]
+    for at in rng.choice(places, int(rng.integers(1, 4))):
+        extreme = int(rng.choice([0, 1, 3, 2**16, 2**30, 2**31 - 1, 2**32 - 1]))
+        spoilt[at : at + 4] = struct.pack("<I", extreme)
+    return bytes(spoilt)
+
+
 def spoil_mcap(rng: np.random.Generator, data: bytes) -> bytes:
     """Spoil JSON where it stands, lengths kept, and switch the chunks' checksums off (0: not checked)."""
     data = bytearray(data)
@@ -257,10 +337,14 @@ def spoil_mcap(rng: np.random.Generator, data: bytes) -> bytes:
 def spoilt(rng: np.random.Generator, name: str, data: bytes) -> bytes:
     """Spoil a file's bytes in one of the ways that its kind knows."""
     ways: list[Callable[[np.random.Generator, bytes], bytes]] = [spoil_bytes]
-    if name.startswith("npz"):
+    if name == "npy-layout":
+        ways += [spoil_npy] * 2
+    elif name.startswith("npz"):
         ways += [spoil_npz] * 3
-    elif name.startswith("mcap"):
+    elif "mcap" in name:
         ways += [spoil_mcap] * 2
+    elif name.startswith("bag-bag"):
+        ways += [spoil_sizes] * 2
     elif b"\0" not in data[:2000]:
         ways += [spoil_text] * 2
     return ways[int(rng.integers(len(ways)))](rng, data)

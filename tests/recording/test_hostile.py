@@ -180,6 +180,81 @@ def test_what_is_just_within_the_limits_is_read(tmp_path: Path) -> None:
     assert taxel.open(table).frames().values.shape == (1, 256, 256)
 
 
+# what other libraries read for taxel
+
+
+def named(path: Path) -> bool:
+    """Open a damaged file; return whether it was refused, in one line that names it."""
+    said = ""
+    try:
+        taxel.open(path).frames()
+    except FormatError as error:
+        said = str(error)
+    assert not said or (str(path) in said and "\n" not in said)
+    return bool(said)
+
+
+def test_a_damaged_block_of_a_bag_in_bz2_is_refused_by_name(tmp_path: Path) -> None:
+    path = hostile.KINDS["bag-bag-bz2"](tmp_path)
+    data = path.read_bytes()
+    blocks = [at for at in range(len(data)) if data.startswith(b"BZh", at)]
+    refused_at = []
+    for at in blocks:
+        path.write_bytes(data[: at + 40] + bytes([data[at + 40] ^ 0xFF]) + data[at + 41 :])
+        refused_at += [at] * named(path)
+    assert refused_at == blocks != []
+
+
+@pytest.mark.parametrize("size", [1 << 40, (1 << 62) + 7])
+@pytest.mark.parametrize("kind", ["none", "storage", "lz4"])
+def test_a_part_of_a_bag_that_says_it_is_huge_is_refused_by_name(kind: str, size: int, tmp_path: Path) -> None:
+    path = hostile.KINDS[f"bag-mcap-{kind}"](tmp_path)
+    data, at, count = path.read_bytes(), 8, 0
+    while at + 9 <= len(data) - 8:
+        path.write_bytes(data[: at + 1] + struct.pack("<Q", size) + data[at + 9 :])
+        count += named(path)
+        if data[at] == 6:  # a chunk, with the sizes of what it holds
+            for field in (at + 25, at + 41):
+                path.write_bytes(data[:field] + struct.pack("<Q", size) + data[field + 8 :])
+                count += named(path)
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    assert count > 3
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        b"{'descr': '<i8', 'fortran_order': False, 'shape': (50, 4, 5), ",
+        b"{'descr': '<i8', 'fortran_order': False, 'shape': (50, 4, 5), }\x00(",
+        b"{'descr': '<i8', 'fortran_order': False, 'shape': (1000000000000, 4, 5), }",
+        b"{'descr': '|O', 'fortran_order': False, 'shape': (50, 4, 5), }",
+        b"{'descr': '<U9999999999', 'fortran_order': False, 'shape': (50, 4, 5), }",
+        b"((((((((((((((((((((((((((((((",
+        b"",
+    ],
+)
+@pytest.mark.parametrize("ending", [".npy", ".npz"])
+def test_an_array_with_a_damaged_description_beside_a_layout_is_refused_by_name(
+    ending: str, header: bytes, tmp_path: Path
+) -> None:
+    path = hostile.KINDS[f"{ending[1:]}-layout"](tmp_path)
+    array = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(8000)
+    if ending == ".npy":
+        path.write_bytes(array)
+    else:
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("pressure.npy", array)
+            archive.writestr("seconds.npy", array)
+    assert named(path)
+
+
+def test_times_that_are_no_numbers_are_refused_by_name(tmp_path: Path) -> None:
+    path = hostile.KINDS["npz-layout"](tmp_path)
+    for seconds in (np.zeros(50, "V8"), np.full(50, "x"), np.zeros(50, "M8[s]"), np.zeros(50, complex)):
+        np.savez(path, pressure=np.zeros((50, 4, 5)), seconds=seconds)
+        assert named(path)
+
+
 # what is write-protected, and what stays empty
 
 

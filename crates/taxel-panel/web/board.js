@@ -1,7 +1,7 @@
 // The board: its registers as sliders, presets.
 
 import { Connection } from "./connection.js";
-import { make, part, write } from "./dom.js";
+import { entitle, make, part, write } from "./dom.js";
 import { FIELDS, PRESETS, refused, warned } from "./registers.js";
 import { RefusedError } from "./server.js";
 import { whole } from "./words.js";
@@ -308,7 +308,7 @@ export class Board {
     this.select.replaceChildren(none, ...group("Built in", built_in), ...group("Your own", Object.keys(own)));
     this.select.value = this.preset ?? "";
     part("preset-delete", HTMLButtonElement).disabled = !(this.select.value in own);
-    part("preset-path", HTMLElement).title = path;
+    entitle(part("preset-path", HTMLElement), "title", path);
   }
 
   /** @returns {Record<string, number>} what the board would hold with everything that is typed */

@@ -1,6 +1,6 @@
 // The counters in the header, and the losses by place.
 
-import { make, part, write } from "./dom.js";
+import { entitle, make, part, write } from "./dom.js";
 import { short, whole } from "./words.js";
 
 /** @typedef {import("./protocol.js").Counters} CountersMessage */
@@ -33,7 +33,7 @@ export function writeCounters(counters, drawn) {
   // The rate follows from the registers, so it says nothing of a board that is off.
   const arrives = counters.arrival.state === "arriving";
   put("frames", number(arrives ? counters.frames_per_s : null, whole));
-  part("frames", HTMLElement).title = counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers say ${whole(counters.frames_per_s)}/s`;
+  entitle(part("frames", HTMLElement), "title", counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : arrives ? "" : `nothing arrives; the registers say ${whole(counters.frames_per_s)}/s`);
   // Events that only the panel lacks are in every recording and in the readout.
   const all = Object.entries(lost).reduce((sum, [place, count]) => sum + (place === "panel" ? 0 : count), 0);
   put("lost", whole(all));

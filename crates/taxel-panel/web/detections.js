@@ -1,6 +1,6 @@
 // Detections: the list beside the views, and the marks over the lanes.
 
-import { make, part, write } from "./dom.js";
+import { entitle, make, part, write } from "./dom.js";
 import { seconds, short, whole } from "./words.js";
 
 /** @typedef {{ label: string, t_us: number, latency_us: number | null }} Detection */
@@ -82,7 +82,7 @@ export class Detections {
     inside.forEach(({ label, t_us }, i) => {
       const mark = /** @type {HTMLElement} */ (marks.children[i]);
       mark.className = this.shape(label);
-      if (mark.title !== label) mark.title = label;
+      entitle(mark, "title", label);
       mark.style.left = `${(100 * (timeline?.share(t_us) ?? 0)).toFixed(3)}%`;
     });
   }

@@ -1,4 +1,22 @@
 // Helpers for the page's elements: find them by id, create them, write text only where it changed.
+// Names in strangers' files may hold control characters; what these write shows them escaped.
+
+/** C0, DEL and C1, marks and overrides of direction, separators, lone surrogates: as `escaped` of taxel/_base/messages.py. */
+const CONTROL = /[\u0000-\u001f\u007f-\u009f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]/gu;
+/** @type {Record<string, string>} */
+const SHORT = { "\t": "\\t", "\n": "\\n", "\r": "\\r" };
+
+/**
+ * A text as one line without control characters: each is escaped as in a literal of Python.
+ * @param {string} text
+ * @returns {string}
+ */
+export function escaped(text) {
+  return text.replace(CONTROL, (found) => {
+    const code = found.charCodeAt(0);
+    return SHORT[found] ?? (code < 0x7f ? `\\x${code.toString(16).padStart(2, "0")}` : `\\u${code.toString(16).padStart(4, "0")}`);
+  });
+}
 
 /**
  * Finds an element of the page; throws where the page has none of that id and kind.
@@ -24,19 +42,33 @@ export function part(id, kind) {
 export function make(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
-    if (value !== false) made.setAttribute(name, value === true ? "" : String(value));
+    // A value is sent back to the server, and stays as it is.
+    const text = name === "value" ? String(value) : escaped(String(value));
+    if (value !== false) made.setAttribute(name, value === true ? "" : text);
   }
-  made.append(...children);
+  made.append(...children.map((child) => (typeof child === "string" ? escaped(child) : child)));
   return made;
 }
 
 /**
  * Writes text where it differs: an unchanged text costs no layout.
  * @param {Node} node
- * @param {string} text
+ * @param {...string} lines
  */
-export function write(node, text) {
+export function write(node, ...lines) {
+  const text = lines.map(escaped).join("\n");
   if (node.textContent !== text) node.textContent = text;
+}
+
+/**
+ * Names an element, for those who point at it or hear it, where the name differs.
+ * @param {Element} element
+ * @param {"title" | "aria-label"} attribute
+ * @param {string} name
+ */
+export function entitle(element, attribute, name) {
+  const text = escaped(name);
+  if (element.getAttribute(attribute) !== text) element.setAttribute(attribute, text);
 }
 
 /**

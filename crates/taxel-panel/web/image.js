@@ -1,6 +1,6 @@
 // The picture as a file: maps with their colours, and all lanes, as PNG.
 
-import { ground, part, themed } from "./dom.js";
+import { escaped, ground, part, themed } from "./dom.js";
 
 const WIDE = 1200;
 const EDGE = 32;
@@ -37,7 +37,7 @@ export async function savePicture({ title, file, lanes }) {
   const text = (/** @type {string} */ caption, /** @type {number} */ x, /** @type {number} */ y, /** @type {number} */ size, colour = "text") => {
     context.font = `${size}px ${font}`;
     context.fillStyle = themed(colour);
-    context.fillText(caption, x, y);
+    context.fillText(escaped(caption), x, y);
   };
   context.fillStyle = themed("ground");
   context.fillRect(0, 0, canvas.width, canvas.height);

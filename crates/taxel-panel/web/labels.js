@@ -1,6 +1,6 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
-import { make, part, write } from "./dom.js";
+import { entitle, make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
 import { counted, readTime, seconds, timeUnit, writtenTime } from "./words.js";
 
@@ -314,8 +314,8 @@ export class Labels {
       flag.classList.toggle("line", level < 0 && label_id !== this.chosen);
       write(/** @type {HTMLElement} */ (flag.lastElementChild), named ? label : "");
       const name = `label ${label} at ${seconds(t_us)}`;
-      if (flag.getAttribute("aria-label") !== name) flag.setAttribute("aria-label", name);
-      if (flag.title !== name) flag.title = name;
+      entitle(flag, "aria-label", name);
+      entitle(flag, "title", name);
       flag.classList.toggle("chosen", label_id === this.chosen);
     });
     for (const [id, flag] of this.flags) {

@@ -1,7 +1,7 @@
 // Curves under the raster: the watched taxel, force and area, the centre. All share one time.
 
 import uPlot from "./vendor/uPlot.js";
-import { make, part, themed, write } from "./dom.js";
+import { escaped, make, part, themed, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { rounded } from "./words.js";
 
@@ -143,7 +143,7 @@ export class Lanes {
     this.data.centre = [this.data.taxel[0], ...curves.slice(1).flatMap(() => [[], []])];
     part("centre-legend", HTMLElement).classList.toggle("apart", sources.length > 0);
     const one = () => make("output", { id: "force-sum", "aria-live": "off" });
-    const names = sources.flatMap((source, k) => [make("span", { class: `swatch ${COLOURS[k]}` }), ` ${source} `, make("output", { "aria-live": "off" }), " "]);
+    const names = sources.flatMap((source, k) => [make("span", { class: `swatch ${COLOURS[k]}` }), ` ${escaped(source)} `, make("output", { "aria-live": "off" }), " "]);
     part("force-sums", HTMLElement).replaceChildren(...(names.length ? names : [make("span", { class: "swatch more" }), " ", one()]));
     part("area-legend", HTMLElement).classList.toggle("apart", sources.length > 0);
     this.make();

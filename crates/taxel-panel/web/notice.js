@@ -24,7 +24,7 @@ export function notify(text, bad = false, offer) {
   const place = part("notice", HTMLElement);
   place.hidden = false;
   place.classList.toggle("bad", bad);
-  write(part("notice-text", HTMLElement), text);
+  write(part("notice-text", HTMLElement), ...text.split("\n"));
   clearTimeout(timer);
   // Lines to be copied stay until they are closed.
   if (text.includes("\n")) return;

@@ -1,6 +1,6 @@
 // The header's first words: what is shown, and which board or recording it is; and whether anything arrives.
 
-import { part, write } from "./dom.js";
+import { entitle, part, write } from "./dom.js";
 import { counted, seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Counters} Counters */
@@ -89,6 +89,6 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const place = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
   const text = [place, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
   write(part("source", HTMLElement), text);
-  part("source", HTMLElement).title = text;
+  entitle(part("source", HTMLElement), "title", text);
   document.documentElement.classList.toggle("recording", recording !== null);
 }

@@ -56,7 +56,7 @@ export class Training {
     const text = printed.replace(last, "").trim();
     place.hidden = !text;
     place.classList.remove("bad");
-    write(place, text);
+    write(place, ...text.split("\n"));
     part("train-next", HTMLElement).hidden = !next;
     write(part("train-detect", HTMLElement), next);
     // The page has no options of the command line, which an advice may name.

@@ -16,7 +16,7 @@ from taxel._base.limits import DESCRIPTION, UNPACKED, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError
 
-__all__ = ["read_arrays", "shapes", "stored_names"]
+__all__ = ["read_array", "read_arrays", "shapes", "stored_names"]
 
 
 def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -69,6 +69,40 @@ def shapes(path: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
         # As in `read_arrays`.
         except Exception as error:
             raise FormatError(f"{path}: no whole {Path(path).suffix} ({first_line(error)}); write it again") from None
+
+
+def read_array(path: str | os.PathLike[str]) -> NDArray[Any]:
+    """Read the one array of a .npy.
+
+    Raises
+    ------
+    FormatError : damage, Python objects, or more bytes than the file holds
+    OSError : the file is not there, or cannot be read
+    MemoryError : as `read_arrays`
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "two.npy"
+    >>> np.save(place, [1, 2])
+    >>> read_array(place)
+    array([1, 2])
+    """
+    with open(path, "rb") as file:
+        try:
+            shape, dtype = _described(file)
+            size, held = math.prod(shape) * dtype.itemsize, os.fstat(file.fileno()).st_size - file.tell()
+            if dtype.hasobject or size > held:
+                what = "Python objects" if dtype.hasobject else f"{size} bytes ({shape}, {dtype}); there are {held}"
+                raise FormatError(f"{path}: says that it holds {what}; must be a NumPy array of numbers")
+            unpacked(str(path), size)
+            file.seek(0)
+            return np.lib.format.read_array(file, allow_pickle=False)
+        except (FormatError, MemoryError):
+            raise
+        # As in `read_arrays`.
+        except Exception as error:
+            raise FormatError(f"{path}: {first_line(error)}; must be a NumPy array of numbers") from None
 
 
 def read_arrays(

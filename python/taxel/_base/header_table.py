@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -132,6 +133,7 @@ def text_of(path: Path) -> list[str]:
     OSError : the file is not there, or cannot be read
     """
     try:
-        return path.read_bytes().decode("utf-8-sig").splitlines(keepends=True)
+        # Other line ends than \n and \r, as U+2028, are part of a cell.
+        return list(io.StringIO(path.read_bytes().decode("utf-8-sig"), newline=""))
     except UnicodeDecodeError as error:
         raise FormatError(f"{path}: not a table of text: {error}") from None

@@ -1,8 +1,59 @@
-"""Parts of messages: counts with their nouns, numbers, and errors of other libraries."""
+"""Parts of messages: counts with their nouns, numbers, control characters, errors of other libraries; warnings.
+
+Names in files of strangers may hold control characters, which move a terminal's cursor, or reverse the order of what is
+read. Files and JSON keep such names; what people read shows them escaped. The places where text leaves taxel escape it,
+so that no message has to: `taxel.Error` and `warn` (here), `taxel.cli.say`, the `Console` of `taxel.cli.console`, the
+pages of reports, and the page's `dom.js`. A `__repr__` that shows a text escapes it itself.
+"""
 
 from __future__ import annotations
 
-__all__ = ["counted", "first_line", "installing", "plain"]
+import re
+import warnings
+
+from taxel._core import Error
+
+__all__ = ["counted", "escaped", "escaped_lines", "first_line", "installing", "plain", "warn"]
+
+#: C0, DEL and C1, the marks and overrides of direction, the separators of lines and paragraphs, and halves of surrogate
+#: pairs, which stand for bytes of file names that are no UTF-8. `crates/taxel-panel/web/dom.js` has the same.
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def escaped(text: object) -> str:
+    r"""Return a text as one line without control characters: each is escaped as in a literal of Python.
+
+    Examples
+    --------
+    >>> print(escaped("thumb\x1b[2J\nleft\u202e"))
+    thumb\x1b[2J\nleft\u202e
+    """
+    return _CONTROL.sub(_escape, str(text))
+
+
+def _escape(found: re.Match[str]) -> str:
+    # TOML and JSON, whose lines may be copied from a message, know no \\x, but escape C0 themselves.
+    return repr(found[0])[1:-1] if found[0] < "\x7f" else f"\\u{ord(found[0]):04x}"
+
+
+def escaped_lines(text: object) -> str:
+    """Return a text of several lines without control characters but its line breaks."""
+    return "\n".join(map(escaped, str(text).split("\n")))
+
+
+def warn(text: str, category: type[Warning] = UserWarning, *, stacklevel: int = 1) -> None:
+    """Issue a warning of Python, without control characters; `stacklevel` counts as in `warnings.warn`."""
+    warnings.warn(escaped(text), category, stacklevel=stacklevel + 1)  # noqa: TID251  the place where it is allowed
+
+
+def _shown(error: Error) -> str:
+    """Return the text of an error: one line, and below it the lines that it gives to be copied, if there are any."""
+    line, *below = error.args or ("",)
+    return "\n".join([escaped(line), *map(escaped_lines, below)])
+
+
+# The class is of the core; it needs Python 3.12 to have a method of its own there.
+Error.__str__ = _shown  # type: ignore[method-assign, assignment]
 
 
 def counted(count: int, noun: str, plural: str | None = None) -> str:

@@ -18,7 +18,7 @@ from taxel._base.arguments import flag, instance, mapping, number, numbers, seve
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.files import beside, named, write_whole
-from taxel._base.messages import counted, first_line
+from taxel._base.messages import counted, escaped, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration._curves import Curve, Law, Power, Table, Values, above_0, curve_of
@@ -517,7 +517,7 @@ class Calibration:
 
     def __repr__(self) -> str:
         size = f"{self.array.name}: {self.array.rows} x {self.array.columns} taxels"
-        return f"Calibration({self.described()}, of {size})"
+        return escaped(f"Calibration({self.described()}, of {size})")
 
 
 def _32_bits(values: Values) -> NDArray[np.float32]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, whole
 from taxel._base.arguments import text as checked_text
+from taxel._base.messages import warn
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration._curves import N_PER_KPA_MM2, Curve, Values, above_0
@@ -148,7 +148,7 @@ def best_exponent(curve: Curve, laid: Sequence[Laid]) -> float:
     alike = [exponent for squares, exponent in others if squares <= max(4.0 * best[0], _ALIKE**2)]
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
-        warnings.warn(
+        warn(
             f"loads: an exponent of {best[1]:.3g} is used, but {also} fits them as well; one more load, or exponent, "
             "would decide",
             stacklevel=3,

@@ -16,8 +16,9 @@ import typer
 from taxel._core import DeviceError, Error
 from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App, app
 from taxel.cli._recordings import SET_HELP, assignments
+from taxel.cli._say import say
 
-__all__ = ["SET_HELP", "App", "app", "assignments", "main"]
+__all__ = ["SET_HELP", "App", "app", "assignments", "main", "say"]
 
 #: typer's error for a command line that cannot be parsed; the class belongs to its own copy of click.
 _UsageError: Any = typer.BadParameter.__base__
@@ -28,7 +29,7 @@ def _root(version: bool = typer.Option(False, "--version", help="Print the versi
     if version:
         from taxel import __version__  # noqa: PLC0415  the package imports its compiled part
 
-        typer.echo(f"taxel {__version__}")
+        say(f"taxel {__version__}")
         raise typer.Exit
 
 
@@ -40,14 +41,14 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         if not str(error.format_message()).startswith("Usage:"):
             _end(f"{_plain(error)}; see {_typed(error.ctx)} --help", WRONG_INPUT)
         # Without a command, the help is printed.
-        typer.echo(error.format_message(), err=True)
+        say(*error.format_message().split("\n"), err=True)
         sys.exit(WRONG_INPUT)
     except KeyboardInterrupt:
         sys.exit(STOPPED)
-    except DeviceError as error:
-        _end(str(error), OUTSIDE)
     except Error as error:
-        _end(str(error), WRONG_INPUT)
+        # It escapes the line breaks of names; those that are left are its own.
+        line, *below = str(error).split("\n")
+        _end(line, OUTSIDE if isinstance(error, DeviceError) else WRONG_INPUT, *below)
     except (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError) as error:
         _end(_system_error(error), WRONG_INPUT)
     except OSError as error:
@@ -97,8 +98,8 @@ def _typed(context: Any) -> str:
     return "taxel" if context is None else str(context.command_path)
 
 
-def _end(text: str, code: int) -> NoReturn:
-    typer.echo(f"taxel: {text}", err=True)
+def _end(line: str, code: int, *below: str) -> NoReturn:
+    say(f"taxel: {line}", *below, err=True)
     sys.exit(code)
 
 

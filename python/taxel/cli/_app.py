@@ -49,7 +49,8 @@ class _Command(TyperCommand):
         try:
             return super().invoke(ctx)
         except Error as error:
-            raise type(error)(self._as_typed(str(error))) from error
+            line, *below = error.args or ("",)
+            raise type(error)(self._as_typed(str(line)), *below) from error
         except FileExistsError as error:
             if error.filename is None:
                 raise

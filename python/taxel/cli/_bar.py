@@ -6,16 +6,24 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from taxel._base.messages import escaped
+
 __all__ = ["bar", "duration"]
 
 
 @contextmanager
 def bar(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """Show a bar; the function takes what is done next, how much is done, and all of it (0 if unknown)."""
-    from rich.console import Console  # noqa: PLC0415  the command line starts quickly
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
 
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[left]}")
+    from taxel.cli.console import Console  # noqa: PLC0415  the command line starts quickly
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}"),
+    )
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as shown:
         task, begun = shown.add_task("", total=None, left=""), time.monotonic()
@@ -24,7 +32,7 @@ def bar(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
             nonlocal begun
             begun = begun if done else time.monotonic()
             left = f"{duration((time.monotonic() - begun) * (of - done) / done)} left" if done else ""
-            shown.update(task, description=what, completed=done, total=of or None, left=left)
+            shown.update(task, description=escaped(what), completed=done, total=of or None, left=left)
 
         yield update
 

@@ -7,8 +7,8 @@ import webbrowser
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from taxel.cli.console import Console
 from taxel.live import Panel
 
 __all__ = ["OpenOption", "PanelHostOption", "PanelPortOption", "announce"]

@@ -14,12 +14,12 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import typer
 
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped, warn
 from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
+from taxel.cli._say import say
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def _warn_of_touch(value: str, recording: Recording, source: Events | Frames, ta
 
     held = held_by_tare([Example(source, {}, tare)], NOISE_FLOOR)
     if held >= TOUCH:
-        warnings.warn(
+        warn(
             f"--tare {value}: the beginning of {recording.title} is not quiet but holds a touch of {held} taxels; give "
             "the seconds before it, or --tare FILE",
             stacklevel=2,
@@ -164,7 +164,7 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
     tare, said = without_what_lay(recording, first)
     if said:
-        warnings.warn(said, stacklevel=2)
+        warn(said, stacklevel=2)
     if tare is not None:
         return tare
     if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_PICTURES <= len(source):
@@ -217,7 +217,7 @@ def _measured(recording: Recording, source: Events | Frames, stop_us: int) -> Ta
         present[source.y, source.x] = True
         unknown = int(np.count_nonzero(present & np.isnan(tare.rest)))
         if unknown > _MOST_UNKNOWN * np.count_nonzero(present):
-            warnings.warn(
+            warn(
                 f"{recording.path}: the rest of {unknown} of {np.count_nonzero(present)} taxels is not known, as none "
                 f"of their changes lies in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are left "
                 "out; start the recording before the board, which then sends all values, or give --tare FILE",
@@ -300,7 +300,7 @@ def _warn_of_strangers(table: Labels, option: str, recordings: Sequence[Recordin
     if strange:
         count = counted(sum(row.recording in strange for row in table.rows), "event")
         there = _few(dict.fromkeys(one.title for one in recordings))
-        warnings.warn(
+        warn(
             f"{option} {table.path}: left out {count} of {_few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
             f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
             stacklevel=3,
@@ -328,7 +328,7 @@ def labelled_trials(source: str | None, recordings: Sequence[Recording]) -> list
         table = beside(path) if source in (None, "notes") else Path(str(source))
         named[path] = every & {row.recording for row in Labels(table).rows} if table.is_file() else set()
         if 0 < len(named[path]) < len(every):
-            warnings.warn(
+            warn(
                 f"{path}: left out {len(every) - len(named[path])} of its {len(every)} trials, which have no labels",
                 stacklevel=2,
             )
@@ -365,7 +365,7 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
 
     events = table.of(recording)
     if recording.clock is None and any(row.at_ns for row in table.rows):
-        warnings.warn(
+        warn(
             f"the {kind_of_file(recording.kind)} holds no arrival times, so host_ns cannot show by how many periods of "
             f"the board's clock (6.5536 s) {table.path} is ahead of it: its times are used unchanged",
             stacklevel=2,
@@ -412,7 +412,7 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
     behind = sorted((int(one), label) for label, t in inside.items() for one in t[t > end + near_us])
     if behind:
         (at, label), begin = behind[0], beginning_us(np.array([first]))
-        warnings.warn(
+        warn(
             f"{len(behind)} of the {total} events of {where} are behind the last that was recorded, at "
             f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): they count, and as missed if the "
             "recording stopped before them",
@@ -420,7 +420,7 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         )
     outside = total - sum(map(len, inside.values()))
     if outside:
-        warnings.warn(f"{outside} of the {total} events of {where} left out: outside {_span(recording)}", stacklevel=2)
+        warn(f"{outside} of the {total} events of {where} left out: outside {_span(recording)}", stacklevel=2)
     return {label: t for label, t in inside.items() if len(t) or not len(events[label])}
 
 
@@ -457,7 +457,7 @@ class _Steps:
         for wait_s in chain(_REPORT_S, repeat(_REPORT_S[-1])):
             if ended.wait(wait_s):
                 return
-            typer.echo(f"taxel: {self}", err=True)
+            say(f"taxel: {self}", err=True)
 
 
 @contextmanager
@@ -466,7 +466,9 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
 
     Without a terminal a line is said first after 2 s, then after 10 s and every 30 s.
     """
-    from rich.console import Console  # noqa: PLC0415  the command line starts quickly
+    from rich.text import Text  # noqa: PLC0415  the command line starts quickly
+
+    from taxel.cli.console import Console  # noqa: PLC0415
 
     console, steps = Console(stderr=True), _Steps()
     with warnings.catch_warnings(record=True) as caught:
@@ -478,7 +480,7 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
 
                 def show(step: str) -> None:
                     steps.update(step)
-                    status.update(str(steps))
+                    status.update(Text(escaped(steps)))
 
                 yield show
         else:
@@ -492,7 +494,7 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
                 reporting.join()
     # One that holds for several recordings is shown once.
     for message in dict.fromkeys(str(one.message) for one in caught if issubclass(one.category, UserWarning)):
-        typer.echo(f"taxel: warning: {message}", err=True)
+        say(f"taxel: warning: {message}", err=True)
 
 
 def of_source(recording: Recording, name: str | None) -> Recording:

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 __all__ = ["listed"]
 
 
-def listed(file: Path, found: Sequence[Topic], as_json: bool) -> str:
-    """Return the topics of a ROS bag that hold numbers as lines for people, or as JSON."""
+def listed(file: Path, found: Sequence[Topic], as_json: bool) -> list[str]:
+    """Return the topics of a ROS bag that hold numbers as lines for people, or as one of JSON."""
     if as_json:
-        return json.dumps({"file": str(file), "kind": "ros", "topics": [asdict(one) for one in found]})
+        return [json.dumps({"file": str(file), "kind": "ros", "topics": [asdict(one) for one in found]})]
     if not found:
-        return f"{file}: a ROS bag without a topic that holds numbers"
+        return [f"{file}: a ROS bag without a topic that holds numbers"]
     rows = [("topic", "field", "shape", "numbers", "messages", "rate")]
     for one in found:
         shape = " x ".join(map(str, one.shape)) if len(one.shape) > 1 else f"{one.shape[0]}" if one.shape else "-"
@@ -33,4 +33,4 @@ def listed(file: Path, found: Sequence[Topic], as_json: bool) -> str:
     ]
     named = next((one for one in found if not one.trouble), found[0])
     more = f" --field {named.field}" * bool(named.field) + " --array ROWSxCOLUMNS" * (len(named.shape) < 2)
-    return "\n".join([f"{file}: ROS bag; open a topic by --topic {named.topic}{more}", *lines])
+    return [f"{file}: ROS bag; open a topic by --topic {named.topic}{more}", *lines]

@@ -79,7 +79,7 @@ class Result:
             result["neurons"] = {label: dict(self.made.recipe.neurons[label]) for label in self.made.readout.labels}
         return result
 
-    def page(self, out: Path, recipe: str | None, report: Path | None, tares: str, tare: str) -> str:
+    def page(self, out: Path, recipe: str | None, report: Path | None, tares: str, tare: str) -> list[str]:
         """Return the result as lines for people; the first says whether the scores are held out.
 
         One line of them, if any, is `tares`: which were taken from the recordings. Another names the command that
@@ -94,23 +94,23 @@ class Result:
         lines += [*self._better(), *self._advised(), *self._aligned()]
         if recipe is not None:
             about = self.made.recipe.about
-            lines.append(f"\nrecipe {recipe}" + (f": {about}" if about else ""))
+            lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
         lines += [*([tares] if tares else []), repr(self.made.readout)]
         for label in self.made.readout.labels if self.searched else ():
             point = self.made.recipe.neurons[label]
             chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))
             lines.append(f"{label}, chosen: {chosen}")
-        lines += [f"\n{one.title}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
+        for one, each in zip(self.opened, self.scored.scores, strict=True):
+            lines += ["", f"{one.title}:", *repr(each).split("\n")]
         if len(self.scored.scores) > 1:
-            lines.append(f"\nall recordings:\n{self.scored.together!r}")
+            lines += ["", "all recordings:", *repr(self.scored.together).split("\n")]
         needed = [one.tare is None for one in self.made.readout.encoder._each() if hasattr(one, "tare")]
         option = f" --tare {quote(tare)}" if tare and any(needed) else ""
-        lines.append(f"\nwritten to {out}; next: taxel detect RECORDING --readout {quote(str(out))}{option}")
+        lines += ["", f"written to {out}; next: taxel detect RECORDING --readout {quote(str(out))}{option}"]
         lines += [f"plain rule of {' and '.join(labels)}: written to {path}" for path, labels in self.rules.items()]
         if report is not None:
             lines.append(f"report: {report / 'report.html'}")
-        lines += [f"warning: {one}" for one in self._warnings()]
-        return "\n".join(lines)
+        return [*lines, *(f"warning: {one}" for one in self._warnings())]
 
     def _scores(self, label: str) -> Iterator[str]:
         """Yield how the neuron and the plain rule of a label scored on the same labels."""

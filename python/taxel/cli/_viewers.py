@@ -10,6 +10,7 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._recordings import SET_HELP, encoder_of
+from taxel.cli._say import say
 from taxel.encode import Encoder
 from taxel.live import Live, Panel, Viewer
 
@@ -67,8 +68,8 @@ def report_viewers(shown: Sequence[Viewer], *, quiet: bool) -> None:
     for viewer in shown:
         state = viewer.stop()
         if not quiet:
-            typer.echo(state_of(viewer))
+            say(state_of(viewer))
         if state.lost:
             parts = (f"{n} of {n + state.sent.get(w, 0)} {_NAMES.get(w, w)}" for w, n in state.lost.items())
             why = state.trouble or "it was not connected, or too slow"
-            typer.echo(f"taxel: {', '.join(parts)} were not shown in {viewer.place}: {why}", err=True)
+            say(f"taxel: {', '.join(parts)} were not shown in {viewer.place}: {why}", err=True)

@@ -24,6 +24,7 @@ from taxel._base.messages import counted
 from taxel._base.provenance import installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._say import say
 
 __all__ = ["bench", "changed_parts", "doubts_of", "goals_of", "made_of"]
 
@@ -71,7 +72,7 @@ def bench(
             f"{folder}: holds no benchmark; run this in a checkout of taxel, or name its folder by --folder"
         )
     if name is None and not goals:
-        typer.echo("\n".join(_listed(folder, stem, file) for stem, file in files.items()))
+        say(*(line for stem, file in files.items() for line in _listed(folder, stem, file)))
         return
     if name not in (None, "all", *files):
         raise ProblemError(f"no benchmark {name!r}: there are {', '.join(files)} and all")
@@ -107,11 +108,11 @@ def bench(
             text = json.dumps(result, indent=1) + "\n"
             write_whole(place, partial(_put, text), overwrite=True)
             if not as_json:
-                typer.echo(f"{stem}: written to {place}")
+                say(f"{stem}: written to {place}")
         if as_json:
-            typer.echo(json.dumps(result))
+            say(json.dumps(result))
         else:
-            typer.echo(_table(stem, result, benchmark))
+            say(*_table(stem, result, benchmark))
 
 
 def made_of(file: Path, benchmark: Any) -> dict[str, str]:
@@ -179,7 +180,7 @@ def _measured(part: Mapping[str, Any], name: str = "result") -> list[tuple[str, 
     return rows + [row for key, one in inner for row in _measured(one, key)]
 
 
-def _listed(folder: Path, stem: str, file: Path) -> str:
+def _listed(folder: Path, stem: str, file: Path) -> list[str]:
     """Return a benchmark's name, what its last run took, and its question."""
     took = _saved(folder / "results" / f"{stem}.json").get("took_s")
     about = (ast.get_docstring(ast.parse(file.read_bytes())) or "").partition("\n")[0]
@@ -201,7 +202,7 @@ def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
         result = _saved(folder / "results" / f"{name}.json")
         if not result:
             absent += 1
-            typer.echo(f"{name}: no result\n")
+            say(f"{name}: no result", "")
             continue
         benchmark = _load(files[name])
         goals, changed = goals_of(benchmark, result), changed_parts(result, made_of(files[name], benchmark))
@@ -213,18 +214,18 @@ def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
         about = [machine.get("cpu", "unknown processor"), commit, _others(machine)]
         about += [doubt for doubt in doubts_of(result) if doubt not in about]
         reached = sum(goal.reached for goal in goals)
-        typer.echo(f"{name}: {reached} of {counted(len(goals), 'goal')} reached")
-        typer.echo(_wrapped("; ".join(about)))
-        typer.echo(_wrapped(f"of earlier code; changed: {', '.join(changed)}" if changed else "of this code"))
-        typer.echo("".join(f"{_row(goal, result)}\n" for goal in goals))
+        say(f"{name}: {reached} of {counted(len(goals), 'goal')} reached")
+        say(*_wrapped("; ".join(about)))
+        say(*_wrapped(f"of earlier code; changed: {', '.join(changed)}" if changed else "of this code"))
+        say(*(line for goal in goals for line in _row(goal, result)), "")
     counts = [f"{verdicts.count(one)} {one}" for one in _VERDICTS]
-    typer.echo(f"{counted(len(verdicts), 'goal')}: {', '.join(counts)}")
-    typer.echo(f"{counted(len(names), 'benchmark')}: {stale} with a result of earlier code")
+    say(f"{counted(len(verdicts), 'goal')}: {', '.join(counts)}")
+    say(f"{counted(len(names), 'benchmark')}: {stale} with a result of earlier code")
     return not absent and set(verdicts) <= {_VERDICTS[0]}
 
 
-def _wrapped(text: str, first: str = "  ", later: str = "  ") -> str:
-    return textwrap.fill(text, 80, initial_indent=first, subsequent_indent=later, break_on_hyphens=False)
+def _wrapped(text: str, first: str = "  ", later: str = "  ") -> list[str]:
+    return textwrap.wrap(text, 80, initial_indent=first, subsequent_indent=later, break_on_hyphens=False)
 
 
 def _verdict(goal: Any) -> str:
@@ -232,7 +233,7 @@ def _verdict(goal: Any) -> str:
     return unknown if goal.figure is None else reached if goal.reached else lacks
 
 
-def _row(goal: Any, result: Mapping[str, Any]) -> str:
+def _row(goal: Any, result: Mapping[str, Any]) -> list[str]:
     """Return a goal as a row: whether it is reached, the figure, the limit, the name, and the quartiles of rounds."""
     figure = "" if goal.figure is None else _figure(goal.what, goal.figure, result, 5)
     first = f"  {_verdict(goal):<13}{figure:>10} {'<=' if goal.at_most else '>='} {goal.limit:<10.5g} "
@@ -319,7 +320,7 @@ def _better(name: str, benchmark: Any) -> str:
     )
 
 
-def _table(stem: str, result: Mapping[str, Any], benchmark: Any) -> str:
+def _table(stem: str, result: Mapping[str, Any], benchmark: Any) -> list[str]:
     groups: dict[str, list[str]] = {}
     for name, one in result.get("ratios", {}).items():
         rounds = result.get("spread", {}).get(name)
@@ -328,6 +329,6 @@ def _table(stem: str, result: Mapping[str, Any], benchmark: Any) -> str:
     rows = [row for better, of in groups.items() for row in (f"  {better}:", *of)]
     left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
     head = f"{stem}: ratios to peers and other figures, with quartiles of rounds; {result['took_s']:g} s"
-    lacks = [_row(goal, result) for goal in goals_of(benchmark, result) if not goal.reached]
+    lacks = [line for goal in goals_of(benchmark, result) if not goal.reached for line in _row(goal, result)]
     doubts = [f"  {doubt}" for doubt in doubts_of(result)]
-    return "\n".join([head, *rows, *left_out, *lacks, *doubts])
+    return [head, *rows, *left_out, *lacks, *doubts]

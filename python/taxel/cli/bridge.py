@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live as Display
 from rich.text import Text
 
@@ -30,6 +30,8 @@ from taxel.cli._board import (
     exit_code,
     rest_of,
 )
+from taxel.cli._say import say
+from taxel.cli.console import Console
 from taxel.detect import load
 from taxel.live import Bridge, Live
 from taxel.live.bridge import PLACE
@@ -111,7 +113,7 @@ def bridge(
         counts = published.counts
     if as_json:
         path = None if summary.path is None else str(summary.path)
-        typer.echo(
+        say(
             json.dumps(
                 asdict(summary) | {"path": path, "published": counts, "verdict_details": summary.verdict.to_dict()}
             )
@@ -119,8 +121,8 @@ def bridge(
     else:
         sent = counts["block"]["sent"] + counts["drop"]["sent"]
         received = counted(summary.counters["capture"]["datagrams"], "datagram")
-        typer.echo(f"{received} received, {counted(sent, 'parcel')} published")
-        typer.echo(summary.verdict)
+        say(f"{received} received, {counted(sent, 'parcel')} published")
+        say(summary.verdict)
     raise typer.Exit(exit_code(summary, live.array))
 
 

@@ -15,6 +15,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import TARE_HELP, assignments, progress, tare_of
+from taxel.cli._say import say
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -129,13 +130,13 @@ def calibrate(
         result: dict[str, Any] = {"calibration": str(place), "unit": calibration.unit, "of": calibration.of}
         result |= {"date": calibration.date, "residual": calibration.residual}
         result["loads"] = [{"load": a, "unit": b, "made": c} for a, b, c in calibration.loads]
-        typer.echo(json.dumps(result))
+        say(json.dumps(result))
         return
-    typer.echo(f"{calibration.described()}: written to {place}")
+    say(f"{calibration.described()}: written to {place}")
     for number, (true, of, value) in enumerate(calibration.loads, start=1):
-        typer.echo(f"  load {number}: {true:g} {of}, calibrated {value:.4g} {of}")
+        say(f"  load {number}: {true:g} {of}, calibrated {value:.4g} {of}")
     if calibration.loads and calibration.residual is None:
-        typer.echo("  no residual: no more loads than unknowns, so the fit is exact; further loads show how good it is")
+        say("  no residual: no more loads than unknowns, so the fit is exact; further loads show how good it is")
 
 
 @dataclass(frozen=True)

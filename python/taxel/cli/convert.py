@@ -13,7 +13,8 @@ from taxel._core import ProblemError
 from taxel.cli._app import app, with_out
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import of_source
+from taxel.cli._recordings import of_source, progress
+from taxel.cli._say import say
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
@@ -57,7 +58,7 @@ def convert(
 
     if target.suffix:
         try_whole(target, overwrite=overwrite)
-    with bar(as_json) as show:
+    with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {source}", 0, 0)
         opened = [of_source(one, part) for one in files.joined(source)]
         if target.suffix and len(opened) > 1:
@@ -75,12 +76,12 @@ def convert(
                 {"source": recording.title, "target": str(place), "lost": taxel.convert(recording, place, **how)}
             )
     if as_json:
-        typer.echo(json.dumps({**written[0], "source": str(source)} if target.suffix else {"written": written}))
+        say(json.dumps({**written[0], "source": str(source)} if target.suffix else {"written": written}))
         return
     for one in written:
-        typer.echo(f"written to {one['target']}")
+        say(f"written to {one['target']}")
         for what in one["lost"]:
-            typer.echo(f"  lost: {what}")
+            say(f"  lost: {what}")
 
 
 def _places(opened: list[Recording], folder: Path) -> list[Path]:

@@ -15,6 +15,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP, of_source, span_us
+from taxel.cli._say import say
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
@@ -81,11 +82,11 @@ def cut(
         lost = taxel.convert(part, place, overwrite=overwrite)
         written.append({"file": str(place), "lost": lost})
         if not as_json:
-            typer.echo(f"written to {place}: {part!r}")
+            say(f"written to {place}: {part!r}")
             for what in lost:
-                typer.echo(f"  lost: {what}")
+                say(f"  lost: {what}")
     if as_json:
-        typer.echo(json.dumps({"recording": str(recording), "written": written}))
+        say(json.dumps({"recording": str(recording), "written": written}))
 
 
 def _check_time(recording: Recording, start: float | None, stop: float | None) -> None:

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from taxel._base.files import try_whole
 from taxel.cli._app import app
+from taxel.cli._say import say
+from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED
 
 __all__ = ["demo"]
@@ -62,14 +63,14 @@ def demo(
             try_whole(place)
     if train_to is not None:
         _train(console, train_to)
-        typer.echo(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
+        say(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
         return
     if drops_to is not None:
         from taxel.demo.naming import write_drops  # noqa: PLC0415
 
         with console.status("dropping balls") as status:
             write_drops(drops_to, progress=status.update)
-        typer.echo(json.dumps({"drops": str(drops_to)}) if as_json else f"drops: {drops_to.resolve()}")
+        say(json.dumps({"drops": str(drops_to)}) if as_json else f"drops: {drops_to.resolve()}")
         return
     from taxel.demo.showing import show  # noqa: PLC0415  pictures load slowly
 
@@ -84,7 +85,7 @@ def demo(
         folder=folder,
     )
     # Not wrapped: a path is to be copied.
-    typer.echo(json.dumps(values | {"report": str(page)}) if as_json else f"report: {page.resolve()}")
+    say(json.dumps(values | {"report": str(page)}) if as_json else f"report: {page.resolve()}")
 
 
 def _train(console: Console, place: Path) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
-import warnings
 from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from taxel._base.messages import counted
+from taxel._base.messages import counted, warn
 from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.cli._app import app
@@ -26,6 +27,7 @@ from taxel.cli._recordings import (
     tare_or_by_unit,
     try_report,
 )
+from taxel.cli._say import say
 from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
@@ -115,24 +117,25 @@ def detect(
     places = {name: str(path) for name, path in written.items() if path is not None}
     if as_json:
         verdicts = [one.verdict for one in opened]
-        typer.echo(json.dumps(_result(recording, readout, loaded, outcomes, verdicts, together, window_ms) | places))
+        say(json.dumps(_result(recording, readout, loaded, outcomes, verdicts, together, window_ms) | places))
         return
     for outcome in outcomes:
         if recording.is_dir() or len(outcomes) > 1:
-            typer.echo(f"{outcome.name}:")
+            say(f"{outcome.name}:")
         _print(outcome, loaded)
         if isinstance(loaded, Readout):
-            typer.echo(outcome.outside_text)
+            say(outcome.outside_text)
     if together is not None:
-        typer.echo(f"\nagainst {truth} (window {window_ms:g} ms):\n{together!r}{_not_scored(events, loaded.labels)}")
+        say("", f"against {truth} (window {window_ms:g} ms):", *repr(together).split("\n"))
+        say(*_not_scored(events, loaded.labels))
     for name, path in places.items():
-        typer.echo(f"written to {path}" if name == "written" else f"{name}: {path}")
+        say(f"written to {path}" if name == "written" else f"{name}: {path}")
 
 
 def _warn_of_losses(recording: Recording) -> None:
     """Warn of what was lost or damaged, as detections may lack or have wrong times."""
     if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
-        warnings.warn(f"{recording.title}: {recording.verdict}", stacklevel=2)
+        warn(f"{recording.title}: {recording.verdict}", stacklevel=2)
 
 
 @contextmanager
@@ -215,20 +218,26 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     """Return the detections as a table; of several recordings each row begins with its recording's name."""
     if len(outcomes) == 1:
         return outcomes[0].found._csv()
-    lines: list[str] = []
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
     # All recordings share one header.
     repaired = any(one.found.repaired.any() for one in outcomes)
     for one in outcomes:
-        head, *rows = one.found._csv(repaired=repaired).splitlines()
+        # A label may hold line breaks.
+        head, *rows = csv.reader(io.StringIO(one.found._csv(repaired=repaired), newline=""))
         name = '"' + Path(one.name).name.replace('"', '""') + '"'
-        lines += [*([] if lines else [f"recording,{head}"]), *(f"{name},{row}" for row in rows)]
-    return "\n".join(lines) + "\n"
+        if not text.tell():
+            table.writerow(["recording", *head])
+        for row in rows:
+            text.write(f"{name},")
+            table.writerow(row)
+    return text.getvalue()
 
 
-def _not_scored(events: Sequence[Mapping[str, object] | None], labels: Sequence[str]) -> str:
-    """Return a line that names the labels of the truth which the readout does not have; "" where it has all."""
+def _not_scored(events: Sequence[Mapping[str, object] | None], labels: Sequence[str]) -> list[str]:
+    """Return a line that names the labels of the truth which the readout does not have; none where it has all."""
     unknown = sorted({label for of in events if of is not None for label in of} - set(labels))
-    return f"\nnot scored, as the readout has {', '.join(labels)}: {', '.join(unknown)}" if unknown else ""
+    return [f"not scored, as the readout has {', '.join(labels)}: {', '.join(unknown)}"] if unknown else []
 
 
 def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:
@@ -237,19 +246,19 @@ def _print(outcome: Outcome, readout: Readout | PlainRule) -> None:
 
     found, begin_us = outcome.found, outcome.begin_us
     detections = Detections._of(found.label, found.t - begin_us, found.known - begin_us, found.slope)
-    typer.echo(repr(detections))
+    say(repr(detections))
     if (hint := _hint(outcome, readout)) is not None:
-        typer.echo(hint)
+        say(hint)
     if not len(detections):
         return
     if begin_us:
-        typer.echo(f"times are from {begun(begin_us)} on")
+        say(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
     first = detections[:_ROWS]
     # A plain rule has no slope; levels of pictures come in steps, and may give one for all.
     sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1
-    typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
+    say(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
-        typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped)
+        say(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped)
     if len(detections) > _ROWS:
-        typer.echo(f"... and {len(detections) - _ROWS} more; --csv and --json hold all")
+        say(f"... and {len(detections) - _ROWS} more; --csv and --json hold all")

@@ -9,13 +9,14 @@ from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import ProblemError
 from taxel.cli._app import App, SecondsOption, app
+from taxel.cli._say import say
+from taxel.cli.console import Console
 from taxel.device import Device, ports
 from taxel.wire import PRESETS, Registers, described
 from taxel.wire.registers import QUOTED_PRESETS
@@ -45,13 +46,13 @@ def listed(as_json: JsonOption = False) -> None:
     """
     serial_ports = ports()
     if as_json:
-        typer.echo(json.dumps([asdict(port) for port in serial_ports]))
+        say(json.dumps([asdict(port) for port in serial_ports]))
         return
     for port in serial_ports:
         usb = "" if port.usb is None else f"{port.usb[0]:04x}:{port.usb[1]:04x}"
-        typer.echo("  ".join(filter(None, (port.place, port.kind, usb, port.maker, port.product, port.serial))))
+        say("  ".join(filter(None, (port.place, port.kind, usb, port.maker, port.product, port.serial))))
     if not serial_ports:
-        typer.echo("no serial port: is the cable plugged in, and are you allowed to open it?", err=True)
+        say("no serial port: is the cable plugged in, and are you allowed to open it?", err=True)
 
 
 @_device.command()
@@ -87,11 +88,11 @@ def set_registers(
             return
         changed = [(name, value, unit) for name, value, unit, *_ in described(after) if value != before[name]]
         for name, value, unit in changed:
-            typer.echo(f"{name}: {before[name]:g} -> {value:g}" + f" {unit}" * bool(unit))
+            say(f"{name}: {before[name]:g} -> {value:g}" + f" {unit}" * bool(unit))
         if not changed:
-            typer.echo("nothing changed: the board had these values")
+            say("nothing changed: the board had these values")
         for warning in after.warnings:
-            typer.echo(f"warning: {warning}", err=True)
+            say(f"warning: {warning}", err=True)
 
 
 @_device.command(short_help="Set a board to a preset, and read it back.")
@@ -148,7 +149,7 @@ def watch(
             if now != before:
                 faults = ", ".join(f"{n} {name}" for name, n in device.faults.items()) or "no faults"
                 again = f"; reconnected {counted(device.reconnects, 'time')}" if device.reconnects else ""
-                typer.echo(json.dumps(now) if as_json else faults + again)
+                say(json.dumps(now) if as_json else faults + again)
                 before = now
             time.sleep(_POLL_S)
 
@@ -176,10 +177,10 @@ def _print(device: Device, registers: Registers, as_json: bool) -> None:
         result["frame_us"] = registers.frame_us
         result["registers"] = {name: value for name, value, *_ in rows}
         result["warnings"] = list(registers.warnings)
-        typer.echo(json.dumps(result))
+        say(json.dumps(result))
         return
     g = device.greeting
-    typer.echo(
+    say(
         f"{device.cable.place}: {g.rows} x {g.columns} taxels, {g.channels} channels, wire version "
         f"{registers.wire_version}, {1e6 / registers.frame_us:.2f} frames/s"
     )
@@ -188,4 +189,4 @@ def _print(device: Device, registers: Registers, as_json: bool) -> None:
         table.add_row(name, f"{value:g}", unit, place, meaning)
     Console(soft_wrap=True).print(table)
     for warning in registers.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}", err=True)

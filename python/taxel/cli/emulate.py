@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taxel._base.files import try_whole
@@ -24,6 +23,8 @@ from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._app import app, with_typed
 from taxel.cli._recordings import progress
+from taxel.cli._say import say
+from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.live.sending import PORT
 from taxel.recording.opening import open_any
@@ -151,7 +152,7 @@ def emulate(typed: _Typed) -> None:
         summary: dict[str, Any] = {"seed": played.seed, "scenes": typed.scenes, "preset": played.board.preset}
         summary |= {"held": report.held, "verdict": report.verdict}
         summary |= {"wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
-        typer.echo(json.dumps({**summary, **asdict(report)}))
+        say(json.dumps({**summary, **asdict(report)}))
     else:
         _print(report, in_time=not typed.pipe)
 
@@ -291,11 +292,11 @@ def _from_file(scene_file: SceneFile, scenes: int | None, tare_ms: float) -> Ite
 
 def _print(report: EmulatorReport, in_time: bool) -> None:
     events, datagrams = counted(report.changes, "event"), counted(report.datagrams, "datagram")
-    typer.echo(f"{events} in {datagrams}, {counted(report.bytes, 'byte')}")
+    say(f"{events} in {datagrams}, {counted(report.bytes, 'byte')}")
     if report.network is not None:
-        typer.echo("network: " + ", ".join(f"{n} {name}" for name, n in report.network.items()))
+        say("network: " + ", ".join(f"{n} {name}" for name, n in report.network.items()))
     if in_time:
-        typer.echo(report.verdict)
+        say(report.verdict)
 
 
 def _pairs(option: str, assignments: Iterable[str]) -> dict[str, str]:

@@ -15,6 +15,7 @@ from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, progress, tare_or_by_unit
+from taxel.cli._say import say
 
 __all__ = ["encode"]
 
@@ -64,4 +65,5 @@ def encode(
         "stop_ms": trains.stop,
         "written": str(out),
     }
-    typer.echo(json.dumps(result) if as_json else f"{trains!r}, {result['silent_trains']} silent\nwritten to {out}")
+    lines = [f"{trains!r}, {result['silent_trains']} silent", f"written to {out}"]
+    say(*([json.dumps(result)] if as_json else lines))

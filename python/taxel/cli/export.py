@@ -10,6 +10,7 @@ import typer
 
 from taxel._base.messages import installing
 from taxel.cli._app import App, app, with_out
+from taxel.cli._say import say
 
 __all__ = ["nir"]
 
@@ -49,8 +50,8 @@ def nir(
     except ModuleNotFoundError as error:
         raise Error(f"{error}: {installing('nir')}") from None
     if as_json:
-        typer.echo(json.dumps({"readout": str(readout), "written": str(out), "lost": lost}))
+        say(json.dumps({"readout": str(readout), "written": str(out), "lost": lost}))
         return
-    typer.echo(f"written to {out}")
+    say(f"written to {out}")
     for what in lost:
-        typer.echo(f"  NIR cannot hold: {what}")
+        say(f"  NIR cannot hold: {what}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +18,8 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, tare_of
+from taxel.cli._recordings import TARE_HELP, progress, tare_of
+from taxel.cli._say import say
 from taxel.cli._topics import listed
 from taxel.clock import doubt
 from taxel.spikes import to_ms
@@ -78,12 +80,12 @@ def info(
         if place is not None:
             try_whole(place, overwrite=overwrite)
     if are_spike_trains(file):
-        typer.echo(_spikes(file, as_json, drawn=picture is not None or table is not None))
+        say(*_spikes(file, as_json, drawn=picture is not None or table is not None))
         return
-    with bar(as_json) as show:
+    with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {file}", 0, 0)
         if file.exists() and is_bag(file) and not files.names_topic(file):
-            typer.echo(listed(file, topics(file, files.types, files.ros), as_json))
+            say(*listed(file, topics(file, files.types, files.ros), as_json))
             return
         opened = files.open(file)
         # A file of another maker may hold several recordings; many hold one.
@@ -93,8 +95,8 @@ def info(
             if picture is not None or table is not None:
                 raise ProblemError(_several(file, every))
             of_each = [_facts(one, tare) for one in every]
-            text = json.dumps(of_each if len(every) > 1 else of_each[0])
-            typer.echo(text if as_json else "\n".join(map(_pages, of_each)))
+            result = [json.dumps(of_each if len(every) > 1 else of_each[0])]
+            say(*(result if as_json else chain.from_iterable(map(_pages, of_each))))
             return
         rest = tare_of(tare, recording)
         pressed = series(recording, rest)
@@ -109,11 +111,11 @@ def info(
     if picture is not None:
         _draw(picture, recording, above_rest(recording, rest), overwrite)
         facts["picture"] = str(picture)
-    typer.echo(json.dumps(facts) if as_json else _page(facts))
+    say(*([json.dumps(facts)] if as_json else _page(facts)))
 
 
-def _spikes(file: Path, as_json: bool, *, drawn: bool) -> str:
-    """Return what a file of spike trains holds, as JSON or as lines for people."""
+def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:
+    """Return what a file of spike trains holds, as one line of JSON or as lines for people."""
     from taxel.spikes import SpikeTrains  # noqa: PLC0415  the command line starts quickly
 
     if drawn:
@@ -123,7 +125,7 @@ def _spikes(file: Path, as_json: bool, *, drawn: bool) -> str:
     spikes = int(trains.counts.sum())
     if as_json:
         facts = {"file": str(file), "trains": len(trains), "silent_trains": silent, "trains_kind": trains.kind}
-        return json.dumps(facts | {"spikes": spikes, "start_ms": trains.start, "stop_ms": trains.stop})
+        return [json.dumps(facts | {"spikes": spikes, "start_ms": trains.start, "stop_ms": trains.stop})]
     rate = f", {spikes / seconds:.4g} a second of all trains" if seconds else ""
     rows = [
         ("trains", f"{len(trains)}, {silent} silent; the file does not say of which encoder"),
@@ -131,7 +133,7 @@ def _spikes(file: Path, as_json: bool, *, drawn: bool) -> str:
         ("time", f"{trains.start:g} to {trains.stop:g} ms ({seconds:.3f} s)"),
         ("spikes", f"{spikes}{rate}"),
     ]
-    return "\n".join([f"{file}: spike trains", *(f"  {name:<20}{value}" for name, value in rows)])
+    return [f"{file}: spike trains", *(f"  {name:<20}{value}" for name, value in rows)]
 
 
 def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest] | None, overwrite: bool) -> None:
@@ -206,11 +208,12 @@ def _sources(recording: Recording, tare: str | None) -> dict[str, Any]:
     return {"file": str(recording.path), **of_all, "sources": sources}
 
 
-def _pages(facts: dict[str, Any]) -> str:
+def _pages(facts: dict[str, Any]) -> list[str]:
     """Return the facts of a recording, or of each source of one, as lines for people."""
     if "sources" not in facts:
         return _page(facts)
-    return "\n".join(f"{name}: {_page(of)}" for name, of in facts["sources"].items())
+    pages = {name: _page(of) for name, of in facts["sources"].items()}
+    return [line for name, (head, *rows) in pages.items() for line in (f"{name}: {head}", *rows)]
 
 
 def _lines(pressed: Series) -> Iterator[str]:
@@ -224,17 +227,18 @@ def _lines(pressed: Series) -> Iterator[str]:
         yield ",".join([str(t), *("" if np.isnan(value) else f"{value:.10g}" for value in values)])
 
 
-def _page(facts: dict[str, Any]) -> str:
+def _page(facts: dict[str, Any]) -> list[str]:
     """Return the facts of a recording as lines for people."""
     from taxel.recording import kind_of_file  # noqa: PLC0415
 
     head = f"{facts['file']}: {kind_of_file(facts['kind'])}" + f", from {facts['source']}" * bool(facts["source"])
     rows = [*_contents(facts), *_rates(facts), *_losses(facts), ("verdict", facts["verdict"])]
     rows += [("remark", line) for line in facts["remarks"]]
-    rows += [("left behind", line) for line in facts["lost"]]
+    left = [("left behind", line) for line in facts["lost"]]
+    # What was left out of a bag, or has other times, concerns all that follows.
+    rows = [*left, *rows] if facts["kind"] == "ros" else [*rows, *left]
     lines = [head, *(f"  {name:<20}{value}" for name, value in rows)]
-    lines += [f"{what} written to {facts[what]}" for what in ("picture", "table") if what in facts]
-    return "\n".join(lines)
+    return [*lines, *(f"{what} written to {facts[what]}" for what in ("picture", "table") if what in facts)]
 
 
 def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -16,6 +16,7 @@ from taxel.cli._app import app
 from taxel.cli._bar import bar, duration
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import SET_HELP, progress
+from taxel.cli._say import say
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, LabelledTrial, Point
@@ -94,7 +95,7 @@ def information(
 
             def show(what: str, done: int, of: int) -> None:
                 if not done and not as_json:
-                    typer.echo(
+                    say(
                         f"{counted(len(trials), 'trial')}: about {duration(of / 1000)} on an idle processor; Ctrl-C "
                         "prints what is known by then",
                         err=True,
@@ -120,14 +121,14 @@ def information(
             update("drawing", 0, 0)
             write_information(report, result, overwrite=overwrite)
     except KeyboardInterrupt:
-        typer.echo(known.line(draws), err=True)
+        say(known.line(draws), err=True)
         raise
     if as_json:
-        typer.echo(json.dumps({**result.to_dict(), "report": str(report)}))
+        say(json.dumps({**result.to_dict(), "report": str(report)}))
         return
     for line in lines(result):
-        typer.echo(line)
-    typer.echo(f"written to {report}")
+        say(line)
+    say(f"written to {report}")
 
 
 class _Known:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live as Display
 from rich.text import Text
 
@@ -47,7 +47,9 @@ from taxel.cli._board import (
 )
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
+from taxel.cli._say import say
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
+from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout, load
 from taxel.detections import Detection
 from taxel.device import Cable
@@ -182,7 +184,7 @@ def live(typed: _Typed) -> None:
             last, external = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
-            _drain(last, console, typer.echo)
+            _drain(last, console, say)
     tare = summary.tare
     if typed.save_tare is not None and tare is not None:
         tare.save(typed.save_tare)
@@ -195,7 +197,7 @@ def live(typed: _Typed) -> None:
     if not typed.as_json:
         _print_summary(summary, typed.guard_frames)
     elif summary.verdict.status in ("damaged", "lost", "nothing arrived"):
-        typer.echo(f"taxel: {summary.verdict}", err=True)
+        say(f"taxel: {summary.verdict}", err=True)
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
@@ -247,21 +249,21 @@ def _report(folder: Path, readout: Readout | PlainRule, path: Path, tare: Tare |
 def _print_summary(summary: Summary, guard_frames: float) -> None:
     counters = summary.counters
     detections, events = counted(counters["detections"], "detection"), counted(counters["events"], "event")
-    typer.echo(f"{detections}, {events} in {counters['seconds']:.1f} s")
+    say(f"{detections}, {events} in {counters['seconds']:.1f} s")
     if counters["detections"]:
-        typer.echo(f"from known to output: {delays(counters['said_latency'])}")
+        say(f"from known to output: {delays(counters['said_latency'])}")
     if counters["wrong"]:
         wrong = counted(counters["wrong"], "detection")
-        typer.echo(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
+        say(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
     if counters["late"]:
-        typer.echo(f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded")
+        say(f"{counted(counters['late'], 'event')} out of order: read out on arrival, and recorded")
     if counters["events_dropped"]:
-        typer.echo(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
+        say(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
     for why in doubted(counters):
-        typer.echo(why)
+        say(why)
     if summary.path is not None:
-        typer.echo(f"recorded to {summary.path}")
-    typer.echo(summary.verdict)
+        say(f"recorded to {summary.path}")
+    say(summary.verdict)
 
 
 def _unsent(summary: Summary) -> None:
@@ -269,9 +271,7 @@ def _unsent(summary: Summary) -> None:
     for one in summary.counters["sent"]:
         if one["lost"]:
             why = one["trouble"] or "read too slowly"
-            typer.echo(
-                f"taxel: lines not sent to {one['to']}: {one['lost']} of {one['sent'] + one['lost']}: {why}", err=True
-            )
+            say(f"taxel: lines not sent to {one['to']}: {one['lost']} of {one['sent'] + one['lost']}: {why}", err=True)
 
 
 def _together(typed: _Typed) -> None:
@@ -299,7 +299,7 @@ def _warn_of_unknown(tare: Tare) -> None:
     """Warn if a fresh tare has the rest of few taxels: encoders ignore the others."""
     known = int(np.count_nonzero(~np.isnan(tare.rest)))
     if 2 * known < tare.array.taxels:
-        typer.echo(
+        say(
             f"taxel: the tare holds {known} of {tare.array.taxels} taxels, those that changed while it was taken; "
             "events of the others are ignored. Start taxel live before the board, which then sends all values, or "
             "give --tare FILE",
@@ -324,7 +324,7 @@ def _watch(
     """
     # If both go to one terminal, detections are printed above the display; else they go to standard output.
     above = console.is_terminal and sys.stdout.isatty()
-    echo: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else typer.echo
+    echo: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else say
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as asked, display:
@@ -359,7 +359,7 @@ def _watch(
                     fresh = False
                     _warn_of_unknown(pipeline.tare)
             if not warned and (wrong := outside(now, pipeline.array)):
-                typer.echo(f"taxel: {wrong}", err=True)
+                say(f"taxel: {wrong}", err=True)
                 warned = True
             if now["seconds"] - before["seconds"] >= REDRAW_S:
                 lines = [Text(state_of(viewer)) for viewer in external]

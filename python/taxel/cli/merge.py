@@ -11,6 +11,7 @@ import typer
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP
+from taxel.cli._say import say
 
 __all__ = ["merge"]
 
@@ -47,8 +48,8 @@ def merge(
     merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6, beside=beside)
     lost = taxel.convert(merged, out, overwrite=overwrite)
     if as_json:
-        typer.echo(json.dumps({"recordings": [str(path) for path in recordings], "file": str(out), "lost": lost}))
+        say(json.dumps({"recordings": [str(path) for path in recordings], "file": str(out), "lost": lost}))
         return
-    typer.echo(f"written to {out}: {merged!r}")
+    say(f"written to {out}: {merged!r}")
     for what in lost:
-        typer.echo(f"  lost: {what}")
+        say(f"  lost: {what}")

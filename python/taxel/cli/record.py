@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.live import Live as Display
 
 from taxel import _core
@@ -42,6 +41,8 @@ from taxel.cli._board import (
     stated_registers,
 )
 from taxel.cli._noting import noting
+from taxel.cli._say import say
+from taxel.cli.console import Console
 from taxel.live import Live, Summary
 from taxel.live.options import LiveOptions
 
@@ -158,7 +159,7 @@ def _automatic(
             codes.append(exit_code(ended, receiver.array))
             empty = 0
         else:
-            typer.echo(f"taxel: {name}: nothing arrived at {receiver.place}; not saved", err=True)
+            say(f"taxel: {name}: nothing arrived at {receiver.place}; not saved", err=True)
             empty += 1
 
     name = following(0)
@@ -247,7 +248,7 @@ def _watch(
                     return
             now = live.counters
             if not warned and (wrong := outside(now, live.array)):
-                typer.echo(f"taxel: {wrong}", err=True)
+                say(f"taxel: {wrong}", err=True)
                 warned = True
             display.update(counters_table(before, now))
             if trial and not live.records:
@@ -271,7 +272,7 @@ def _sources(texts: list[str]) -> dict[str, str]:
 def _print(summary: Summary, as_json: bool) -> None:
     if as_json:
         path = None if summary.path is None else str(summary.path)
-        typer.echo(json.dumps(asdict(summary) | {"path": path, "verdict_details": summary.verdict.to_dict()}))
+        say(json.dumps(asdict(summary) | {"path": path, "verdict_details": summary.verdict.to_dict()}))
         return
     counters = summary.counters
     if summary.path is not None:
@@ -281,14 +282,14 @@ def _print(summary: Summary, as_json: bool) -> None:
             counted(counters["events"], "event"),
             counted(counters["markers"], "marker"),
         )
-        typer.echo(f"{summary.path}: {counters['seconds']:.1f} s, {', '.join(contents)}")
+        say(f"{summary.path}: {counters['seconds']:.1f} s, {', '.join(contents)}")
     for name, counts in counters["sources"].items():
         if "capture" in counts:
             received = f"{counted(counts['decoded'], 'datagram')}, {counted(counts['events'], 'event')}"
         else:
             received = counted(counts["lines"], "line")
         trouble = counts.get("trouble")  # sources of lines alone have this key
-        typer.echo(f"  {name}: {received}" + (f"; {trouble}" if trouble else ""))
+        say(f"  {name}: {received}" + (f"; {trouble}" if trouble else ""))
     for why in doubted(counters):
-        typer.echo(why)
-    typer.echo(summary.verdict)
+        say(why)
+    say(summary.verdict)

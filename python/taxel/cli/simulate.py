@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import Progress
 
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._recordings import progress
+from taxel.cli._say import say
+from taxel.cli.console import Console
 
 __all__ = ["simulate"]
 
@@ -99,4 +100,4 @@ def simulate(
         write_whole(labels, lambda file: file.write(f"label,t_us\n{rows}".encode()), overwrite=overwrite)
         lines.append(f"truth written to {labels}")
     about["written"] = [str(path) for path in targets]
-    typer.echo(json.dumps(about) if as_json else "\n".join(lines))
+    say(*([json.dumps(about)] if as_json else lines))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from taxel._base.messages import warn
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
@@ -30,6 +30,7 @@ from taxel.cli._recordings import (
     tare_of,
     try_report,
 )
+from taxel.cli._say import say
 
 if TYPE_CHECKING:
     from taxel.cli._trained import Result
@@ -152,7 +153,7 @@ def train(
         write_listening(report, result.made.readout, outcomes, title=title, judged=result.how, **more)
     taken = _taken(examples) if tare is None else []
     page = result.page(out, recipe, report, _tares(taken), _tare_again(taken) if tare is None else tare)
-    typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else page)
+    say(*([json.dumps(result.to_dict(out, recipe, report))] if as_json else page))
 
 
 def _try_rules(place: Path | None, labels: Sequence[str], *, overwrite: bool) -> None:
@@ -277,7 +278,7 @@ class _Training:
         from taxel.detect.training import UNFELT  # noqa: PLC0415
 
         if fall := fallen(self.examples):
-            warnings.warn(fall, stacklevel=2)
+            warn(fall, stacklevel=2)
         try:
             return self._result(plan, folds)
         except ProblemError as error:

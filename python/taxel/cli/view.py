@@ -10,14 +10,15 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from taxel._core import ProblemError
 from taxel.cli._app import SecondsOption, app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._paneling import PanelHostOption, PanelPortOption, announce
+from taxel.cli._say import say
 from taxel.cli._topics import listed
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
+from taxel.cli.console import Console
 from taxel.formats.ros import is_bag, topics
 from taxel.live import Panel
 from taxel.recording import Recording
@@ -96,7 +97,7 @@ def view(
         external = viewers(shown, panel, to or (), spikes, 1.0 if speed is None else speed)
         if as_json:
             where = {"to": [viewer.place for viewer in external]} if external else {}
-            typer.echo(json.dumps({"url": panel.url, "token": panel.token, **where}))
+            say(json.dumps({"url": panel.url, "token": panel.token, **where}))
         announce(panel, not to if opens is None else opens, console)
         console.print("Ctrl-C ends")
         reported = dict.fromkeys(external, "")

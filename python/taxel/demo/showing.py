@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console  # noqa: TID251  the type; the command line makes one
 from rich.live import Live as Drawing
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -78,7 +79,7 @@ def show(
         folder = Path(f"taxel-demo-{datetime.now().astimezone():%Y%m%d-%H%M%S}-{seed}")
     folder.mkdir(parents=True)
     began = time.monotonic()
-    console.print(f"[bold]taxel demo[/bold]: {counted(scenes, 'scene')} of seed [bold]{seed}[/bold]")
+    console.print(Text.assemble(("taxel demo", "bold"), f": {counted(scenes, 'scene')} of seed ", (str(seed), "bold")))
     counters: dict[str, Any] = {}
     if not live:
         evaluation = _evaluate(
@@ -98,7 +99,7 @@ def show(
             "agrees": playing.agrees,
         }
         for verdict in playing.verdicts:
-            console.print(f"[dim]{verdict}[/dim]", soft_wrap=not console.is_terminal)
+            console.print(verdict, style="dim", soft_wrap=not console.is_terminal)
     seconds = (60.0 if live else 120.0) if noise_s is None else noise_s
     quiet = _evaluate(console, f"detecting in {seconds:g} s of noise without the clock", _noise(seconds), used, seed)
     # In real time there is a minute for all of it: a few scenes show what the dashpot does.
@@ -124,7 +125,7 @@ def show(
     values = figures(material)
     _print_table(console, evaluation, quiet)
     _print_answers(console, values["which_drop"])
-    console.print(f"[dim]{time.monotonic() - began:.0f} s in all[/dim]")
+    console.print(f"{time.monotonic() - began:.0f} s in all", style="dim")
     return values, page
 
 
@@ -157,7 +158,7 @@ def _print_table(console: Console, evaluation: Evaluation, quiet: Evaluation) ->
         known = "{:.2f} / {:.2f}".format(*np.percentile(row.delays_ms, [50, 95])) if row.found else "-"
         table.add_row(row.name, row.label, f"{row.found} of {row.touches}", error, known)
     console.print(table)
-    console.print("[dim]error: time minus true, mean; known: minus true, median / 95 %[/dim]")
+    console.print("error: time minus true, mean; known: minus true, median / 95 %", style="dim")
     false = sum(len(times) for times in evaluation.judged.false.values())
     noise_s = (quiet.stop_us - quiet.start_us) * 1e-6
     within = sum(evaluation.judged.false_within.values())

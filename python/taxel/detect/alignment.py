@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import whole
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.detect.ages import Ages, onsets
 from taxel.detect.followed import Followed
@@ -96,9 +96,9 @@ class Alignment:
 
     def __repr__(self) -> str:
         if self.train is None:
-            return f"Alignment({self.label}: {counted(len(self.given), 'label')} as given)"
+            return escaped(f"Alignment({self.label}: {counted(len(self.given), 'label')} as given)")
         moved = f"median {self.median_ms:+.3g} ms, largest {self.largest_ms:+.3g} ms"
-        return f"Alignment({self.label}: {moved}, {self.unpaired.sum()} of {len(self.given)} without a pair)"
+        return escaped(f"Alignment({self.label}: {moved}, {self.unpaired.sum()} of {len(self.given)} without a pair)")
 
 
 def align(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import callback, finite, flag, instance, several, shown, whole, window
-from taxel._base.messages import counted
+from taxel._base.messages import counted, warn
 from taxel._core import ProblemError
 from taxel.detect.ages import in_pictures
 from taxel.detect.examples import Example, array_of, checked, unit_of
@@ -281,7 +281,7 @@ def _chosen(
             continue
         ways = _folds_for(label, examples, parts, folds) if isinstance(folds, int) else folds
         if not ways:
-            warnings.warn(
+            warn(
                 f"{label}: too few events to choose its parameters on held-out data, as two folds need 4: the first of "
                 "the recipe's are taken",
                 stacklevel=4,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from taxel import _core
 from taxel._base.arguments import instance, number, parameters, several, shown, text, whole
+from taxel._base.messages import escaped
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.detector import _Detector
@@ -170,9 +171,9 @@ class PlainRule(_Detector):
         frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
         if self.age_ms is not None:
             kinds = f"below it {first}, else {second}".replace("None", "nothing")
-            return f"PlainRule({self.quantity} {self.threshold:g} at {self.age_ms:g} ms: {kinds})"
+            return escaped(f"PlainRule({self.quantity} {self.threshold:g} at {self.age_ms:g} ms: {kinds})")
         found = ", ".join(f"{name} {label}" for name, label in (("onset", first), ("end", second)) if label is not None)
-        return f"PlainRule({self.quantity} >= {self.threshold:g}, release {self.release:g}, {frames}: {found})"
+        return escaped(f"PlainRule({self.quantity} >= {self.threshold:g}, release {self.release:g}, {frames}: {found})")
 
     def _compared(self) -> str:
         """Return what the rule compares, without its labels; with both of kinds, which one of them lies below."""

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.messages import escaped
 from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
 from taxel.detect.detector import _Detector, detector, tare_text
@@ -344,7 +345,7 @@ class Readout(_Detector):
         array = self.array
         taxels = "" if array is None else f" on {array.rows} x {array.columns} taxels"
         threshold = "" if self.run_threshold == 1.0 else f", threshold x {self.run_threshold:g}"
-        return (
+        return escaped(
             f"Readout({', '.join(self.labels)}; {self.encoder!r}{taxels}; {self.time}, {self.after_spike}{threshold})"
         )
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, finite_numbers, instance, numbers, shown
-from taxel._base.messages import counted, plain
+from taxel._base.messages import counted, escaped, plain
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.spikes import to_us
@@ -170,7 +170,7 @@ class Score:
         every = [*rows, self]
         counts = [(one.events, one.found, one.missed, one.false, one.false_near) for one in every]
         table: list[tuple[str, ...]] = [("", "events", "found", "missed", "false", "near")]
-        table += [(one.label, *map(str, row)) for one, row in zip(every, counts, strict=True)]
+        table += [(escaped(one.label), *map(str, row)) for one, row in zip(every, counts, strict=True)]
         widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
         lines = [
             "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
@@ -178,7 +178,7 @@ class Score:
         ]
         # Spreads are long: each on a line of its own, within the 80 columns of a terminal.
         for what, of in (("t - event (ms)", "error"), ("known - event (ms)", "delay")):
-            lines += [what, *(f"{one.label.ljust(widths[0])}  {getattr(one, of)!r}" for one in every)]
+            lines += [what, *(f"{escaped(one.label).ljust(widths[0])}  {getattr(one, of)!r}" for one in every)]
         return "\n".join(lines)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, instance, parameters, shown
-from taxel._base.messages import counted
+from taxel._base.messages import counted, warn
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -285,7 +285,7 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
         assert refused is not None
         raise refused
     for one in best.caught:
-        warnings.warn(one.message, stacklevel=5)
+        warn(str(one.message), stacklevel=5)
     return best
 
 
@@ -473,7 +473,7 @@ class Fitting:
             )
         begins = [_begin_ms(source) for source in self._sources]
         for text_of in _remarks(cone, self._targets, self._names, self._shift_ms, begins, caught):
-            warnings.warn(f"{self._label}: {text_of}", stacklevel=5)
+            warn(f"{self._label}: {text_of}", stacklevel=5)
         return cone
 
 

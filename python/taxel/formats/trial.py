@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
+from taxel._base.messages import escaped
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
@@ -130,4 +131,4 @@ class Trial:
 
     def __repr__(self) -> str:
         events = ", ".join(f"{len(times)} {event}" for event, times in self.truth.items()) or "no truth"
-        return f"Trial({self.name}: {self.recorded!r}, {events})"
+        return escaped(f"Trial({self.name}: {self.recorded!r}, {events})")

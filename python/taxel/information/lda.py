@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import finite, finite_numbers, text, whole
+from taxel._base.messages import warn
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.dual import LARGEST_RIDGE, Regressions, gram_matrix, residual, solved_without_ridge
@@ -116,7 +116,7 @@ class LDA(Classifier):
         solution = solved(moments, _ridge(self.ridge), self.priors, shift)
         self.coef_, self.intercept_, self.rank_ = solution[:3]
         if solution.rank < solution.weighed:
-            warnings.warn(
+            warn(
                 f"LDA: features are linearly dependent within classes, so {solution.rank} of {solution.weighed} "
                 "directions are weighed",
                 UserWarning,

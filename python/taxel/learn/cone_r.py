@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, Self
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, floats, instance, parameters, several
+from taxel._base.messages import warn
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError, ProblemError
 from taxel.learn._examples import examples, windows
@@ -456,19 +456,19 @@ def _warn(cone: ConeR) -> None:
         listed = ", ".join(f"pattern {p} target {k}" for p, k in cone.unreachable_[:5])
         more = f" and {len(cone.unreachable_) - 5} more" if len(cone.unreachable_) > 5 else ""
         within = f"within {_shown(cone.lb)} to {_shown(cone.ub)} mV"
-        warnings.warn(
+        warn(
             f"no weights {within} bring {listed}{more} to the threshold; the rest was fitted",
             stacklevel=4,
         )
     if cone.refires_:
-        warnings.warn(
+        warn(
             f"the trained neuron fires again {cone.refires_} times after its own spikes on its training patterns: "
             f'after_spike is "{cone.neuron_.after_spike}"; "reset", a longer refractory or a larger '
             "theta_plus would end that",
             stacklevel=4,
         )
     if cone.status_ != "solved":
-        warnings.warn(
+        warn(
             f"the objective is only proven to lie within {cone.gap_:.1e} of its least value (tolerance "
             f"{cone.tolerance:.1e})",
             stacklevel=4,

@@ -35,6 +35,6 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Return what had another name until version 0.1."""
     if name == "Said":
-        warnings.warn("taxel.live.Said is taxel.Detection now", DeprecationWarning, stacklevel=2)
+        warnings.warn("taxel.live.Said is taxel.Detection now", DeprecationWarning, stacklevel=2)  # noqa: TID251  a fixed text
         return Detection
     raise AttributeError(f"module 'taxel.live' has no attribute {name!r}")

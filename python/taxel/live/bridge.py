@@ -15,6 +15,7 @@ from typing import Any
 
 from taxel import _core
 from taxel._base.arguments import number, text
+from taxel._base.messages import escaped
 from taxel._core import DeviceError, ProblemError
 from taxel.live.live import Live
 from taxel.live.remote import wheel, with_taxel_errors
@@ -145,7 +146,7 @@ class Bridge:
                 self.stop()
 
     def __repr__(self) -> str:
-        return f"Bridge({self.name!r}, {', '.join(self.listen)})"
+        return escaped(f"Bridge({self.name!r}, {', '.join(self.listen)})")
 
 
 def _places(name: str, addresses: str | Sequence[str]) -> list[str]:

@@ -18,7 +18,7 @@ from taxel import _core
 from taxel._base.arguments import finite, flag, number, numbers, parameters, shown, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.limits import VALUE
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped
 from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -471,8 +471,8 @@ class Live:
 
     def __repr__(self) -> str:
         if self._summary is not None:
-            return f"Live(ended; {self._summary.verdict})"
-        return f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)"
+            return escaped(f"Live(ended; {self._summary.verdict})")
+        return escaped(f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)")
 
 
 def _given(inlet: LslInlet) -> str:

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import threading
 import time
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 from taxel._base.arguments import text
-from taxel._base.messages import installing
+from taxel._base.messages import installing, warn
 from taxel._core import Error, ProblemError
 
 __all__ = ["LslInlet", "LslOutlet"]
@@ -27,7 +26,7 @@ def _pylsl() -> Any:
         import pylsl  # noqa: PLC0415  an extra
     except ImportError:
         raise ImportError(f"pylsl is not installed: {installing('lsl')}") from None
-    warnings.warn(
+    warn(
         "the lab streaming layer listens on all addresses of this machine, TCP and UDP from port 16572 on", stacklevel=3
     )
     return pylsl

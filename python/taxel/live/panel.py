@@ -287,7 +287,12 @@ def _shown(place: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, st
     if not place.exists():
         raise FileNotFoundError(2, "no such recording", str(place))
     check_recording(place, layout)
-    return place.resolve().parent, place.resolve().name
+    place = place.resolve()
+    try:
+        place.name.encode()
+    except UnicodeEncodeError:
+        raise ProblemError(f"{place}: its name is no UTF-8, which the page cannot hold; rename it") from None
+    return place.parent, place.name
 
 
 def _held(live: Live) -> Tare:

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any
 
 from taxel._base.arguments import instance, number, shown, text
-from taxel._base.messages import installing
+from taxel._base.messages import escaped, installing
 from taxel._core import ProblemError
 from taxel.encode import Encoder
 from taxel.live._external_viewer import KINDS
@@ -223,7 +223,7 @@ class Viewer:
         self.stop()
 
     def __repr__(self) -> str:
-        return f"Viewer({self._place}{', ended' if self._stopping else ''})"
+        return escaped(f"Viewer({self._place}{', ended' if self._stopping else ''})")
 
 
 def _where(to: object) -> dict[str, Any]:

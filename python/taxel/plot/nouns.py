@@ -9,7 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from taxel._base.arguments import finite, instance, shown
-from taxel._base.messages import counted
+from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.events import Events
@@ -108,7 +108,7 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
     exists = True if frames.array.exists is None else frames.array.exists
     values = np.where(exists, frames.values[k], np.nan)
     image = ax.imshow(values, origin="upper", cmap="magma", interpolation="nearest")
-    ax.figure.colorbar(image, ax=ax, label=frames.unit)
+    ax.figure.colorbar(image, ax=ax, label=escaped(frames.unit))
     ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{to_ms(frames.t[k]):.3f} ms")
     return ax
 
@@ -187,7 +187,7 @@ def detections(found: Detections, ax: Axes | None = None) -> Axes:
     ax = axes(ax, (8, 2.4))
     for row, label in enumerate(found.labels):
         ax.scatter(found[label].t / 1e6, np.full(len(found[label]), row), marker="|", s=400, color=f"C{row}")
-    ax.set(xlabel="time (s)", yticks=range(len(found.labels)), yticklabels=found.labels)
+    ax.set(xlabel="time (s)", yticks=range(len(found.labels)), yticklabels=list(map(escaped, found.labels)))
     ax.set_ylim(-0.7, max(1, len(found.labels)) - 0.3)
     return ax
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
+from taxel._base.messages import escaped
 from taxel._base.times import beginning_us, begun
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
@@ -82,7 +83,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         frames = recording.frames()
         begin_us = beginning_us(frames.t)
         over.plot((frames.t - begin_us) / 1e6, frames.total(), color="black", linewidth=0.8)
-        over.set_ylabel(f"sum of taxels ({frames.unit})")
+        over.set_ylabel(escaped(f"sum of taxels ({frames.unit})"))
         above = above_rest(recording)
         assert above is not None  # of pictures
         pressed, _, rest = above
@@ -96,7 +97,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
     for note in recording.notes:
         if note.t is not None:
             over.axvline((note.t - begin_us) / 1e6, color="grey", linestyle=":", linewidth=0.8)
-    over.set(xlabel=_time(begin_us), title=recording.path.name)
+    over.set(xlabel=_time(begin_us), title=escaped(recording.path.name))
     return figure
 
 
@@ -143,12 +144,12 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     t = (frames.t - begin_us) / 1e6
     for ax, (name, values) in zip(rows, curves, strict=False):
         ax.plot(t, values, color="black", linewidth=0.8)
-        ax.set_ylabel(name)
+        ax.set_ylabel(escaped(name))
     if of.centre is not None:
         names = ("column", "row") if of.centre_unit == "taxels" else ("x", "y")
         for axis, colour, name in zip(of.centre.T, ("#c44e52", "#4c72b0"), names, strict=True):
             rows[-1].plot(t, axis, color=colour, linewidth=0.8, label=name)
-        rows[-1].set_ylabel(f"centre ({of.centre_unit})")
+        rows[-1].set_ylabel(escaped(f"centre ({of.centre_unit})"))
         rows[-1].legend(loc="upper right")
     rows[-1].set_xlabel(_time(begin_us))
     return figure
@@ -193,7 +194,7 @@ def health_map(health: Health, ax: Axes | None = None) -> Axes:
 def _map(values: NDArray[np.floating], label: str, health: Health, ax: Axes) -> Axes:
     """Draw a value of each taxel, with those marked that are dead, stuck or noisy."""
     image = ax.imshow(values, origin="upper", cmap="Greys", interpolation="nearest")
-    ax.figure.colorbar(image, ax=ax, label=label)
+    ax.figure.colorbar(image, ax=ax, label=escaped(label))
     for name, places in health.named().items():
         if places:
             x, y = np.array(places).T

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 from taxel import _core, formats
 from taxel._base import arguments
 from taxel._base.arguments import flag, instance, text
+from taxel._base.messages import warn
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -263,7 +263,7 @@ def _warn_of_tables(folder: Path, own: Sequence[Path], files: Sequence[Path], ho
     if left:
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
         kept = ", ".join(file.name for file in own[:3]) + " ..." * (len(own) > 3)
-        warnings.warn(
+        warn(
             f"{folder}: {names} left out, as beside recordings ({kept}) tables and arrays are not read: convert them, "
             "or keep them in a folder of their own",
             stacklevel=4,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import read_arrays, shapes, stored_names
+from taxel._base.archive import read_array, read_arrays, shapes, stored_names
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.h5_file import H5File
@@ -336,10 +336,7 @@ def _data(path: Path, how: Data) -> _Read:
             size = as_size(getattr(how, key))
             right = f"a size is said by {size}" if size else "leave it out"
             raise FormatError(f"{path}: one array without a name; the layout says [data] {key}: {right}")
-        try:
-            arrays = {"": np.load(path, allow_pickle=False)}
-        except (ValueError, EOFError) as error:
-            raise FormatError(f"{path}: {first_line(error)}; must be a NumPy array of numbers") from None
+        arrays = {"": read_array(path)}
         there: list[str] = [""]
         wanted = there
     else:
@@ -375,7 +372,10 @@ def _data(path: Path, how: Data) -> _Read:
         )
     if len(wanted) == 1:
         return _Read(values, None, lost=lost)
-    times = arrays[wanted[1]].astype(np.float64)
+    times = arrays[wanted[1]]
+    if times.dtype.kind not in "uif":
+        raise FormatError(f"{path}, {wanted[1]}: {times.dtype}; must be times as numbers")
+    times = times.astype(np.float64)
     if times.shape != values.shape[:1]:
         raise FormatError(f"{path}, {wanted[1]}: {counted(times.size, 'time')} for {counted(len(values), 'picture')}")
     return _Read(values, times * UNITS_US[how.time_unit] / 1e6, lost=lost)

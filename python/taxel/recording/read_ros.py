@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from taxel._base import arguments
-from taxel._base.messages import counted
+from taxel._base.messages import counted, warn
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.ros import Chosen, Read, read
@@ -97,6 +97,9 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
     sources: dict[str, Contents] = {}
     for name, one in zip(_names(path, reads), reads, strict=True):
+        told = tuple(_told(one))
+        for line in told:
+            warn(f"{path}: topic {one.topic}: {line}", stacklevel=4)
         sources[name] = Contents(
             path,
             path.name,
@@ -110,8 +113,8 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
                 "messages_of_another_length": one.left_out,
                 "times_by_the_bag": one.by_the_bag,
             },
-            remarks=_remarks(one),
-            lost=(f"other topics of the bag: {', '.join(one.unread)}",) if one.unread else (),
+            remarks=() if one.has_stamps else ("at the bag's times, as its messages have no header",),
+            lost=(*told, f"other topics of the bag: {', '.join(one.unread)}") if one.unread else told,
             sources=sources,
         )
     return alone(sources)
@@ -133,15 +136,14 @@ def _names(path: Path, reads: Sequence[Read]) -> list[str]:
     return names
 
 
-def _remarks(one: Read) -> tuple[str, ...]:
-    """Return what was left out, and whose times stand in for a header's."""
-    lines = []
+def _told(one: Read) -> Iterator[str]:
+    """Yield what was left out, and how many of the stamps were wrong."""
     if one.left_out:
-        lines.append(f"{counted(one.left_out, 'message')} of another length left out")
+        whole = counted(one.left_out + len(one.t), "message")
+        rows, columns = one.array.shape
+        yield f"{one.left_out} of {whole} left out, as they do not hold {rows} x {columns} values"
     if one.by_the_bag:
-        lines.append(
-            f"{one.by_the_bag} of {counted(len(one.t), 'message')} at the bag's time, as stamps are 0 or step back"
+        yield (
+            f"{one.by_the_bag} of {counted(len(one.t), 'message')} at the bag's time, as stamps are 0, do not ascend, "
+            "or are more than a day from it"
         )
-    if not one.has_stamps:
-        lines.append("at the bag's times, as its messages have no header")
-    return tuple(lines)

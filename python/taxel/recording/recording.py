@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, text, window
 from taxel._base.drawing import draw
-from taxel._base.messages import counted, plain
+from taxel._base.messages import counted, escaped, plain
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -485,7 +485,7 @@ class Recording:
     def __repr__(self) -> str:
         own = self._contents
         if own.is_several:
-            return f"Recording({self.name}: {len(own.sources)} sources: {', '.join(own.sources)})"
+            return escaped(f"Recording({self.name}: {len(own.sources)} sources: {', '.join(own.sources)})")
         what = own.table if own.has_events else self.frames()
         noun = "event" if self.has_events else "picture"
         time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) and self.timed else "no time"
@@ -496,7 +496,7 @@ class Recording:
         others = [] if own.is_slice and own.clock_of is None else [name for name in own.sources if name != own.label]
         more += [f"beside {', '.join(others)}"] * bool(others)
         size = f"{self.array.rows} x {self.array.columns} taxels"
-        return f"Recording({self.name}: {', '.join([counted(len(what), noun), time, size, *more])})"
+        return escaped(f"Recording({self.name}: {', '.join([counted(len(what), noun), time, size, *more])})")
 
 
 def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:

@@ -79,8 +79,7 @@ def refuse_without_layout(path: Path) -> None:
             )
         holds, lines = listed(there), _of_arrays(path, name, there)
         says = "says which are the pictures" if len(there) > 1 else "says what it is"
-    written = "\n".join(lines)
-    raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:\n{written}")
+    raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
 def are_spike_trains(path: Path) -> bool:

@@ -17,7 +17,7 @@ def __getattr__(name: str) -> Any:
     if name != "Listened":
         raise AttributeError(f"module 'taxel.report' has no attribute {name!r}")
     text = "taxel.report.Listened is taxel.detect.Outcome now, of a taxel.detect.Example"
-    warnings.warn(text, DeprecationWarning, stacklevel=2)
+    warnings.warn(text, DeprecationWarning, stacklevel=2)  # noqa: TID251  a fixed text
     return _listened
 
 

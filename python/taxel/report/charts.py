@@ -21,6 +21,8 @@ from matplotlib import collections, colors, container, lines, patches
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
+from taxel._base.messages import escaped_lines
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
@@ -63,12 +65,21 @@ def chart(figure: Figure | Sequence[Figure]) -> Markup:
 
 def _one(figure: Figure) -> Markup:
     try:
-        data = chart_data(figure)
+        data = _shown(chart_data(figure))
     except _NotKnownError:
         return Markup('<div class="picture">') + Markup(_svg(figure)) + Markup("</div>")
     # The data must not contain the end tag of the script element that holds it.
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     return Markup('<div class="charts"><script type="application/json">') + Markup(text) + Markup("</script></div>")
+
+
+def _shown(data: Any) -> Any:
+    """Return what a chart holds with its texts without control characters."""
+    if isinstance(data, str):
+        return escaped_lines(data)
+    if isinstance(data, dict):
+        return {key: _shown(value) for key, value in data.items()}
+    return [_shown(value) for value in data] if isinstance(data, list | tuple) else data
 
 
 def chart_data(figure: Figure) -> dict[str, Any]:
@@ -439,4 +450,4 @@ def _svg(figure: Figure) -> str:
     svg = svg[svg.index("<svg") :]
     for colour, ink in ((INK, "--ink"), ("#000000", "--ink"), (_LINE, "--line")):
         svg = svg.replace(f": {colour}", f": var({ink})")
-    return svg
+    return escaped_lines(svg)

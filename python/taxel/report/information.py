@@ -12,6 +12,7 @@ import numpy as np
 
 from taxel._base.arguments import instance
 from taxel._base.files import write_whole
+from taxel._base.messages import escaped
 from taxel.information import Answer, Point
 from taxel.report.charts import STYLE, chart
 from taxel.report.page import render
@@ -167,7 +168,7 @@ def _confusion(answer: Answer) -> Figure:
     figure = Figure(figsize=(6.4, 5.4), layout="constrained")
     ax = figure.subplots()
     picture = ax.imshow(share, cmap="Blues", vmin=0, vmax=1)
-    names = [str(name) for name in answer.full.found.classes]
+    names = [escaped(name) for name in answer.full.found.classes]
     if len(names) <= _MOST_NAMES:
         ax.set_xticks(range(len(names)), names, rotation=45, ha="right")
         ax.set_yticks(range(len(names)), names)

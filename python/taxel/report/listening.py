@@ -17,6 +17,7 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from taxel._base.files import write_whole
+from taxel._base.messages import escaped
 from taxel._base.times import begun
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -200,14 +201,18 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
         total, unit = (of.total, of.unit) if of.force is None else (of.force, "N")
         begins = np.arange(0, len(total), 1 + len(total) // _STRETCHES)
         seconds, most = (of.t[begins] - one.begin_us) / 1e6, np.fmax.reduceat(total, begins)
-        axis.plot(seconds, most, color=INK, linewidth=0.9, label=f"sum, {unit}")
+        axis.plot(seconds, most, color=INK, linewidth=0.9, label=escaped(f"sum, {unit}"))
         for k, label in enumerate(labels):
             at = (one.found[label].t - one.begin_us) / 1e6
             axis.plot(
-                at, np.interp(at, seconds, most), "o^sD"[k % 4], color=_DETECTED if k % 2 == 0 else _TRUE, label=label
+                at,
+                np.interp(at, seconds, most),
+                "o^sD"[k % 4],
+                color=_DETECTED if k % 2 == 0 else _TRUE,
+                label=escaped(label),
             )
-        axis.set_title(one.name, fontsize=9)
-        axis.set_ylabel(unit)
+        axis.set_title(escaped(one.name), fontsize=9)
+        axis.set_ylabel(escaped(unit))
         axis.legend()
     axes[-1][0].set_xlabel("s")
     return figure
@@ -272,7 +277,7 @@ def _potential(
         felt = np.empty(0) if aligned is None else to_ms(aligned.felt(moment.recording))
         for k, t in enumerate(felt[np.abs(felt - at) < reach]):
             axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle=":", label="felt" * (k == 0))
-        axis.set_title(f"{moment.what}, {(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s", fontsize=9)
+        axis.set_title(escaped(f"{moment.what}, {(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s"), fontsize=9)
         axis.set_xlabel("ms from then")
         axis.legend()
     axes[0][0].set_ylabel("potential, mV")
@@ -327,7 +332,7 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
         axis.set_axis_on()
         picture = plane.reshape(array.shape)
         axis.imshow(picture if array.exists is None else np.where(array.exists, picture, np.nan), "RdBu_r", scale)
-        axis.set_title(name or "weights", fontsize=9)
+        axis.set_title(escaped(name or "weights"), fontsize=9)
         axis.set_xlabel("column")
         axis.set_ylabel("row")
     figure.colorbar(ScalarMappable(scale, "RdBu_r"), ax=axes, label="weight, mV")

@@ -7,22 +7,36 @@ from importlib.resources import files
 from typing import Any
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from taxel import _core
+from taxel._base.messages import escaped, escaped_lines
 
 __all__ = ["render"]
 
 
+def _shown(value: object) -> object:
+    """Return what a template shows: texts as one line without control characters; figures and scripts are no texts."""
+    return value if hasattr(value, "__html__") else escaped(value)
+
+
+def _lines(value: object) -> Markup:
+    """Return a text of several lines for a template: {{ text|lines }}."""
+    return escape(escaped_lines(value))
+
+
 @cache
 def _environment(package: str) -> jinja2.Environment:
-    return jinja2.Environment(
+    made = jinja2.Environment(
         loader=jinja2.ChoiceLoader([jinja2.PackageLoader(name, ".") for name in dict.fromkeys((package, "taxel"))]),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
+        finalize=_shown,
     )
+    made.filters["lines"] = _lines
+    return made
 
 
 def render(template: str, *, package: str = "taxel", **values: Any) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import finite, flag, number, numbers, parameters, shown, whole
-from taxel._base.messages import plain
+from taxel._base.messages import escaped, plain, warn
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -272,7 +271,7 @@ class Scene:
         """Warn, once for each scene, that a touch is too narrow."""
         if narrow is not None and not self._warned:
             self._warned = True
-            warnings.warn(narrow, stacklevel=3)
+            warn(narrow, stacklevel=3)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scene) and self.parameters == other.parameters
@@ -282,7 +281,7 @@ class Scene:
     def __repr__(self) -> str:
         bodies = self.parameters.get("bodies", [])
         kinds = [f"{_only(body, 'shape')} {_only(body, 'motion')}" for body in bodies]
-        return f"Scene({', '.join(kinds)})"
+        return escaped(f"Scene({', '.join(kinds)})")
 
 
 #: Optional parameters of a body.

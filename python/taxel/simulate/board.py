@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, numbers, text, whole
-from taxel._base.messages import plain
+from taxel._base.messages import escaped, plain
 from taxel._base.options import option
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
@@ -272,4 +272,4 @@ class Board:
         return dict(json.loads(self._core.counts()))
 
     def __repr__(self) -> str:
-        return f"Board({self.greeting.strip()}, {plain(self.time_us)} us after reset)"
+        return escaped(f"Board({self.greeting.strip()}, {plain(self.time_us)} us after reset)")

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import finite_numbers, mapping, number, parameters, whole
+from taxel._base.messages import escaped
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -192,7 +193,7 @@ class Layer:
         self._core.forget()
 
     def __repr__(self) -> str:
-        return f"Layer({self.foam}, {self.array!r})"
+        return escaped(f"Layer({self.foam}, {self.array!r})")
 
 
 def _waves(waves: ArrayLike) -> NDArray[np.float64]:

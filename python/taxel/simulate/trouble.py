@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from taxel._base.arguments import finite, mapping, shown, whole
+from taxel._base.messages import escaped
 from taxel._core import ProblemError
 
 __all__ = ["Faults", "Flaws"]
@@ -78,7 +79,7 @@ class Flaws:
     def __repr__(self) -> str:
         settings = [f"{name}={getattr(self, name)}" for name in self._names() if getattr(self, name)]
         settings += [f"seeds={dict(self.seeds)}"] if self.seeds else []
-        return f"Flaws({', '.join(settings)})"
+        return escaped(f"Flaws({', '.join(settings)})")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taxel._base.messages import first_line, installing
+from taxel._base.messages import escaped, first_line, installing
 from taxel._core import Error, FormatError, ProblemError
 
 if TYPE_CHECKING:
@@ -125,17 +125,21 @@ def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
     try:
         from rosbags import rosbag1, rosbag2  # noqa: PLC0415  an extra
     except ImportError:
-        raise ImportError(f"{path}: a ROS bag, and rosbags is not installed: {installing('ros')}") from None
+        raise ImportError(f"{escaped(path)}: a ROS bag, and rosbags is not installed: {installing('ros')}") from None
     try:
         is_ros1 = path.is_file() and _begins(path, len(_ROS1)) == _ROS1
         reader: Any = (rosbag1 if is_ros1 else rosbag2).Reader(path)
         with reader:
             yield Bag(path, is_ros1, reader, _store(reader.connections, types, ros))
-    except (Error, OSError, MemoryError):
+    except Error:
         raise
-    # Damaged files also raise errors of rosbags' parts: of struct, of SQLite, of YAML, of zstd.
+    # Damaged files raise errors of rosbags' parts: of struct, of SQLite, of YAML, of bz2, of zstd; and a damaged size
+    # asks for more memory than there is.
     except Exception as error:
-        why = first_line(error)
+        if isinstance(error, OSError) and error.errno is not None:
+            error.filename = error.filename or str(path)
+            raise
+        why = "more memory than there is" if isinstance(error, MemoryError) else first_line(error)
         if "index" in why.lower() and path.suffix == ".bag":
             why = "its index is missing or damaged, as of a recording that was cut off; rosbag reindex makes it anew"
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):

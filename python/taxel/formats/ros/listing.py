@@ -1,7 +1,8 @@
-"""The topics of a ROS bag that hold numbers: fields, shapes and rates."""
+"""The topics of a ROS bag that hold numbers: fields, shapes and rates, by a message of the most frequent length."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,14 +11,17 @@ from numpy.typing import NDArray
 
 from taxel._core import FormatError
 from taxel.formats.ros.bag import Bag, opened
-from taxel.formats.ros.fields import grid, is_empty, leaves
+from taxel.formats.ros.fields import grid, leaves
 
 __all__ = ["Topic", "topics"]
+
+#: Of so many lengths of a topic's messages, in bytes, the first message is held; of clouds and texts each may differ.
+_MOST_LENGTHS = 32
 
 
 @dataclass(frozen=True)
 class Topic:
-    """Describe a field of a ROS topic that holds numbers, by the topic's first message.
+    """Describe a field of a ROS topic that holds numbers, by the topic's first message of the most frequent length.
 
     Parameters
     ----------
@@ -66,28 +70,31 @@ def topics(path: Path, types: Path | None = None, ros: str | None = None) -> lis
 
 
 def _of_topic(bag: Bag, topic: str) -> list[Topic]:
-    """Return the fields of a topic by its first message, or by the first whose arrays are not empty; count all."""
+    """Return the fields of a topic by the first message of the most frequent length that has numbers; count all."""
     connections = [one for one in bag.reader.connections if one.topic == topic]
     kind = connections[0].msgtype
     undefined = bag.undefined(kind)
     if undefined:
         count = sum(one.msgcount for one in connections)
         return [Topic(topic, kind, "", (), "", count, None, f"no definition of {undefined}")]
-    first: Any = None
-    found: list[tuple[str, NDArray[Any]]] = []
+    lengths: Counter[int] = Counter()
+    firsts: dict[int, tuple[Any, bytes]] = {}
     times: list[int] = []
     for connection, at, data in bag.messages(connections):
-        # Some publishers send empty arrays before they have a reading.
-        if first is None or is_empty(found):
-            first = bag.decoded(connection, data)
-            try:
-                found = list(leaves(first))
-            except FormatError as error:
-                return [Topic(topic, kind, "", (), "", sum(c.msgcount for c in connections), None, str(error))]
-            if not any(held.size > 1 for _, held in found) and not is_empty(found):
-                return []
+        lengths[len(data)] += 1
+        if len(firsts) < _MOST_LENGTHS:
+            firsts.setdefault(len(data), (connection, data))
         times.append(at)
-    if first is None:
+    found: list[tuple[str, NDArray[Any]]] = []
+    for length in sorted(firsts, key=lambda one: -lengths[one]):
+        first = bag.decoded(*firsts[length])
+        try:
+            found = list(leaves(first))
+        except FormatError as error:
+            return [Topic(topic, kind, "", (), "", sum(c.msgcount for c in connections), None, str(error))]
+        if any(held.size > 1 for _, held in found):
+            break
+    else:
         return []
     span = (max(times) - min(times)) / 1e9
     rate = (len(times) - 1) / span if span > 0 else None

@@ -1,7 +1,11 @@
-"""Pictures of chosen topics of a ROS bag, with the times of their messages."""
+"""Pictures of chosen topics of a ROS bag, with the times of their messages.
+
+One odd message does not decide for all: most of them say which length is read, and whether stamps count.
+"""
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +24,9 @@ from taxel.formats.ros.fields import grid, is_empty, leaves, values
 
 __all__ = ["Chosen", "Read", "read"]
 
+#: A stamp that is further from the bag's time of its message is wrong, ns.
+_DAY_NS = 86_400 * 10**9
+
 
 @dataclass(frozen=True)
 class Chosen:
@@ -31,8 +38,8 @@ class Chosen:
     field : str, optional
         A path, as "left.taxels"; default: the topic's only field with numbers.
     array : Array, optional
-        Messages of another length are left out; default: rows and columns where the message states them, else one row
-        of as many taxels as most messages have.
+        Messages of another length are left out; default: the length of most messages, in the rows and columns that
+        they state, else in one row.
     """
 
     topic: str
@@ -56,7 +63,7 @@ class Read:
     has_stamps : bool
         Whether the messages have a header.
     by_the_bag : int
-        How many of them have the bag's time, as their stamp is 0 or not after the ones before.
+        How many of them have the bag's time, as their stamp is wrong, or those of most.
     left_out : int
         How many messages have another length.
     unread : tuple of str
@@ -116,8 +123,10 @@ class _Held:
         self.values: list[NDArray[np.float32]] = []
         self.bag_ns: list[int] = []
         self.stamps_ns: list[int | None] = []
-        self.stated: tuple[int, int] | None = None
-        self.unit = "as sent"
+        self.grids: list[tuple[int, int] | None] = []
+        self.are_whole: list[bool] = []
+        #: Why a message has no numbers to read: those of most may have some.
+        self.trouble = ""
         self.bytes = 0
 
     @property
@@ -127,15 +136,14 @@ class _Held:
     def add(self, message: Any, at: int) -> None:
         """Add a message."""
         try:
-            if self.field is None and not is_empty(list(leaves(message))):
+            if self.field is None:
                 self.field = self._only_field(message)
             # Before a first reading there may be no field to choose by; such messages are of another length.
             numbers = np.empty(0) if self.field is None else self._numbers(message, self.field)
         except FormatError as error:
             raise FormatError(f"{self.place}: {error}") from None
-        if numbers.size and not any(one.size for one in self.values):
-            self.stated = None if self.field is None else grid(message, self.field)
-            self.unit = "counts" if numbers.dtype.kind in "ui" else "as sent"
+        self.grids.append(None if self.field is None else grid(message, self.field))
+        self.are_whole.append(numbers.dtype.kind in "ui")
         if numbers.dtype.kind == "f" and (np.abs(numbers) > VALUE).any():
             raise FormatError(
                 f"{self.place}, message {len(self.values)}: a value is infinite, or too large for 32 bits"
@@ -148,29 +156,33 @@ class _Held:
         stamp = getattr(header, "stamp", None)
         self.stamps_ns.append(None if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec))
 
-    def _only_field(self, message: Any) -> str:
-        there = [path for path, numbers in leaves(message) if numbers.size > 1]
-        if not there:
-            raise FormatError("no field with more numbers than one; taxel info lists topics that have one")
-        if len(there) != 1:
+    def _only_field(self, message: Any) -> str | None:
+        """Return the field of a message that holds more numbers than one; None of a message without any."""
+        found = list(leaves(message))
+        there = [path for path, numbers in found if numbers.size > 1]
+        if len(there) > 1:
             raise FormatError(f"say which field (--field NAME, field=); there are {_there(message)}")
-        return there[0]
+        if not there and not is_empty(found):
+            self.trouble = "no field with more numbers than one; taxel info lists topics that have one"
+        return there[0] if there else None
 
-    @staticmethod
-    def _numbers(message: Any, field: str) -> NDArray[Any]:
+    def _numbers(self, message: Any, field: str) -> NDArray[Any]:
         try:
             return values(message, field)
         except LookupError:
-            raise FormatError(f"no field with numbers; there are {_there(message)}") from None
+            self.trouble = f"no field with numbers; there are {_there(message)}"
+            return np.empty(0)
 
     def read(self, kind: str, unread: tuple[str, ...]) -> Read:
         """Return the pictures of the messages."""
         if not self.values:
             raise FormatError(f"{self.place}: holds no message")
+        if self.trouble and not any(one.size for one in self.values):
+            raise FormatError(f"{self.place}: {self.trouble}")
         array = sensor(self.place, self.array or self._stated())
         fits = np.array([_fits(one, array) for one in self.values])
         if not fits.any():
-            some = self.values[0]
+            some = next((one for one in self.values if one.size), self.values[0])
             size = " x ".join(map(str, some.shape)) if some.ndim == 2 else f"{some.size}"
             raise FormatError(
                 f"{self.place}: its messages hold {size} values; the array has {array.rows} x {array.columns}"
@@ -190,7 +202,7 @@ class _Held:
             kind,
             array,
             pictures,
-            self.unit,
+            "counts" if all(one for one, fit in zip(self.are_whole, fits, strict=True) if fit) else "as sent",
             t // 1000,
             has_stamps,
             by_the_bag,
@@ -199,11 +211,13 @@ class _Held:
         )
 
     def _stated(self) -> Array:
-        """Return rows and columns as the first message states them, else one row of the most frequent length."""
-        lengths = Counter(one.size for one in self.values if one.size)
+        """Return the most frequent length: in rows and columns as most of its messages state them, else in one row."""
+        lengths = Counter(one.shape for one in self.values if one.size)
         if not lengths:
             raise FormatError(f"{self.place}: its messages hold no values")
-        rows, columns = self.stated or (1, lengths.most_common(1)[0][0])
+        ((most, _),) = lengths.most_common(1)
+        stated = Counter(g for one, g in zip(self.values, self.grids, strict=True) if g and one.shape == most)
+        rows, columns = stated.most_common(1)[0][0] if stated else (1, most[0])
         return Array(rows, columns, name=self.topic)
 
 
@@ -217,17 +231,39 @@ def _there(message: Any) -> str:
 
 
 def _times(stamps: NDArray[np.int64], bag: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """Return times in ns by the headers' stamps, and how many are the bag's instead.
+    """Return times in ns, which never fall, by the headers' stamps; and how many are the bag's instead.
 
-    The bag's time stands where a stamp is 0 or not after all before it. It is later than the stamp by the time that the
-    message was under way; if it would come after the next message's, it is used less the median of that delay. Where
-    that does not ascend either (the stamps' clock was set back), all messages have the bag's times.
+    Sound stamps are above 0, within a day of the bag's time of their message, and ascend. Where less than half are
+    sound, all messages have the bag's times, else those whose stamp is wrong. The bag's time is later than the stamp by
+    the time that the message was under way: where it would come after the next message's, it is used less the median of
+    that delay, and at most that next time.
     """
-    before = np.concatenate([[0], np.maximum.accumulate(stamps)[:-1]])
-    good = stamps > before
-    if good.any():
-        for late in (0, int(np.median((bag - stamps)[good]))):
-            t = np.where(good, stamps, bag - late)
-            if (np.diff(t) > 0).all():
-                return t, int(np.count_nonzero(~good))
-    return bag, len(bag)
+    near = np.flatnonzero((stamps > 0) & (np.abs(bag.astype(np.float64) - stamps) <= _DAY_NS))
+    sound = near[_ascending(stamps[near].tolist())]
+    if 2 * len(sound) < len(stamps):
+        return bag, len(bag)
+    t, late = stamps.copy(), int(np.median((bag - stamps)[sound]))
+    wrong = np.setdiff1d(np.arange(len(stamps)), sound)
+    for run in np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1) if len(wrong) else ():
+        before, after = t[: run[0]][-1:], stamps[run[-1] + 1 :][:1]
+        held = [np.concatenate([before, bag[run] - less, after]) for less in (0, late)]
+        fits = next((one for one in held if (np.diff(one) > 0).all()), None)
+        low, high = before[0] if len(before) else None, after[0] if len(after) else None
+        t[run] = np.clip(bag[run] - late, low, high) if fits is None else fits[len(before) :][: len(run)]
+    return t, len(wrong)
+
+
+def _ascending(times: Sequence[int]) -> list[int]:
+    """Return the places of the most times that ascend; of several such choices the one of the earliest times."""
+    # From the end, as in patience sorting: for each length the place where the best choice of that length begins.
+    begins: list[int] = []
+    falling: list[int] = []
+    after = [-1] * len(times)
+    for k in reversed(range(len(times))):
+        at = bisect_left(falling, -times[k])
+        after[k] = begins[at - 1] if at else -1
+        begins[at : at + 1], falling[at : at + 1] = [k], [-times[k]]
+    chosen = begins[-1:]
+    while chosen and after[chosen[-1]] >= 0:
+        chosen.append(after[chosen[-1]])
+    return chosen

@@ -1,0 +1,116 @@
+"""Recordings whose texts are hostile: each name, note, label, unit and topic holds control characters."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from formats import bags
+
+import taxel
+from taxel import Note
+from taxel.recording import Recording
+from taxel.recording.contents import Contents
+
+#: What a terminal would obey, in a name: clear the screen, set its title; C1, DEL, directions, separators.
+SEQUENCE = "\x1b[2J\x1b]0;owned\x07\x9b31m\x7f\x08\u202e\u2066\u200e\u200f\u061c\u2028\u2029"
+#: A name that would begin a line of its own, as a message of taxel's.
+NAME = f"a{SEQUENCE}\n\rtaxel: forged\tz"
+#: One for cells of tables, whose lines end with a line break.
+CELL = f"a{SEQUENCE}z"
+#: A file's name: with a byte that is no UTF-8 too.
+FILE = os.fsdecode(f"f{SEQUENCE}\ntaxel: forged\t".encode() + b"\xff\x9b")
+
+CONTROL = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def wrong(said: str) -> str:
+    """Return what is wrong with a text for people: a control character, or a forged line; "" if nothing."""
+    found = CONTROL.search(said)
+    if found:
+        return f"{found[0]!r} in {said[max(0, found.start() - 200) : found.end() + 50]!r}"
+    return next((line for line in said.split("\n") if line.startswith("taxel: forged")), "")
+
+
+def pressed(n: int = 400) -> np.ndarray[Any, Any]:
+    """Values of 2 x 3 taxels with a press in each 80 pictures."""
+    values = np.random.default_rng(3).integers(0, 3, (n, 2, 3)).astype(float)
+    for k in range(40, n, 80):
+        values[k : k + 30, :, 1:] += 300
+    return values
+
+
+def frames() -> taxel.Frames:
+    """Pictures of an array whose name and names of taxels are hostile, in a hostile unit."""
+    array = taxel.Array(2, 3, names=[f"{k}{NAME}" for k in range(6)], name=NAME)
+    return taxel.Frames(pressed(), np.arange(400) * 10_000, unit=CELL, array=array)
+
+
+def recording(source: str = NAME) -> Recording:
+    """Such pictures with hostile notes, detections, source and remarks."""
+    found = taxel.Detections([NAME, CELL], [500_000, 900_000], [500_000, 900_000], [1.0, 1.0])
+    of = frames()
+    return Recording(
+        Contents(
+            Path("a.bag"), "a.bag", "ros", of.array, frames=of, source=source, remarks=(NAME,), lost=(NAME,),
+            notes=(Note(NAME, 300_000, 0), Note(CELL, 600_000, 0)), detections=found,
+        )
+    )  # fmt: skip
+
+
+def labels(place: Path) -> Path:
+    """A table of labels with hostile names."""
+    rows = "".join(f'"{NAME}",{10_000 * k}\n' for k in range(40, 400, 80))
+    place.write_text(f"label,t_us\n{rows}", newline="")
+    return place
+
+
+def write(folder: Path) -> dict[str, Path]:
+    """Write a file of each kind, with every text hostile, into a folder with a hostile name."""
+    folder = folder / FILE
+    folder.mkdir(parents=True)
+    places = {}
+    for ending in (".mcap", ".npz", ".h5", ".csv"):
+        places[ending] = folder / f"{FILE}{ending}"
+        taxel.convert(recording(), places[ending])
+    places["events"] = folder / f"{FILE} events.mcap"
+    events = taxel.Events([0, 200, 300], [0, 1, 2], [1, 1, 0], [True, False, True], array=frames().array)
+    taxel.convert(events, places["events"])
+    places["lsa"] = folder / f"{FILE}.lsa"
+    taxel.convert(events, places["lsa"])
+    rows = "".join(f"{k / 100:g},{','.join(map(str, one.ravel()))}\n" for k, one in enumerate(pressed()))
+    head = ",".join(f'"{k}{CELL}"' for k in range(6))
+    places["table"] = folder / f"{FILE}.txt"
+    places["table"].write_text(f'"t{CELL}",{head}\n{rows}', newline="")
+    places["table without a layout"] = folder / f"{FILE} alone.txt"
+    places["table without a layout"].write_text(f'"t{CELL}",{head}\n{rows}', newline="")
+    layout = places["table"].with_name(f"{FILE}.layout.toml")
+    layout.write_text(f"unit = {toml(CELL)}\n[table]\nseparator = ','\ntime_column = {toml('t' + CELL)}\n")
+    places["arrays"] = folder / f"{FILE} arrays.npz"
+    np.savez(places["arrays"], **{f"a{CELL}": pressed(), f"b{CELL}": np.arange(3)})
+    places["layout"] = folder / f"{FILE} unknown.txt"
+    places["layout"].write_text("1,2\n3,4\n")
+    places["layout"].with_name(f"{FILE} unknown.layout.toml").write_text(f"{toml(NAME)} = 3\n")
+    places["nothing"] = folder / f"{FILE} nothing.csv"
+    places["nothing"].write_text(f"{CELL}\n{CELL}\n")
+    places["missing"] = folder / f"{FILE} missing.mcap"
+    places["bag"] = folder / f"{FILE}.bag"
+    kind = "std_msgs/msg/Int16MultiArray"
+    sent: list[bags.Message] = [
+        (f"/{NAME}", kind, 10 * k, None, bags.multi_array(one, (2, 3))) for k, one in enumerate(pressed())
+    ]
+    bags.write(places["bag"], [*sent, (f"/b{CELL}", kind, 5000, None, bags.multi_array(range(6), ()))])
+    places["labels"] = labels(folder / f"{FILE} labels.csv")
+    return places
+
+
+def toml(text: str) -> str:
+    """Return a text as a basic string of TOML."""
+    return '"' + "".join(f"\\u{ord(c):04x}" if not c.isalnum() else c for c in text) + '"'
+
+
+Each = Callable[[], Any]
