@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from taxel._base.documents import read_text
+from taxel._base.files import open_file
 from taxel._base.messages import first_line, installing
 from taxel._core import Error, FormatError, ProblemError
 
@@ -41,7 +43,7 @@ def is_bag(path: Path) -> bool:
 
 
 def _begins(path: Path, count: int) -> bytes:
-    with path.open("rb") as file:
+    with open_file(path) as file:
         return file.read(count)
 
 
@@ -128,6 +130,9 @@ def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
         raise ImportError(f"{path}: a ROS bag, and rosbags is not installed: {installing('ros')}") from None
     try:
         is_ros1 = path.is_file() and _begins(path, len(_ROS1)) == _ROS1
+        for part in path.iterdir() if path.is_dir() else [path]:
+            if not part.is_dir():
+                open_file(part).close()  # rosbags would wait for a named pipe
         reader: Any = (rosbag1 if is_ros1 else rosbag2).Reader(path)
         with reader:
             yield Bag(path, is_ros1, reader, _store(reader.connections, types, ros))
@@ -181,7 +186,7 @@ def _of_folder(folder: Path, needed: Iterable[str]) -> dict[str, Any]:
     defined: dict[str, Any] = {}
     for file in files:
         try:
-            text = file.read_text()
+            text = read_text(file)
             if file.suffix == ".idl":
                 defined |= _of_idl(text)
             else:
