@@ -8,7 +8,6 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, NoReturn
 
 from taxel._base.arguments import shown
@@ -175,7 +174,7 @@ def _check_depth(place: str, value: Any) -> None:
 
 
 def _between_marks(text: str) -> Iterator[tuple[int, str]]:
-    """Yield what may be a key of TOML, without its quoted parts, and its line: what lies between = , [ ] { } and ends."""
+    """Yield what may be a key of TOML, without its quoted parts, and its line: it ends at = , [ ] { } or the line."""
     at, line, key = 0, 1, ""
     while found := _MARKS.search(text, at):
         begin, mark = found.start(), found[0]

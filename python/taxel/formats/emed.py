@@ -82,7 +82,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
 @dataclass(frozen=True)
 class _Page:
-    """One picture: its number, the line of that number, the sum of its cells and how many are not 0, its stated force."""
+    """One picture: its number and that one's line, the sum of its cells, how many are not 0, the force it states."""
 
     number: int
     line: int

@@ -46,6 +46,8 @@ _LIMITS: dict[str, tuple[int, int, type[Any]]] = {
 }
 #: Number of pictures that are written at once.
 _PICTURES = 4096
+#: Bytes of the first line, whose columns are counted for the error.
+_HEAD = 1 << 26
 #: Bytes of a table that are read at once.
 _AT_ONCE = 1 << 22
 #: The number of a table's line, and whole lines from there on.
@@ -118,9 +120,9 @@ def check_head(path: Path) -> None:
 
 
 def _head(path: Path, file: BinaryIO) -> list[str]:
-    head = file.readline(LINE + 1)
-    if len(head) > LINE and COLUMNS > head.count(b","):
-        raise FormatError(f"{path}, line 1: more than {LINE} bytes; at most that are read")
+    head = file.readline(_HEAD + 1)
+    if len(head) > _HEAD:
+        raise FormatError(f"{path}, line 1: more than {_HEAD} bytes; at most that are read")
     return _names(path, head.removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n"))
 
 
@@ -231,20 +233,8 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
     at_once = max(1, _AT_ONCE // (rows * columns))
     for first, body in blocks:
         table = _numbers(path, names, first, body, np.float64)
-        large = np.argwhere(np.abs(table[:, 1:]) > VALUE)
-        if len(large):
-            k, c = large[0]
-            raise FormatError(
-                f"{path}, line {first + _line_number(body, k)}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit "
-                "32 bits"
-            )
-        with np.errstate(invalid="ignore"):
-            t = table[:, 0].astype(np.int64)
-        broken = np.flatnonzero(t != table[:, 0])
-        if len(broken):
-            k = int(broken[0])
-            line = first + _line_number(body, k)
-            raise FormatError(f"{path}, line {line}, column t_us: is {table[k, 0]:g}; must be a whole number of us")
+        _check_values(path, names, first, body, table)
+        t = _whole(path, first, body, table[:, 0])
         n = len(read) + len(table)
         if array is None and n * rows * columns > max(1 << 24, 16 * n * len(names)):
             raise FormatError(sparse)
@@ -280,6 +270,27 @@ def _numbers(path: Path, names: list[str], first: int, body: bytes, dtype: type[
             "line"
         )
     return table
+
+
+def _check_values(path: Path, names: list[str], first: int, body: bytes, table: NDArray[np.float64]) -> None:
+    """Refuse a value that 32 bits do not hold, in lines of which the first has a number."""
+    large = np.argwhere(np.abs(table[:, 1:]) > VALUE)
+    if len(large):
+        k, c = large[0]
+        line = first + _line_number(body, k)
+        raise FormatError(f"{path}, line {line}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit 32 bits")
+
+
+def _whole(path: Path, first: int, body: bytes, times: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the times of some lines as whole us; the first line has a number."""
+    with np.errstate(invalid="ignore"):
+        t = times.astype(np.int64)
+    broken = np.flatnonzero(t != times)
+    if len(broken):
+        k = int(broken[0])
+        line = first + _line_number(body, k)
+        raise FormatError(f"{path}, line {line}, column t_us: is {times[k]:g}; must be a whole number of us")
+    return t
 
 
 def _line_number(body: bytes, row: int) -> int:

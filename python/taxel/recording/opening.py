@@ -23,6 +23,7 @@ from taxel.events import Events
 from taxel.formats import Trial
 from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
+from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording.contents import Contents, several
 from taxel.recording.csv import check_head, read_csv

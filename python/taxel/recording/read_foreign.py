@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -215,7 +215,6 @@ def _table(path: Path, layout: Layout) -> _Read:
             f"time_column = {json.dumps(time, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, skip "
             f"the names: skip_lines = {first - 1}"
         )
-    missing = frozenset() if how.missing is None else frozenset({_unquoted(how.missing), "nan"})
     rows = (cells(line, how.separator) for line in body)
     if column is not None and how.time_unit == ISO:
         rows = (_with_seconds(row, column, path, line) for line, row in enumerate(rows, first))
@@ -224,19 +223,25 @@ def _table(path: Path, layout: Layout) -> _Read:
     kept = [name for k, name in enumerate(names) if k not in left]
     lost = ", ".join(names[k] or f"column {k + 1}" for k in sorted(left))
     lines_of_lost = (f"columns that are no taxels: {lost}",) if lost else ()
-    if column is not None:
-        column -= sum(k < column for k in left)
-    read = Growing(str(path), values=((len(kept) - (column is not None),), np.float32), t=((), np.int64))
-    for line, block in text.blocks(rows, path, first, kept, missing, unmarked=how.missing is None):
-        t = (
-            np.arange(len(read), len(read) + len(block))
-            if column is None
-            else _us(block[:, column], kept[column], how, path, line)
-        )
-        read.add(values=block if column is None else np.delete(block, column, axis=1), t=t)
-    taxel_names = [name for k, name in enumerate(kept) if k != column] if named else None
-    t = read.column("t")
-    return _Read(read.column("values"), None if column is None else t, first, taxel_names, lines_of_lost)
+    at = None if column is None else column - sum(k < column for k in left)
+    values, t = _read(rows, path, first, kept, at, how)
+    taxel_names = [name for k, name in enumerate(kept) if k != at] if named else None
+    return _Read(values, t, first, taxel_names, lines_of_lost)
+
+
+def _read(
+    rows: Iterable[Sequence[str]], path: Path, first: int, names: Sequence[str], time: int | None, how: Table
+) -> tuple[NDArray[np.float32], NDArray[np.int64] | None]:
+    """Return the readings of a table and its times, us, which are the column `time`."""
+    missing = frozenset() if how.missing is None else frozenset({_unquoted(how.missing), "nan"})
+    read = Growing(str(path), values=((len(names) - (time is not None),), np.float32), t=((), np.int64))
+    for line, block in text.blocks(rows, path, first, names, missing, unmarked=how.missing is None):
+        if time is None:
+            read.add(values=block, t=np.zeros(len(block)))
+        else:
+            t = _us(block[:, time], names[time], how, path, line)
+            read.add(values=np.delete(block, time, axis=1), t=t)
+    return read.column("values"), None if time is None else read.column("t")
 
 
 def _lines(path: Path, how: Table) -> Iterator[str]:

@@ -32,9 +32,8 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Conte
     FormatError : more than may be read, or wire version 2
     OSError : the file cannot be read
     """
-    payload, parts, decoder, complete = _core.read_lsa(
-        path, array._parts(), pairing, differences, limits.memory(limits.given())
-    )
+    memory = limits.memory(limits.given())
+    payload, parts, decoder, complete = _core.read_lsa(path, array._parts(), pairing, differences, memory)
     unmarked = None if complete else path.with_suffix(".lss").name
     verdict = Verdict._of({"raw": [unmarked, json.loads(_core.recording_damage(decoder))]})
     return Contents(

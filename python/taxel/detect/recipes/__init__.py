@@ -10,7 +10,6 @@ without `other` it is for its neurons' labels alone. A new recipe is a new file 
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from functools import cache
