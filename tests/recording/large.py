@@ -121,7 +121,9 @@ def foreign_h5(folder: Path, size: int) -> Path:
 def gaitpdb(folder: Path, size: int) -> Path:
     """Two feet of 8 sensors: 40 bytes a line and foot, and the totals."""
     line = lambda k: (  # noqa: E731
-        f"{k / 100:.2f}\t" + "\t".join(["40" if k % 100 < 60 else "0"] * 16 + ["320" if k % 100 < 60 else "0"] * 2) + "\n"
+        f"{k / 100:.2f}\t"
+        + "\t".join(["40" if k % 100 < 60 else "0"] * 16 + ["320" if k % 100 < 60 else "0"] * 2)
+        + "\n"
     )
     return write(folder / "GaCo99_01.txt", texts(size // 80, line))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import column, numbers
 from taxel._base.limits import unpacked
 
-__all__ = ["Columns", "Growing", "frozen", "own", "own_column", "own_numbers"]
+__all__ = ["Columns", "Growing", "OwnMemory", "frozen", "frozen_whole", "own", "own_column", "own_numbers"]
 
 
 class Columns:
@@ -22,6 +23,10 @@ class Columns:
             if isinstance(value, np.ndarray):
                 frozen(value)
         self.__dict__.update(state)
+
+
+class OwnMemory(mmap.mmap):
+    """Memory to which nothing but an array of ours refers."""
 
 
 class Growing:
@@ -97,6 +102,15 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
+def frozen_whole(array: NDArray[Any]) -> NDArray[Any]:
+    """Make an array of ours read-only, with all that it is a view of, and return it: nothing else refers to that."""
+    part: object = array
+    while isinstance(part, np.ndarray):
+        frozen(part)
+        part = part.base
+    return array
+
+
 def own_column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
     """Return a read-only column (see `column`), copied if it shares memory with a caller's writable array."""
     return own(column(name, values, dtype, unit), values)
@@ -122,4 +136,4 @@ def _unchangeable(array: object) -> bool:
         if array.flags.writeable:
             return False
         array = array.base
-    return array is None or isinstance(array, bytes) or type(array).__name__ == "PySliceContainer"
+    return array is None or isinstance(array, bytes | OwnMemory) or type(array).__name__ == "PySliceContainer"

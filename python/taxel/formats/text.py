@@ -119,7 +119,7 @@ def before(content: Iterator[str], ends: Callable[[str], bool]) -> tuple[list[st
 
     None stands for that one where no line of the first 1 MiB is.
     """
-    taken, left = [], _HEAD
+    taken, left = list[str](), _HEAD
     for line in content:
         if ends(line):
             return taken, line

@@ -249,8 +249,8 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
 
 def _folder(folder: Path, how: How) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
-    there = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
-    files = sorted(there, key=_order)
+    inside = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
+    files = sorted(inside, key=_order)
     own = [file for file in files if _is_own(file)]
     if how.topic or not own:
         own = [file for file in files if file in own or is_bag(file)]

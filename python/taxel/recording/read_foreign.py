@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from taxel._base.archive import read_array, read_arrays, shapes, stored_names
 from taxel._base.arguments import shown
-from taxel._base.columns import Growing, frozen
+from taxel._base.columns import Growing, frozen_whole
 from taxel._base.h5_file import H5File
 from taxel._base.limits import COLUMNS, VALUE
 from taxel._base.messages import counted, first_line
@@ -125,7 +125,7 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
             taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
         )
         pictures = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
-        frames = Frames(frozen(pictures), t, array=array)
+        frames = Frames(frozen_whole(pictures), t, array=array)
     except ProblemError as error:
         raise FormatError(f"{layout.place}: {first_line(error)}") from None
     limited(path, frames)
@@ -197,7 +197,7 @@ def _table(path: Path, layout: Layout) -> _Read:
     taxels = None if layout.rows is None or layout.columns is None else layout.rows * layout.columns
     others = len(how.leave_out) + (how.time_column is not None)
     is_whole = begin is not None and taxels is not None and len(cells(begin, how.separator)) == taxels + others
-    body = islice(_lines(path, how), above, None)
+    body: Iterator[str] = islice(_lines(path, how), above, None)
     if not is_whole and begin is not None and _all_end(names if named else None, begin, path, how, above):
         body = (line.rstrip(" ").removesuffix(how.separator) for line in body)
         names = names[: len(cells(begin.rstrip(" ").removesuffix(how.separator), how.separator))]

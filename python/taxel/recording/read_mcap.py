@@ -60,8 +60,7 @@ class _Source:
     def __init__(
         self, path: Path, reader: _core.RecordingReader, sources: dict[str, Contents], limit: int | None
     ) -> None:
-        # What is available when something is read, not when the file was opened, says how much may be.
-        self.reader = lambda: reader.within(limits.memory(limit))
+        self._reader, self._limit = reader, limit
         about = json.loads(reader.about())
         self.header, self.ending, self.opened = about["header"], about["ending"] or {}, about["rebuilt"]
         self.array = array_of(self.header["array"])
@@ -82,6 +81,10 @@ class _Source:
             "side": self.header.get("side", ""),
             "heel": self.header.get("heel", ""),
         }
+
+    def reader(self) -> _core.RecordingReader:
+        """Return the reader of this source, which reads as much as the memory that is available now allows."""
+        return self._reader.within(limits.memory(self._limit))
 
     def board(self, pairing: str) -> Contents:
         """Return the contents of a board."""
