@@ -44,13 +44,13 @@ def opened(path: Path, *, at_most: int = 0, **how: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("kind", large.QUICK)
 def test_little_memory_is_taken_beside_the_arrays(kind: str, tmp_path: Path) -> None:
     sizes = {}
-    for size in (MIB, 64 * MIB):
+    for size in (MIB, 24 * MIB):
         (folder := tmp_path / str(size)).mkdir()
         sizes[size] = opened(large.KINDS[kind](folder, size))
     small, whole = sizes.values()
-    assert whole["arrays"] > 60 * MIB
-    # What a process takes for itself does not count here, so that 64 MiB show the ratio.
-    assert whole["peak"] - small["peak"] <= 1.5 * whole["arrays"] + 16 * MIB
+    assert whole["arrays"] > 20 * MIB
+    # What a process takes for itself does not count here, so that 24 MiB show the ratio.
+    assert whole["peak"] - small["peak"] <= 1.5 * whole["arrays"] + 8 * MIB
 
 
 @pytest.mark.slow
@@ -83,9 +83,9 @@ def test_a_limit_refuses_what_is_larger_and_names_both_sizes(kind: str, tmp_path
 
 @pytest.mark.parametrize("limit", [0, -1, 1.5, "1 GB", True])
 def test_a_limit_is_a_number_of_bytes(limit: object, tmp_path: Path) -> None:
-    path = taxel.convert(some_events(), tmp_path / "a.npz").path
+    taxel.convert(some_events(), tmp_path / "a.npz")
     with refused("limit is"):
-        taxel.open(path, limit=limit)
+        taxel.open(tmp_path / "a.npz", limit=limit)
 
 
 def test_the_recordings_of_a_folder_count_together(tmp_path: Path) -> None:
@@ -99,41 +99,39 @@ def test_the_recordings_of_a_folder_count_together(tmp_path: Path) -> None:
 
 
 def gzip_bomb(folder: Path) -> Path:
-    """Write a table of 2 MB that unpacks to 1.7 GB."""
-    line = (b"0," * 49 + b"0\n") * 10_000
-    part = gzip.compress(line)
+    """Write a table of 6 MB that unpacks to 1.7 GB."""
+    part = gzip.compress((b"0," * 49 + b"0\n") * 100_000)
     with (folder / "a.csv.gz").open("wb") as file:
-        for _ in range(1700):
+        for _ in range(170):
             file.write(part)
     (folder / "layout.toml").write_text("rows = 1\ncolumns = 50\nrate_hz = 100\n")
     return folder / "a.csv.gz"
 
 
-def npz_bomb(folder: Path) -> Path:
-    """Write pictures of 3 GiB in 3 MB."""
-    with zipfile.ZipFile(folder / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
-        n = 3 << 18
+def npz_bomb(folder: Path, pieces: int = 600) -> Path:
+    """Write pictures of 600 MiB in .6 MB; of the 3 GiB of 3 times 1024 pieces the file holds the description alone."""
+    with zipfile.ZipFile(folder / "a.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        n = pieces << 8
         for name, descr, shape in (("values", "<f4", (n, 32, 32)), ("t", "<i8", (n,))):
             with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
                 np.lib.format.write_array_header_1_0(file, {"descr": descr, "fortran_order": False, "shape": shape})
-                zeros = bytes(8 * n if name == "t" else 1 << 20)
-                for _ in range(1 if name == "t" else 3 << 10):
-                    file.write(zeros)
+                for _ in range(1 if name == "t" or pieces > 1000 else pieces):
+                    file.write(bytes(8 * n if name == "t" else 1 << 20))
     return folder / "a.npz"
 
 
 @pytest.mark.parametrize("write", [gzip_bomb, npz_bomb])
 def test_a_small_file_that_unpacks_to_gigabytes_is_refused_before_it_takes_them(write: Any, tmp_path: Path) -> None:
     path = write(tmp_path)
-    assert path.stat().st_size < 4_000_000
-    said = opened(path, limit=500_000_000)
+    assert path.stat().st_size < 8_000_000
+    said = opened(path, limit=300_000_000)
     assert "--limit BYTES" in said["refused"]
     assert said["peak"] < 256 * MIB
 
 
 def test_a_recording_that_is_larger_than_what_is_available_is_refused_with_both_sizes(tmp_path: Path) -> None:
-    """Of a process that may address 2 GiB, most of which libraries map, three quarters of the rest are less than 1.5 GiB."""
-    said = opened(npz_bomb(tmp_path), at_most=2048 * MIB)
+    """A process that may address 2 GiB has less than 1.5 GiB for a recording."""
+    said = opened(npz_bomb(tmp_path, 3 << 10), at_most=2048 * MIB)
     assert "claims 3221225472 bytes" in said["refused"]
     assert "(3/4 of the memory that is available): --limit BYTES" in said["refused"]
 
@@ -141,7 +139,8 @@ def test_a_recording_that_is_larger_than_what_is_available_is_refused_with_both_
 def test_large_pictures_of_one_value_open_whatever_they_are_packed_to(tmp_path: Path) -> None:
     """What taxel wrote always opens, though a bomb is packed as well."""
     frames = taxel.Frames(np.zeros((300, 512, 512), np.float32), np.arange(300) * 1000)
-    path = taxel.convert(frames, tmp_path / "a.mcap").path
+    path = tmp_path / "a.mcap"
+    taxel.convert(frames, path, compression="zstd")
     assert 2 * frames.values.size > 1000 * path.stat().st_size
     assert taxel.open(path).frames() == frames
 
@@ -203,7 +202,7 @@ def test_columns_that_grow_are_what_was_added(pieces: list[int]) -> None:
     column = read.column("values")
     np.testing.assert_array_equal(column, np.concatenate([values for _, values in parts]))
     frames = taxel.Frames(column, np.arange(len(column)))
-    assert frames.values is column or not len(column)
+    assert np.shares_memory(frames.values, column) or not len(column)
 
 
 def test_columns_that_grow_stop_at_the_limit() -> None:

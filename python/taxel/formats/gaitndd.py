@@ -69,12 +69,10 @@ def trials(path: str | Path) -> Iterator[Trial]:
             file = header.parent / name
             foot = {".let": "left", ".rit": "right"}.get(file.suffix, "")
             values = _samples(file, samples, first, checksum)
-            valid = np.flatnonzero(values != NO_SAMPLE)
             kept = Growing(header.name, t=((), np.int64), values=((1, 1), np.float32))
-            for k in range(0, len(valid), _AT_ONCE):
-                part = valid[k : k + _AT_ONCE]
-                kept.add(t=whole_us(header.name, part / rate, 0), values=values[part, None, None])
-            del valid
+            for k in range(0, samples, _AT_ONCE):
+                valid = k + np.flatnonzero(values[k : k + _AT_ONCE] != NO_SAMPLE)
+                kept.add(t=whole_us(header.name, valid / rate, 0), values=values[valid, None, None])
             truth: dict[str, NDArray[np.int64]] = {}
             scored = (0, 0)
             if foot == "left" and steps.exists():
