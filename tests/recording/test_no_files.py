@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from panel.protocol import Client
 from refusal import refused
 
 import taxel
@@ -17,7 +18,7 @@ from taxel import FormatError, formats
 from taxel._base.files import open_file
 from taxel.cli import main
 from taxel.detect import PlainRule, recipes
-from taxel.live import Panel, PanelClient
+from taxel.live import Panel
 from taxel.simulate import SceneFile
 
 from .hostile import KINDS
@@ -96,7 +97,7 @@ def test_what_describes_a_recording_is_a_file(read: Callable[[Path], Any], no_fi
     make, called = no_file
     make(path := tmp_path / "GaCo99_01.txt")
     taxel.convert(some_frames(), tmp_path / "ok.npz")
-    with refused(f"{called}; must be a file|neither", FormatError):
+    with refused(f"{called}; must be a file|holds no spike trains", FormatError):
         read(path)
 
 
@@ -134,11 +135,16 @@ def test_the_page_serves_a_folder_with_pipes(tmp_path: Path) -> None:
     for name in BESIDE:
         os.mkfifo(tmp_path / name)
     os.mkfifo(tmp_path / "walk.lss")
-    with Panel(tmp_path) as panel, PanelClient(panel.url, rate_hz=10) as client:
-        client.open("walk.mcap")
-        client.play(8.0)
-        names = {subject.name for subject, _ in zip((subject for subject, _ in client), range(3), strict=False)}
-    assert names
+    with Panel(tmp_path / "walk.mcap") as panel, Client(panel) as page:
+        for name in ("walk.mcap", "press.npz"):
+            assert page.ask("open", name=name)["type"] == "done"
+        page.send(type="recordings")
+        listed = page.until("recordings")
+        assert [one["name"] for one in listed["files"]] == ["press.npz", "walk.mcap"]
+        assert listed["readouts"] == []
+        for name in ("x.mcap", "x.lsa", "x.csv", "x.npz"):
+            assert page.ask("open", name=name)["type"] == "refused"
+        assert page.ask("open", name="walk.mcap")["type"] == "done"
 
 
 @pytest.mark.parametrize("command", ["info", "convert", "cut", "merge", "encode", "detect", "train", "information"])
@@ -146,16 +152,19 @@ def test_a_command_says_it_in_one_line(command: str, tmp_path: Path, capsys: pyt
     os.mkfifo(path := tmp_path / "a.csv")
     more = {
         "convert": [str(tmp_path / "b.npz")],
-        "cut": ["--to-us", "5", "-o", str(tmp_path / "b.npz")],
+        "cut": [str(tmp_path / "b.npz"), "--to", "1"],
+        "encode": ["--encoder", "change_events"],
         "merge": [str(path), "-o", str(tmp_path / "b.npz")],
         "detect": ["--readout", str(path)],
         "train": ["--labels", str(path), "-o", str(tmp_path / "b.json")],
         "information": ["--labels", str(path)],
     }
-    assert main([command, str(path), *more.get(command, [])]) != 0
+    with pytest.raises(SystemExit) as ended:
+        main([command, str(path), *more.get(command, [])])
+    assert ended.value.code == 2
     said = capsys.readouterr().err.strip().splitlines()
     assert len(said) == 1
-    assert command == "cut" or "a named pipe; must be a file" in said[0]
+    assert "a named pipe; must be a file" in said[0]
 
 
 def test_links_to_files_and_descriptors_without_waiting_are_read(tmp_path: Path) -> None:
