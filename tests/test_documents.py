@@ -120,9 +120,7 @@ def test_a_setting_is_read_as_a_file_is() -> None:
 def test_a_line_of_many_numbers_or_texts_with_dots_is_no_key(tmp_path: Path) -> None:
     x = [k + 0.5 for k in range(4096)]
     path = tmp_path / "a.layout.toml"
-    path.write_text(
-        f"# {'.' * 500}\nrows = 64\ncolumns = 64\nunit = '{'.' * 300}'\n[places]\nx = {x}\ny = {x[::-1]}\n"
-    )
+    path.write_text(f"# {'.' * 500}\nrows = 64\ncolumns = 64\nunit = '{'.' * 300}'\n[places]\nx = {x}\ny = {x[::-1]}\n")
     assert formats.layout.Layout.read(path).places.x.tolist() == x
 
 

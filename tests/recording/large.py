@@ -201,6 +201,20 @@ def plate(folder: Path, size: int) -> Path:
     return write_plate(folder, count=max(1, size // (4 * 26 * 12 * 41)))
 
 
+def bag(ending: str) -> Callable[[Path, int], Path]:
+    def one(folder: Path, size: int) -> Path:
+        from formats import bags
+
+        (folder / "layout.toml").write_text('[ros]\ntopic = "/palm"\n')
+        palms = [bags.palm(RNG.integers(0, 900, 768)) for _ in range(20)]
+        count = size // (4 * 768 + 8)
+        return bags.write(
+            folder / f"a{ending}", (("/palm", bags.PALM, 5.0 * k, 5.0 * k, palms[k % 20]) for k in range(1, count))
+        )
+
+    return one
+
+
 #: How large files of each kind are written; the formats of other makers have their names.
 KINDS: dict[str, Callable[[Path, int], Path]] = {
     "mcap of events": converted("a.mcap", events),
@@ -218,6 +232,9 @@ KINDS: dict[str, Callable[[Path, int], Path]] = {
     "txt": lambda folder, size: table(folder, size, "a.txt"),
     "csv.gz": lambda folder, size: table(folder, size, "a.csv.gz", ";"),
     "one channel": one_channel,
+    "bag of ROS 1": bag(".bag"),
+    "bag of ROS 2": bag(".mcap"),
+    "database of ROS 2": bag(".db3"),
     "gaitpdb": gaitpdb,
     "gaitndd": gaitndd,
     "moticon": moticon,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 import resource
 import subprocess
 import sys
@@ -13,7 +14,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from formats import bags
 from refusal import refused
+from rosbags import rosbag1, rosbag2
 
 import taxel
 from taxel import FormatError, ProblemError, formats
@@ -134,6 +137,39 @@ def test_a_recording_that_is_larger_than_what_is_available_is_refused_with_both_
     said = opened(npz_bomb(tmp_path, 3 << 10), at_most=2048 * MIB)
     assert "claims 3221225472 bytes" in said["refused"]
     assert "(3/4 of the memory that is available): --limit BYTES" in said["refused"]
+
+
+@pytest.mark.parametrize("ending", [".bag", ".mcap"])
+def test_a_chunk_of_a_bag_that_unpacks_to_too_much_is_refused(ending: str, tmp_path: Path) -> None:
+    """100 MB of zeros are some kilobytes of bz2 and of zstd."""
+    path = bags.write(tmp_path / f"a{ending}", [("/hand", bags.HAND, 1.0, 1.0, bags.hand([0.0] * 12_500_000, [1.0]))])
+    assert path.stat().st_size > 100_000_000
+    write_packed(path)
+    assert path.stat().st_size < 200_000
+    said = opened(path, topic="/hand", field="thumb")
+    assert re.search("a chunk .* more than 67108864 bytes|a chunk of 100.* at most 67108864", said["refused"])
+    assert said["peak"] < 256 * MIB
+
+
+def write_packed(path: Path) -> None:
+    """Write a bag anew with its chunks packed."""
+    to = path.with_name("packed")
+    if path.suffix == ".bag":
+        writer: Any = rosbag1.Writer(to)
+        writer.set_compression(rosbag1.Writer.CompressionFormat.BZ2)
+        reader: Any = rosbag1.Reader(path)
+        types = bags.store(bags.Stores.ROS1_NOETIC)
+    else:
+        writer = rosbag2.Writer(to, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP)
+        writer.set_compression(rosbag2.CompressionMode.STORAGE, rosbag2.CompressionFormat.ZSTD)
+        reader, types = rosbag2.Reader(path), bags.store()
+    with reader, writer:
+        for connection in reader.connections:
+            own = writer.add_connection(connection.topic, connection.msgtype, typestore=types)
+            for _, at, data in reader.messages([connection]):
+                writer.write(own, at, data)
+    path.unlink()
+    (to if path.suffix == ".bag" else next(to.glob("*.mcap"))).rename(path)
 
 
 def test_large_pictures_of_one_value_open_whatever_they_are_packed_to(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -62,11 +62,11 @@ NO_FILES = {
 
 
 @pytest.fixture(params=NO_FILES)
-def no_file(request: pytest.FixtureRequest) -> Iterator[tuple[Callable[[Path], None], str]]:
-    yield NO_FILES[request.param]
+def no_file(request: pytest.FixtureRequest) -> tuple[Callable[[Path], None], str]:
+    return NO_FILES[request.param]
 
 
-ENDINGS = [".mcap", ".lsa", ".npz", ".csv", ".csv.gz", ".txt", ".npy", ".asc", ".lst", ".asf", ".hea", ".bag", ".db3", ""]
+ENDINGS = [".mcap", ".lsa", ".npz", ".csv", ".csv.gz", ".txt", ".npy", ".asc", ".lst", ".asf", ".hea", ".bag", ".db3"]
 
 
 @pytest.mark.parametrize("ending", ENDINGS)

@@ -18,6 +18,7 @@ import numpy as np
 from taxel._core import FormatError
 
 __all__ = [
+    "CHUNK",
     "COLUMNS",
     "DESCRIPTION",
     "LINE",
@@ -44,6 +45,8 @@ LINE = 1 << 22
 UNPACKED = 1 << 32
 #: Bytes of a text, unpacked: 1 GiB.
 TEXT = 1 << 30
+#: Bytes of a chunk of a ROS bag, unpacked: 64 MiB, as of a .mcap.
+CHUNK = 1 << 26
 #: Bytes of a description in JSON: 64 MiB.
 DESCRIPTION = 1 << 26
 #: The largest value of a picture, which has 32 bits.
