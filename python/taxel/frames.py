@@ -66,7 +66,7 @@ class Frames(Columns):
             raise ProblemError(f"values have {found}: must have three (n, rows, columns)")
         if len(self.t) != len(self.values):
             raise ProblemError(f"t has shape {self.t.shape}: must be ({len(self.values)},), one time a picture")
-        back = np.flatnonzero(np.diff(self.t) <= 0)
+        back = np.flatnonzero(self.t[1:] <= self.t[:-1])
         if len(back):
             k = int(back[0])
             raise ProblemError(f"t[{k + 1}] is {self.t[k + 1]} us, not after t[{k}] = {self.t[k]} us")

@@ -15,6 +15,7 @@ from taxel import _core
 from taxel._base.arguments import instance, shown, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
+from taxel._base.documents import text_of_json
 from taxel._base.files import write_whole
 from taxel._base.messages import counted, escaped
 from taxel._core import FormatError, ProblemError
@@ -200,9 +201,10 @@ class Tare:
         array([[5.]])
         """
         place = Path(checked_path("path", path))
+        text = text_of_json(place)
         try:
-            return cls.from_json(place.read_text(encoding="utf-8"))
-        except (_core.Error, UnicodeDecodeError) as error:
+            return cls.from_json(text)
+        except _core.Error as error:
             raise FormatError(f"{path}: {error}") from None
 
     def __eq__(self, other: object) -> bool:

@@ -110,7 +110,7 @@ def test_a_table_with_missing_cells_says_how_to_read_them(tmp_path: Path, mark: 
 def test_a_table_is_the_same_however_many_rows_are_read_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
 ) -> None:
-    monkeypatch.setattr(taxel.formats.text, "_AT_ONCE", at_once)
+    monkeypatch.setattr(taxel.formats.text, "_CELLS", at_once)
     layout = 'rate_hz = 100\n[table]\nmissing = "NA"\n'
     frames = table(tmp_path, lines(VALUES).replace("6.5", "NA"), layout).frames()
     expected = VALUES.copy()

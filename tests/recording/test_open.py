@@ -59,7 +59,7 @@ def npz(**columns: object) -> bytes:
         ("a.csv", b"t_us,x0y0,x0y0\n0,1,2\n", "column 'x0y0' stands there twice"),
         ("a.csv", b"t_us,x0y0,heel\n0,1,2\n", "column 'heel' among taxels"),
         ("a.csv", b"t_us,x0y0\n0,1\n0,2\n", "t[1] is 0 us, not after"),
-        ("a.csv", b"t_us,x0y0\n0.5,1\n", "t[0] is 0.5"),
+        ("a.csv", b"t_us,x0y0\n0.5,1\n", "a.csv, line 2, column t_us: is 0.5; must be a whole number of us"),
         ("a.csv", b"t_us,x0y0\n0,1\n1,2,3\n", "line 3"),
         ("a.csv", b"t_us,x9999y9999\n0,1\n", "most are missing"),
         ("a.txt", b"hello", "no recording; there are .mcap, .lsa, .npz, .csv, .h5"),

@@ -58,6 +58,12 @@ impl Events {
         self.t.len()
     }
 
+    /// Bytes of the columns.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.len() * (13 + 3 * usize::from(self.intensity.is_some()) + usize::from(self.repaired.is_some()))
+    }
+
     /// Whether there is no event.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -8,6 +8,7 @@ pub mod host_clock;
 mod latency;
 pub mod locked;
 pub mod ports;
+mod regular_file;
 
 pub mod capture;
 pub mod emulate;
@@ -15,3 +16,4 @@ pub mod pipeline;
 pub mod recording;
 
 pub use error::{Error, Result};
+pub use regular_file::open_regular;

@@ -1,5 +1,6 @@
 //! Recordings: the live format's reader and writer, and the manual's raw files.
 
+use std::os::fd::IntoRawFd;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -60,8 +61,13 @@ struct RecordingReader {
 #[pymethods]
 impl RecordingReader {
     #[new]
-    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Ok(Self { reader: enter(py, |_| Reader::open(&path))? })
+    fn open(py: Python<'_>, path: PathBuf, memory: u64) -> PyResult<Self> {
+        Ok(Self { reader: enter(py, |_| Reader::open_within(&path, memory))? })
+    }
+
+    /// The same reader, which returns at most so many bytes.
+    fn within(&self, memory: u64) -> Self {
+        Self { reader: self.reader.within(memory) }
     }
 
     /// The names of the sources.
@@ -366,10 +372,11 @@ fn read_lsa<'py>(
     sensor: ArrayParts,
     pairing: &str,
     differences: bool,
+    memory: u64,
 ) -> PyResult<LsaOut<'py>> {
     let sensor = to_array(sensor)?;
     let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
-    let read = enter(py, |stop| decode_lsa(&path, sensor, pairing, differences, stop))?;
+    let read = enter(py, |stop| decode_lsa(&path, sensor, pairing, differences, memory, stop))?;
     Ok((array(py, read.bytes), from_events(py, read.events), json!(read.counts).to_string(), read.complete))
 }
 
@@ -390,6 +397,12 @@ fn clock_lines(
 #[pyfunction]
 fn clock_doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
     clock::doubt(drift_ppm, delay_us, median_us)
+}
+
+/// The descriptor of a regular file, opened for reading.
+#[pyfunction]
+fn open_regular(py: Python<'_>, path: PathBuf) -> PyResult<i32> {
+    Ok(enter(py, |_| taxel_live::open_regular(&path))?.into_raw_fd())
 }
 
 /// The name of a recording in automatic mode: the index appended to the name.
@@ -415,5 +428,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clock_lines, module)?)?;
     module.add_function(wrap_pyfunction!(clock_doubt, module)?)?;
     module.add_function(wrap_pyfunction!(write_lsa, module)?)?;
+    module.add_function(wrap_pyfunction!(open_regular, module)?)?;
     module.add_function(wrap_pyfunction!(numbered_path, module)?)
 }

@@ -12,6 +12,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.files import open_file
 from taxel._base.limits import DESCRIPTION, UNPACKED, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError
@@ -31,7 +32,7 @@ def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
     ('t', 'x')
     """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_file(path) as file, zipfile.ZipFile(file) as archive:
             return tuple(name.removesuffix(".npy") for name in archive.namelist())
     # The errors that zipfile raises on damage are not documented; reading the arrays reports what is wrong.
     except Exception:
@@ -54,7 +55,7 @@ def shapes(path: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
     >>> shapes(place)
     {'t': (2,), 'x': (2, 1)}
     """
-    with open(path, "rb") as file:
+    with open_file(path) as file:
         try:
             if not zipfile.is_zipfile(file):
                 file.seek(0)
@@ -88,13 +89,14 @@ def read_array(path: str | os.PathLike[str]) -> NDArray[Any]:
     >>> read_array(place)
     array([1, 2])
     """
-    with open(path, "rb") as file:
+    with open_file(path) as file:
         try:
             shape, dtype = _described(file)
-            size, held = math.prod(shape) * dtype.itemsize, os.fstat(file.fileno()).st_size - file.tell()
-            if dtype.hasobject or size > held:
-                what = "Python objects" if dtype.hasobject else f"{size} bytes ({shape}, {dtype}); there are {held}"
-                raise FormatError(f"{path}: says that it holds {what}; must be a NumPy array of numbers")
+            size, stored = math.prod(shape) * dtype.itemsize, os.fstat(file.fileno()).st_size - file.tell()
+            if dtype.hasobject:
+                raise FormatError(f"{path}: holds Python objects; must be a NumPy array of numbers")
+            if size > stored:
+                raise FormatError(f"{path}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
             unpacked(str(path), size)
             file.seek(0)
             return np.lib.format.read_array(file, allow_pickle=False)
@@ -134,7 +136,7 @@ def read_arrays(
     >>> read_arrays(place, ["t", "y"])
     {'t': array([1, 2])}
     """
-    with open(path, "rb") as file:
+    with open_file(path) as file:
         try:
             return _arrays(Path(path), file, tuple(names), frozenset(texts))
         except (FormatError, MemoryError):

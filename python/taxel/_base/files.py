@@ -1,4 +1,4 @@
-"""Writes files atomically, and overwrites existing files only on request."""
+"""Opens regular files; writes files atomically, and overwrites existing files only on request."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from typing import BinaryIO
 
 from taxel._base.arguments import flag
 from taxel._base.arguments import path as checked_path
+from taxel._core import open_regular
 
-__all__ = ["beside", "named", "try_whole", "whole_file", "write_whole"]
+__all__ = ["beside", "named", "open_file", "try_whole", "whole_file", "write_whole"]
 
 
 def beside(path: Path, name: str) -> Path:
@@ -30,6 +31,20 @@ def beside(path: Path, name: str) -> Path:
 def named(path: Path) -> Path:
     """Return a path whose last part is a name: "." and ".." as the folder that they stand for."""
     return path if path.name not in ("", "..") else path.resolve()
+
+
+def open_file(path: str | os.PathLike[str]) -> BinaryIO:
+    """Open a regular file, or a link to one, to read bytes.
+
+    Every file that taxel reads is opened here or in the compiled part: a named pipe would wait for its writer, and a
+    device may have no end.
+
+    Raises
+    ------
+    FormatError : a named pipe, a socket or a device
+    OSError : the file is not there, or cannot be read
+    """
+    return open(path, "rb", opener=lambda name, _: open_regular(name))
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object], *, overwrite: bool = False) -> Path:

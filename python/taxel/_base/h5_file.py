@@ -18,6 +18,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.columns import OwnMemory
 from taxel._base.limits import DESCRIPTION, unpacked
 from taxel._core import FormatError
 
@@ -134,7 +135,7 @@ class H5File:
         at = self._filled
         try:
             os.ftruncate(self._memory, at + max(1, size))
-            shared = mmap.mmap(self._memory, max(1, size), offset=at)
+            shared = OwnMemory(self._memory, max(1, size), offset=at)
         except OSError as error:
             raise MemoryError(str(error)) from None
         # The next data set begins at the next place that can be mapped, so this one is the array's, without a copy.

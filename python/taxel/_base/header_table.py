@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from taxel._base.arguments import shown
+from taxel._base.documents import read_text
+from taxel._base.limits import TEXT, unpacked
 from taxel._core import FormatError
 
 __all__ = ["HeaderTable", "text_of"]
 
 #: The names of other separators than the comma, for errors.
 _PARTED = {";": "semicolons", "\t": "tabs"}
+
+#: Bytes in memory of a character of a table of short cells, about.
+_OBJECTS = 16
 
 
 @dataclass(frozen=True)
@@ -55,22 +61,46 @@ class HeaderTable:
         >>> table.header, list(table)
         (('label', 't_us'), [(3, {'label': 'heel', 't_us': '400'})])
         """
-        reader = csv.reader(lines, strict=True)
-        rows: list[tuple[int, tuple[str, ...]]] = []
-        line = 1
-        try:
-            for cells in reader:
-                if any(cell.strip() for cell in cells):
-                    rows.append((line, tuple(cells)))
-                line = reader.line_num + 1
-        except csv.Error as error:
-            reason = "a quote opens and does not close" if "end of data" in str(error) else error
-            raise FormatError(f"{place}, line {line}: {reason}") from None
-        header = tuple(name.strip() for name in rows[0][1]) if rows else ()
-        repeated = [name for name in header if name and header.count(name) > 1]
-        if repeated:
-            raise FormatError(f"{place}, line {rows[0][0]}: column {shown(repeated[0])} stands there twice")
-        return cls(str(place), header, tuple(rows[1:]))
+        rows = _rows(place, lines)
+        return replace(cls.head(place, rows), lines=tuple(rows))
+
+    @classmethod
+    def head(cls, place: str | Path, rows: Iterator[tuple[int, tuple[str, ...]]]) -> HeaderTable:
+        """Read the names of a table from its first row; the others are left in the iterator.
+
+        Raises
+        ------
+        FormatError : a duplicate column (names the line)
+        """
+        line, first = next(rows, (1, ()))
+        header = tuple(name.strip() for name in first)
+        repeated = next((name for name, count in Counter(header).items() if name and count > 1), None)
+        if repeated is not None:
+            raise FormatError(f"{place}, line {line}: column {shown(repeated)} stands there twice")
+        return cls(str(place), header, ())
+
+    @classmethod
+    def stream(
+        cls, place: str | Path, lines: Iterable[str], required: Sequence[str]
+    ) -> Iterator[tuple[int, dict[str, str]]]:
+        """Yield the rows of a table as iterating over one does, without holding them.
+
+        Parameters
+        ----------
+        place, lines
+            As of `read`.
+        required : sequence of str
+            Columns that must be there.
+
+        Raises
+        ------
+        FormatError : as of `read`, `has` and iterating
+        """
+        rows = _rows(place, lines)
+        table = cls.head(place, rows)
+        table.has(required)
+        for row in rows:
+            yield from replace(table, lines=(row,))
 
     @property
     def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
@@ -124,6 +154,20 @@ class HeaderTable:
             yield line, {name: cell for name, cell in named if name}
 
 
+def _rows(place: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tuple[str, ...]]]:
+    """Yield the rows of a table that are not empty, each with the number of its line."""
+    reader = csv.reader(lines, strict=True)
+    line = 1
+    try:
+        for cells in reader:
+            if any(cell.strip() for cell in cells):
+                yield line, tuple(cells)
+            line = reader.line_num + 1
+    except csv.Error as error:
+        reason = "a quote opens and does not close" if "end of data" in str(error) else error
+        raise FormatError(f"{place}, line {line}: {reason}") from None
+
+
 def text_of(path: Path) -> list[str]:
     """Read the lines of a UTF-8 text, with or without BOM, including line ends, as a quoted cell may contain one.
 
@@ -132,8 +176,7 @@ def text_of(path: Path) -> list[str]:
     FormatError : no UTF-8 text
     OSError : the file is not there, or cannot be read
     """
-    try:
-        # Other line ends than \n and \r, as U+2028, are part of a cell.
-        return list(io.StringIO(path.read_bytes().decode("utf-8-sig"), newline=""))
-    except UnicodeDecodeError as error:
-        raise FormatError(f"{path}: not a table of text: {error}") from None
+    text = read_text(path, TEXT)
+    unpacked(str(path), _OBJECTS * len(text))
+    # Other line ends than \n and \r, as U+2028, are part of a cell.
+    return list(io.StringIO(text, newline=""))

@@ -1,4 +1,4 @@
-"""Limits of the size of files, checked before memory is allocated; errors name them, docs/files.md lists them.
+"""Limits of the size of files, checked before memory is taken; errors name them, docs/files.md lists them.
 
 Files may be damaged or malicious: a few bytes can claim 10^12 values. The limits lie well above what current
 sensors record. Those of .mcap are in its reader (crates/taxel-live/src/recording/limits.rs).
@@ -6,20 +6,47 @@ sensors record. Those of .mcap are in its reader (crates/taxel-live/src/recordin
 
 from __future__ import annotations
 
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass
+from pathlib import Path
+
 import numpy as np
 
 from taxel._core import FormatError
 
-__all__ = ["COLUMNS", "DESCRIPTION", "TAXELS", "TEXT", "TIME_US", "UNPACKED", "VALUE", "unpacked"]
+__all__ = [
+    "CHUNK",
+    "COLUMNS",
+    "DESCRIPTION",
+    "LINE",
+    "TAXELS",
+    "TEXT",
+    "TIME_US",
+    "UNPACKED",
+    "VALUE",
+    "available",
+    "given",
+    "keep",
+    "memory",
+    "opening",
+    "unpacked",
+]
 
 #: Taxels of a sensor: 2048 x 2048.
 TAXELS = 1 << 22
 #: Columns of a table of text: a time, and 256 x 256 taxels.
 COLUMNS = (1 << 16) + 1
+#: Bytes of a line of text: 4 MiB, 64 for each column.
+LINE = 1 << 22
 #: Bytes of the arrays of a file, unpacked: 4 GiB.
 UNPACKED = 1 << 32
 #: Bytes of a text, unpacked: 1 GiB.
 TEXT = 1 << 30
+#: Bytes of a chunk of a ROS bag, unpacked: 64 MiB, as of a .mcap.
+CHUNK = 1 << 26
 #: Bytes of a description in JSON: 64 MiB.
 DESCRIPTION = 1 << 26
 #: The largest value of a picture, which has 32 bits.
@@ -27,13 +54,165 @@ VALUE = float(np.finfo(np.float32).max)
 #: The largest absolute time, us: 142 years, so that it also fits in 64 bits as ns.
 TIME_US = 1 << 52
 
+#: So many bytes are read without a look at what is available, which takes longer than to read them.
+_SMALL = 1 << 24
+
+
+@dataclass
+class _Room:
+    """Say how much memory an opening may take.
+
+    Parameters
+    ----------
+    limit : int, bytes, optional
+        What the caller allows.
+    most : int, bytes
+        Three quarters of what was available when it began.
+    kept : int, bytes
+        The arrays of the files that it has read so far.
+    """
+
+    limit: int | None
+    most: int
+    kept: int = 0
+
+
+_room: ContextVar[_Room | None] = ContextVar("room", default=None)
+
+
+@contextmanager
+def opening(limit: int | None = None) -> Iterator[None]:
+    """Count what is read within this context as one opening, of a file or a folder.
+
+    Parameters
+    ----------
+    limit : int, bytes, optional
+        How much may be read; default: three quarters of what is available now, and at most the sizes of docs/files.md.
+    """
+    if limit is None and _room.get() is not None:
+        yield
+        return
+    before = _room.set(_Room(limit, _most()))
+    try:
+        yield
+    finally:
+        _room.reset(before)
+
+
+def given() -> int | None:
+    """Return the limit that the caller of the current opening gave, bytes."""
+    room = _room.get()
+    return None if room is None else room.limit
+
+
+def keep(size: int) -> None:
+    """Count arrays of a file that stay in memory while the opening reads further files."""
+    room = _room.get()
+    if room is not None:
+        room.kept += size
+
+
+def memory(limit: int | None) -> int:
+    """Return how many bytes may be read now, within a limit that a caller gave."""
+    return min(UNPACKED, _most()) if limit is None else limit
+
 
 def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
-    """Refuse data that would unpack to more than `most` bytes.
+    """Refuse data that would unpack to more bytes than may be read.
+
+    Parameters
+    ----------
+    place : str
+        For the error.
+    size : int, bytes
+        What the data would take in memory.
+    most : int, bytes
+        How much is read of such data where the caller of the opening gave no limit.
 
     Raises
     ------
-    FormatError : more bytes than `most`
+    FormatError : more bytes than `most`, than the limit of the opening, or than three quarters of what is available
+        (names both sizes)
     """
-    if size > most:
-        raise FormatError(f"{place}: claims {size} bytes, unpacked; at most {most} are read")
+    room = _room.get()
+    limit, whole = (None, size) if room is None else (room.limit, size + room.kept)
+    if limit is not None:
+        bound, why = limit, ""
+    elif size > most:
+        whole, bound, why = size, most, ""
+    elif whole <= _SMALL:
+        return
+    else:
+        bound, why = _most() if room is None else room.most, " (3/4 of the memory that is available)"
+    if whole > bound:
+        raise FormatError(
+            f"{place}: claims {whole} bytes, unpacked; at most {bound} are read{why}: --limit BYTES (limit=) says how "
+            "many may be"
+        )
+
+
+def _most() -> int:
+    return available() * 3 // 4
+
+
+def available(root: Path = Path("/")) -> int:
+    """Return how many bytes this process can still take, of the machine, its control groups and its own limit.
+
+    Parameters
+    ----------
+    root : Path
+        Where ``proc`` and ``sys`` are.
+    """
+    return max(0, min([_of_machine(root), _of_process(root), *_of_groups(root)]))
+
+
+def _of_machine(root: Path) -> int:
+    """Return what the machine has available; without an answer of the system what a process can address."""
+    with suppress(OSError, ValueError):
+        for line in (root / "proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) * 1024
+    return 1 << 47
+
+
+def _of_process(root: Path) -> int:
+    """Return what the limit of this process's addresses leaves."""
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if most == resource.RLIM_INFINITY:
+        return 1 << 47
+    with suppress(OSError, ValueError):
+        return most - int((root / "proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    return most
+
+
+#: Of each version of control groups: its folder, and the names of its limit, its usage, and what of the usage is files
+#: that the system gives up when memory is wanted.
+_GROUPS = {
+    "": ("sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),
+    "memory": ("sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+}
+
+
+def _of_groups(root: Path) -> Iterator[int]:
+    """Yield what the limit of each control group leaves that this process is in."""
+    try:
+        lines = (root / "proc/self/cgroup").read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        _, _, rest = line.partition(":")
+        controllers, _, path = rest.partition(":")
+        name = "memory" if "memory" in controllers.split(",") else controllers
+        if name not in _GROUPS:
+            continue
+        base, limit, usage, files = _GROUPS[name]
+        top = root / base
+        # Within a container the path is that of the machine, of which only the top is there.
+        group = top / path.lstrip("/")
+        for folder in (group, *group.parents):
+            with suppress(OSError, ValueError):
+                stat = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
+                used = int((folder / usage).read_text()) - int(stat.get(files, 0))
+                yield int((folder / limit).read_text()) - used
+            if folder == top:
+                break

@@ -17,6 +17,7 @@ from taxel import _core
 from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
+from taxel._base.documents import BY_TAXEL, of_json, read_text
 from taxel._base.files import beside, named, write_whole
 from taxel._base.messages import counted, escaped, first_line
 from taxel._core import FormatError, ProblemError
@@ -408,7 +409,7 @@ class Calibration:
             raise ProblemError(f"calibration is {shown(text)}: must be JSON text")
         entry = "the whole"
         try:
-            document = json.loads(text)
+            document = of_json("calibration", text, BY_TAXEL)
             if not isinstance(document, dict) or document.get("taxel") != "calibration":
                 raise ProblemError('must be an object with "taxel": "calibration"')
             entry = "array"
@@ -428,8 +429,6 @@ class Calibration:
             names = ("gain", "floor", "date", "residual", "note")
             how = {name: document[name] for name in names if name in document} | {"rest": rest, "loads": loads}
             return cls._made(array, curve, unit, document["of"], how)
-        except RecursionError:
-            raise FormatError("the calibration is nested too deeply; must be as Calibration.save writes it") from None
         except KeyError as error:
             raise FormatError(f"{entry}: {error.args[0]} is missing; must be as Calibration.save writes it") from None
         except (ValueError, TypeError, AttributeError, IndexError, OverflowError, ProblemError) as error:
@@ -470,9 +469,10 @@ class Calibration:
         FormatError : no calibration (names the file)
         """
         place = Path(checked_path("path", path))
+        text = read_text(place, BY_TAXEL)
         try:
-            return cls.from_json(place.read_text(encoding="utf-8"))
-        except (_core.Error, UnicodeDecodeError) as error:
+            return cls.from_json(text)
+        except _core.Error as error:
             raise FormatError(f"{place}: {error}") from None
 
     @staticmethod

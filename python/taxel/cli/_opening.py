@@ -67,6 +67,14 @@ class FileOptions:
         float | None,
         typer.Option(help="Pictures a second, for recordings without times, whose pictures are numbered."),
     ] = None
+    limit: Annotated[
+        int | None,
+        typer.Option(
+            metavar="BYTES",
+            help="How much of a recording may be read into memory. Default: 3/4 of what is available, and at most the "
+            "sizes that taxel's docs state (files.md).",
+        ),
+    ] = None
 
     def open(self, path: Path) -> Recording | list[Recording]:
         """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
@@ -86,6 +94,7 @@ class FileOptions:
             field=self.field,
             types=self.types,
             ros=self.ros,
+            limit=self.limit,
         )
         if isinstance(opened, list):
             return [self._timed(self._on_array(one)) for one in opened]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from taxel._base.documents import NotTomlError, of_toml
 from taxel._base.messages import counted, escaped, warn
 from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us, begun
@@ -58,8 +58,8 @@ def assignments(settings: list[str]) -> dict[str, Any]:
         if not equals or not key.strip():
             raise ProblemError(f"--set {one}: must be KEY=VALUE")
         try:
-            values[key.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
+            values[key.strip()] = of_toml(f"--set {key.strip()}", f"value = {value}")["value"]
+        except NotTomlError:
             values[key.strip()] = value.strip()
     return values
 

@@ -64,6 +64,10 @@ class _Typed:
     speed: Annotated[
         float | None, typer.Option(help="With --replay: playback speed; 2 takes half the time. Default: 1.")
     ] = None
+    limit: Annotated[
+        int | None,
+        typer.Option(metavar="BYTES", help="With --replay: how much of the recording may be read into memory."),
+    ] = None
     pipe: Annotated[
         bool, typer.Option("--pipe", help="Send events of another sensor, whose frames come on standard input.")
     ] = False
@@ -168,6 +172,7 @@ def _together(typed: _Typed) -> None:
         raise ProblemError("--scenes, --truth and --rest belong to scenes: leave them out with --replay or --pipe")
     for name, value, other, there in (
         ("--speed", typed.speed, "--replay", typed.replay is not None),
+        ("--limit", typed.limit, "--replay", typed.replay is not None),
         ("--noise-floor", typed.noise_floor, "--pipe", typed.pipe),
         ("--baud", typed.baud, "--line", typed.line is not None),
     ):
@@ -190,7 +195,7 @@ def _played(typed: _Typed) -> _Played:
     flaws, faults = _flaws(typed.flaw or [], seed), _faults(typed.fault or [], seed)
     circuit = _circuit(typed.circuit or [], seed)
     if typed.replay is not None:
-        touch: Any = Replay(open_any(typed.replay), 1.0 if typed.speed is None else typed.speed)
+        touch: Any = Replay(open_any(typed.replay, limit=typed.limit), 1.0 if typed.speed is None else typed.speed)
         text = f"replay of {typed.replay}"
     elif typed.pipe:
         touch, text = _piped(3 if typed.noise_floor is None else typed.noise_floor)

@@ -13,6 +13,7 @@ from taxel import _core
 from taxel._base.arguments import instance, number, parameters, shown, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
+from taxel._base.documents import text_of_json
 from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -306,13 +307,15 @@ def detector(name: str, value: object) -> _Detector:
 
 def read(path: str | os.PathLike[str], what: str, of_text: Callable[[str], _D]) -> _D:
     """Read a detector's file; errors name it."""
+    place = Path(checked_path("path", path))
     try:
-        return of_text(Path(checked_path("path", path)).read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise FormatError(f"{path}: not text, so no {what}") from None
+        text = text_of_json(place)
     except FormatError as error:
-        right = f"; must be a {what} as taxel writes it" if "not JSON" in str(error) else ""
-        raise FormatError(f"{path}: {error}{right}") from None
+        raise FormatError(f"{error}; must be a {what} as taxel writes it") from None
+    try:
+        return of_text(text)
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from None
 
 
 def tare_text(tare: Tare | None) -> str | None:

@@ -13,7 +13,10 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["ascending_us", "sensor", "table", "whole_us"]
+__all__ = ["ascending", "ascending_us", "sensor", "table", "whole_us"]
+
+#: Times that are converted at once, so that little memory is taken beside them.
+_PIECE = 1 << 16
 
 
 def sensor(place: str, array: Array) -> Array:
@@ -50,11 +53,15 @@ def whole_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) -> N
     ------
     FormatError : a time farther from 0 than 142 years (names the line)
     """
-    wrong = np.flatnonzero(~(np.abs(seconds) <= TIME_US * 1e-6))
-    if len(wrong):
-        k = int(wrong[0])
-        raise FormatError(f"{place}, line {first_line + k}: time {seconds[k]:g} s; must lie within 142 years of 0")
-    return np.asarray(np.rint(seconds * 1e6).astype(np.int64))
+    t = np.empty(len(seconds), np.int64)
+    for begin in range(0, len(t), _PIECE):
+        part = slice(begin, begin + _PIECE)
+        wrong = np.flatnonzero(~(np.abs(seconds[part]) <= TIME_US * 1e-6))
+        if len(wrong):
+            k = begin + int(wrong[0])
+            raise FormatError(f"{place}, line {first_line + k}: time {seconds[k]:g} s; must lie within 142 years of 0")
+        t[part] = np.rint(seconds[part] * 1e6)
+    return t
 
 
 def ascending_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) -> NDArray[np.int64]:
@@ -64,9 +71,18 @@ def ascending_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) 
     ------
     FormatError : a time that does not ascend, or lies farther from 0 than 142 years (names the line)
     """
-    t = whole_us(place, seconds, first_line)
-    back = np.flatnonzero(np.diff(t) <= 0)
+    return ascending(place, whole_us(place, seconds, first_line), first_line)
+
+
+def ascending(place: str, t: NDArray[np.int64], first_line: int = 1) -> NDArray[np.int64]:
+    """Return a file's times in us, which must ascend.
+
+    Raises
+    ------
+    FormatError : a time that does not (names the line)
+    """
+    back = np.flatnonzero(t[1:] <= t[:-1])
     if len(back):
         k = int(back[0]) + 1
-        raise FormatError(f"{place}, line {first_line + k}: time {seconds[k]:g} s does not ascend")
+        raise FormatError(f"{place}, line {first_line + k}: time {t[k] / 1e6:g} s does not ascend")
     return t

@@ -10,14 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
-from taxel._base.limits import TIME_US, unpacked
+from taxel._base.columns import Growing
+from taxel._base.limits import TIME_US
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
@@ -29,6 +29,8 @@ from taxel.spikes import to_us
 __all__ = ["files", "trials"]
 
 _MARGIN = "Force"
+#: Characters of a page.
+_PAGE = 1 << 26
 _NUMBER = r"(\d{1,9}(?:\.\d{1,9})?)"
 _HEAD = {
     "matrix": re.compile(r"Matrix:\s*(\d{1,5})\s*x\s*(\d{1,5})", re.ASCII),
@@ -47,8 +49,7 @@ def files(path: Path) -> list[Path]:
 
 
 def _is_export(path: Path) -> bool:
-    with path.open("rb") as file:
-        head = file.read(65_536)
+    head = text.first_bytes(path, 65_536)
     return b"Matrix:" in head and b"Time/picture:" in head
 
 
@@ -81,42 +82,56 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
 @dataclass(frozen=True)
 class _Page:
-    """One picture: its number, the line of that number, the printed rectangle, the force that the page states."""
+    """One picture: its number and that one's line, the sum of its cells, how many are not 0, the force it states."""
 
     number: int
     line: int
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
-    values: NDArray[np.float64]
+    sum: float
+    loaded: int
     force: float
     force_line: int
 
 
+def _pages(at: int, begin: str, content: Iterator[str]) -> Iterator[tuple[int, list[str]]]:
+    """Yield the lines of each page, with the number of the first; the first page begins at line `at` with `begin`."""
+    page, size = [begin], 0
+    for line in content:
+        if _PICTURE.search(line):
+            yield at, page
+            at, page, size = at + len(page), [], 0
+        page.append(line)
+        size += len(line)
+        if size > _PAGE:
+            break  # no page has so many rows: it ends without its forces
+    yield at, page
+
+
 def _read(file: Path) -> Trial:
-    content = text.lines(file)
-    shape, size, period = _head(file, content)
-    begins = [k for k, line in enumerate(content) if _PICTURE.search(line)]
-    if not begins:
+    content = text.stream(file)
+    above, begin = text.before(content, lambda line: _PICTURE.search(line) is not None)
+    head = [*above, *([] if begin is None else [begin])]
+    shape, size, period = _head(file, head)
+    if begin is None:
         raise FormatError(f"{file.name}: no page with a picture's number (Pict-No.: 1)")
-    pages = [
-        _page(file, content, begin, end, shape) for begin, end in zip(begins, [*begins[1:], len(content)], strict=True)
-    ]
-    for before, page in pairwise(pages):
-        if page.number <= before.number:
-            raise FormatError(f"{file.name}, line {page.line}: picture {page.number} after picture {before.number}")
+    area, pages = size[0] * size[1], list[_Page]()
+    read = Growing(file.name, values=(shape, np.float32))
+    for first, lines in _pages(len(head), begin, content):
+        page, places, cells = _page(file, lines, first, shape)
+        if pages and page.number <= pages[-1].number:
+            raise FormatError(f"{file.name}, line {page.line}: picture {page.number} after picture {pages[-1].number}")
+        picture = np.zeros((1, *shape), np.float32)
+        picture[0][np.ix_(*places)] = cells
+        read.add(values=picture)
+        pages.append(page)
     t = np.rint(to_us((np.array([page.number for page in pages], np.float64) - 1) * period))
     if t[-1] > TIME_US or (np.diff(t) <= 0).any():
         raise FormatError(f"{file.name}: {period:g} ms a picture; must be .001 ms or more, and end within 142 years")
-    unpacked(file.name, 4 * len(pages) * shape[0] * shape[1])
-    values = np.zeros((len(pages), *shape), np.float32)
-    for picture, page in zip(values, pages, strict=True):
-        picture[np.ix_(page.rows, page.columns)] = page.values
     # The size is named as the matrix is: across first.
     array = Array(*shape, pitch_mm=(10 * size[1], 10 * size[0]), name="emed plate")
     return Trial(
         name=file.stem,
         person=file.stem,
-        recorded=Frames(values, t.astype(np.int64), unit=_unit(file, pages, size[0] * size[1]), array=array),
+        recorded=Frames(read.column("values"), t.astype(np.int64), unit=_unit(file, pages, area), array=array),
         truth={},
         source="",
         series={"total": np.array([page.force for page in pages])},
@@ -145,37 +160,34 @@ def _head(file: Path, content: Sequence[str]) -> tuple[tuple[int, int], tuple[fl
     return (rows, columns), (values["size"][0], values["size"][1]), values["period"][0]
 
 
-def _page(file: Path, content: Sequence[str], begin: int, end: int, shape: tuple[int, int]) -> _Page:
-    match = _PICTURE.search(content[begin])
+def _page(
+    file: Path, content: Sequence[str], line: int, shape: tuple[int, int]
+) -> tuple[_Page, tuple[NDArray[np.int64], NDArray[np.int64]], NDArray[np.float64]]:
+    """Return a page, the rows and columns that it prints, and their cells; `line` is the number of its first line."""
+    match = _PICTURE.search(content[0])
     assert match is not None  # the page was found by this pattern
-    head = next((k for k in range(begin + 1, end) if content[k].strip()), end)
+    end, before = len(content), line - 1
+    head = next((k for k in range(1, end) if content[k].strip()), end)
     names = content[head].split() if head < end else []
     if len(names) < 2 or names[-1] != _MARGIN:
-        raise FormatError(f"{file.name}, line {head + 1}: no line of column numbers that ends in {_MARGIN}")
+        raise FormatError(f"{file.name}, line {before + head + 1}: no line of column numbers that ends in {_MARGIN}")
     last = next((k for k in range(head + 1, end) if content[k].startswith(_MARGIN)), None)
     if last is None:
-        raise FormatError(f"{file.name}, line {end}: picture {match[1]} ends without the line {_MARGIN}")
-    lines = [line.split() for line in content[head + 1 : last]]
-    read = text.numbers(lines, file, head + 2, ["row", *(f"column {n}" for n in names[:-1]), _MARGIN])
+        raise FormatError(f"{file.name}, line {before + end}: picture {match[1]} ends without the line {_MARGIN}")
+    lines = (row.split() for row in content[head + 1 : last])
+    labels = ["row", *(f"column {n}" for n in names[:-1]), _MARGIN]
+    read = text.numbers(lines, file, before + head + 2, labels)
     margin = content[last].split()
     if len(margin) != len(names) + 1:
-        raise FormatError(f"{file.name}, line {last + 1}: {len(margin) - 1} forces, must have {len(names)}")
-    return _Page(
-        int(match[1]),
-        begin + 1,
-        _places(file, head + 2, "row", read[:, 0], shape[0], step=1),
-        _places(
-            file,
-            head + 1,
-            "column",
-            np.array([text.number(n, file, head + 1, "column number") for n in names[:-1]]),
-            shape[1],
-            step=0,
-        ),
-        read[:, 1:-1],
-        text.number(margin[-1], file, last + 1, _MARGIN),
-        last + 1,
+        raise FormatError(f"{file.name}, line {before + last + 1}: {len(margin) - 1} forces, must have {len(names)}")
+    numbers = np.array([text.number(n, file, before + head + 1, "column number") for n in names[:-1]])
+    places = (
+        _places(file, before + head + 2, "row", read[:, 0], shape[0], step=1),
+        _places(file, before + head + 1, "column", numbers, shape[1], step=0),
     )
+    cells, force = read[:, 1:-1], text.number(margin[-1], file, before + last + 1, _MARGIN)
+    page = _Page(int(match[1]), line, float(cells.sum()), int(np.count_nonzero(cells)), force, before + last + 1)
+    return page, places, cells
 
 
 def _places(
@@ -197,9 +209,9 @@ def _unit(file: Path, pages: Sequence[_Page], area_cm2: float) -> str:
 
     Cells and forces are rounded to hundredths; a page that agrees with neither unit is damaged.
     """
-    sums = np.array([page.values.sum() for page in pages]) * area_cm2
+    sums = np.array([page.sum for page in pages]) * area_cm2
     forces = np.array([page.force for page in pages])
-    rounding = 0.006 + 0.005 * area_cm2 * np.array([np.count_nonzero(page.values) for page in pages])
+    rounding = 0.006 + 0.005 * area_cm2 * np.array([page.loaded for page in pages])
     fits = {unit: np.abs(forces - factor * sums) <= rounding for unit, factor in _NEWTON.items()}
     unit = max(fits, key=lambda name: int(fits[name].sum()))
     wrong = np.flatnonzero(~fits[unit])

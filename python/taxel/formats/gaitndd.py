@@ -6,6 +6,7 @@ the authors' step times. Values are raw counts, not N, and they drift.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
+from taxel._base.columns import Growing
+from taxel._base.files import open_file
+from taxel._base.limits import unpacked
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending_us, whole_us
+from taxel.formats.checks import ascending, whole_us
 from taxel.formats.trial import MARGIN_US, Trial
 from taxel.frames import Frames
 
@@ -25,6 +29,8 @@ __all__ = ["files", "format_212", "step_times", "trials"]
 
 #: The value that format 212 stores for an invalid sample.
 NO_SAMPLE = -2048
+#: Samples, or three bytes with two of them, that are unpacked at once.
+_AT_ONCE = 1 << 16
 
 _TS_COLUMNS = [
     *("time", "left stride", "right stride", "left swing", "right swing", "left swing %", "right swing %"),
@@ -63,8 +69,10 @@ def trials(path: str | Path) -> Iterator[Trial]:
             file = header.parent / name
             foot = {".let": "left", ".rit": "right"}.get(file.suffix, "")
             values = _samples(file, samples, first, checksum)
-            t = ascending_us(header.name, np.arange(samples) / rate, 0)
-            valid = values != NO_SAMPLE
+            kept = Growing(header.name, t=((), np.int64), values=((1, 1), np.float32))
+            for k in range(0, samples, _AT_ONCE):
+                valid = k + np.flatnonzero(values[k : k + _AT_ONCE] != NO_SAMPLE)
+                kept.add(t=whole_us(header.name, valid / rate, 0), values=values[valid, None, None])
             truth: dict[str, NDArray[np.int64]] = {}
             scored = (0, 0)
             if foot == "left" and steps.exists():
@@ -76,8 +84,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
                 name=f"{header.stem} {foot}".strip(),
                 person=header.stem,
                 recorded=Frames(
-                    values[valid].astype(np.float32)[:, None, None],
-                    t[valid],
+                    kept.column("values"),
+                    ascending(header.name, kept.column("t"), 0),
                     unit="raw",
                     array=Array(1, 1, name="gaitndd foot"),
                 ),
@@ -181,20 +189,28 @@ def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
 
 def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.int16]:
     try:
-        data = path.read_bytes()
+        file = open_file(path)
     except FileNotFoundError:
         raise FormatError(f"{path.name}: named in the header, but not there") from None
-    if len(data) != 3 * ((samples + 1) // 2):
-        raise FormatError(
-            f"{path.name}: {len(data)} bytes; {samples} samples of format 212 are {3 * ((samples + 1) // 2)}"
-        )
-    values = format_212(data, path.name)[:samples]
+    with file:
+        size = os.fstat(file.fileno()).st_size
+        if size != 3 * ((samples + 1) // 2):
+            raise FormatError(
+                f"{path.name}: {size} bytes; {samples} samples of format 212 are {3 * ((samples + 1) // 2)}"
+            )
+        # A picture of one channel has 12 bytes.
+        unpacked(path.name, 12 * samples)
+        read = Growing(path.name, values=((), np.int16))
+        while data := file.read(3 * _AT_ONCE):
+            read.add(values=format_212(data, path.name))
+    values = np.asarray(read.column("values")[:samples], np.int16)
     expected = NO_SAMPLE if first == -32768 else first
     if values[0] != expected:
         raise FormatError(f"{path.name}: first value {values[0]}; the header says {first}")
     # In the header's checksum an invalid sample counts as -32768.
-    total = int(np.where(values == NO_SAMPLE, -32768, values).sum(dtype=np.int64))
-    if checksum not in {_int16(total), _int16(int(values.sum(dtype=np.int64)))}:
+    plain = int(values.sum(dtype=np.int64))
+    total = plain + (-32768 - NO_SAMPLE) * int(np.count_nonzero(values == NO_SAMPLE))
+    if checksum not in {_int16(total), _int16(plain)}:
         raise FormatError(f"{path.name}: samples sum to {_int16(total)} (16 bits); the header says {checksum}")
     return values
 

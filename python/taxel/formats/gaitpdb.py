@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
+from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending_us
+from taxel.formats.checks import ascending, whole_us
 from taxel.formats.layout import packaged
 from taxel.formats.trial import MARGIN_US, Trial
 from taxel.frames import Frames
@@ -67,12 +68,16 @@ def trials(path: str | Path) -> Iterator[Trial]:
         if match is None:
             raise FormatError(f"{file.name}: must be named such as GaCo02_01.txt")
         person = match[1]
-        values = text.numbers((line.split("\t") for line in text.lines(file)), file, 1, _COLUMNS)
-        t = ascending_us(file.name, values[:, 0], 1)
+        feet = ((8,), np.float32)
+        read = Growing(file.name, t=((), np.int64), left=feet, right=feet, totals=((2,), np.float64))
+        for line, rows in text.blocks((line.split("\t") for line in text.stream(file)), file, 1, _COLUMNS):
+            t = whole_us(file.name, rows[:, 0], line)
+            read.add(t=t, left=rows[:, 1:9], right=rows[:, 9:17], totals=rows[:, 17:])
+        t = ascending(file.name, read.column("t"))
         if len(t) < 2:
             raise FormatError(f"{file.name}: fewer than 2 lines: must have more")
-        for n, foot in enumerate(("left", "right")):
-            total = values[:, 17 + n]
+        totals = read.column("totals").T
+        for foot, total in zip(("left", "right"), totals, strict=True):
             samples = known[person, foot] if (person, foot) in known else contacts(total)
             if samples.size and samples.max() >= len(t):
                 raise FormatError(
@@ -87,9 +92,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
             yield Trial(
                 name=f"{file.name.split('.')[0]} {foot}",
                 person=person,
-                recorded=Frames(
-                    values[:, None, 1 + 8 * n : 9 + 8 * n], t, unit="N", array=places.array(8, foot_of, foot)
-                ),
+                recorded=Frames(read.column(foot).reshape(-1, 1, 8), t, unit="N", array=places.array(8, foot_of, foot)),
                 truth=truth,
                 source=_SOURCE,
                 foot=foot,
@@ -118,12 +121,14 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     array([[30, 90]])
     """
     total = arguments.floats("total", total)
-    # +1 above 50 N, -1 below 25 N, 0 between: the state is the last value other than 0.
-    state = (total > 50).astype(np.int64) - (total < 25)
-    last = np.maximum.accumulate(np.where(state != 0, np.arange(len(total)), -1))
-    loaded = (last >= 0) & (state[last] > 0)
-    edges = np.diff(loaded.astype(np.int64))
-    ups, downs = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
+    # Above 50 N a foot is loaded, below 25 N not, and between as before.
+    above = total > 50
+    known = np.flatnonzero(above | (total < 25))
+    loaded = above[known]
+    turns = np.flatnonzero(loaded[1:] != loaded[:-1]) + 1
+    if len(known) and known[0] > 0 and loaded[0]:
+        turns = np.append(0, turns)
+    ups, downs = known[turns[loaded[turns]]], known[turns[~loaded[turns]]]
     downs = downs[np.searchsorted(downs, ups[0], side="right") :] if len(ups) else downs[:0]
     n = min(len(ups), len(downs))
     stances = np.stack([ups[:n], downs[:n]], axis=1)

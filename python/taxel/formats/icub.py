@@ -12,6 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base import arguments
+from taxel._base.columns import Growing
+from taxel._base.header_table import HeaderTable
+from taxel._base.limits import unpacked
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
@@ -23,6 +26,8 @@ __all__ = ["FINGERS", "files", "trials"]
 #: Rows of the array, twelve taxels each.
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 _TAXELS = tuple(f"{finger}_{k}" for finger in FINGERS for k in range(1, 13))
+#: Bytes in memory of a grasp beside its values, at most.
+_GRASP = 1 << 14
 _JOINTS = tuple(f"joint{k}" for k in range(7, 16))
 
 
@@ -65,29 +70,31 @@ def trials(path: str | Path) -> Iterator[Trial]:
         raise FormatError(f"{place}: no table of grasps (OBJECT.csv.gz) in it")
     for file in paths:
         name = file.name.removesuffix(".gz").removesuffix(".csv")
-        grasps: dict[str, list[dict[str, str]]] = {}
-        for row in text.table(file, ["trial", "slice", *_JOINTS, *_TAXELS]):
-            grasps.setdefault(row["trial"], []).append(row)
-        for number, rows in grasps.items():
-            for k, row in enumerate(rows):
-                if text.number(row["slice"], file, int(row["line"]), "slice") != k:
-                    raise FormatError(f"{file.name}, line {row['line']}: slice is {row['slice']}, must be {k}")
-
-            def column(names: tuple[str, ...], rows: list[dict[str, str]] = rows, file: Path = file) -> np.ndarray:
-                return np.array([[text.number(r[n], file, int(r["line"]), n) for n in names] for r in rows])
-
-            raw, joints = column(_TAXELS), column(_JOINTS)
+        shapes = {"taxels": ((len(_TAXELS),), np.float32), "joints": ((len(_JOINTS),), np.float64)}
+        grasps: dict[str, Growing] = {}
+        for line, row in HeaderTable.stream(file.name, text.stream(file), ["trial", "slice", *_JOINTS, *_TAXELS]):
+            if row["trial"] not in grasps:
+                grasps[row["trial"]] = Growing(file.name, **shapes)
+                unpacked(file.name, _GRASP * len(grasps))
+            grasp = grasps[row["trial"]]
+            if text.number(row["slice"], file, line, "slice") != len(grasp):
+                raise FormatError(f"{file.name}, line {line}: slice is {row['slice']}, must be {len(grasp)}")
+            taxels, joints = (
+                text.numbers([[row[n] for n in names]], file, line, names) for names in (_TAXELS, _JOINTS)
+            )
+            grasp.add(taxels=255.0 - taxels, joints=joints)
+        for number, grasp in grasps.items():
             yield Trial(
                 f"{name}/{number}",
                 "",
                 Frames(
-                    255.0 - raw.reshape(len(rows), len(FINGERS), -1),
-                    np.arange(len(rows)),
+                    grasp.column("taxels").reshape(len(grasp), len(FINGERS), -1),
+                    np.arange(len(grasp)),
                     array=Array(len(FINGERS), 12, name="iCub hand"),
                 ),
                 {},
                 "",
-                series=dict(zip(_JOINTS, joints.T, strict=True)),
+                series=dict(zip(_JOINTS, grasp.column("joints").T, strict=True)),
                 about={"object": name},
                 timed=False,
             )

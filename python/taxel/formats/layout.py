@@ -8,7 +8,6 @@ docs/files.md.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base.arguments import finite, flag, mapping, several, shown, text, whole
+from taxel._base.documents import read_toml
 from taxel._base.files import beside, named
 from taxel._base.limits import VALUE
 from taxel._base.messages import first_line
@@ -188,15 +188,10 @@ class Layout:
 
         Raises
         ------
-        FormatError : not TOML, a key that is not known, or a value of another kind (names the key)
+        FormatError : not TOML, longer than 1 MiB, a key that is not known, or a value of another kind (names the key)
         OSError : the file cannot be read
         """
-        try:
-            document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise FormatError(f"{path}: not TOML: {first_line(error)}") from None
-        except RecursionError:
-            raise FormatError(f"{path}: nested too deeply") from None
+        document = read_toml(path)
         try:
             return cls(place=path, **_values(document))
         except (ProblemError, TypeError) as error:

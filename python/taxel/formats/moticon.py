@@ -8,17 +8,19 @@ manufacturer's step detection.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
+from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending_us
+from taxel.formats.checks import ascending, ascending_us, whole_us
 from taxel.formats.trial import MARGIN_US, Trial
 from taxel.frames import Frames
 
@@ -41,8 +43,7 @@ def files(path: Path) -> list[Path]:
 
 
 def _is_export(path: Path) -> bool:
-    with path.open("rb") as file:
-        head = file.read(4096)
+    head = text.first_bytes(path, 4096)
     return head.lstrip(b"\xef\xbb\xbf").startswith(b"#") and b"Sensor insoles" in head
 
 
@@ -72,45 +73,40 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
 
 def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Iterator[Trial]:
-    content = text.lines(file)
-    head = next((k for k, line in enumerate(content) if not line.startswith("#")), len(content))
-    if head == 0 or head == len(content):
+    content = text.stream(file)
+    above, begin = text.before(content, lambda line: not line.startswith("#"))
+    head = len(above)
+    if head == 0 or begin is None:
         raise FormatError(f"{file.name}, line {head + 1}: must hold lines of #, column names the last, then rows")
-    names = content[head - 1].lstrip("# ").split("\t")
-    about = dict(line[2:].split(": ", 1) for line in content[: head - 1] if ": " in line)
-    rows = [line.split("\t") for line in content[head:]]
+    names = above[-1].lstrip("# ").split("\t")
+    about = dict(line[2:].split(": ", 1) for line in above[:-1] if ": " in line)
     first = head + 1
-    for k, row in enumerate(rows):
-        if len(row) != len(names):
-            raise FormatError(f"{file.name}, line {first + k}: {len(row)} cells, must have {len(names)}")
     at = _column(names, r"time\b.*", file, head)
-    seconds = text.numbers([[row[at]] for row in rows], file, first, ["time"])[:, 0]
-    t = ascending_us(file.name, seconds, first)
-    marked = _markers(rows, names, t, file, first)
-    for foot in ("left", "right"):
-        pressures = [k for k, name in enumerate(names) if re.match(rf"{foot} pressure \d+", name)]
-        if not pressures:
-            raise FormatError(f"{file.name}, line {head}: no column '{foot} pressure 1'")
-        total = _column(names, rf"{foot} total force.*", file, head)
-        chosen = [*pressures, total]
-        there = []
-        for k, row in enumerate(rows):
-            empty = sum(not row[c].strip() for c in chosen)
-            if empty == 0:
-                there.append(k)
-            elif empty < len(chosen):
-                c = next(c for c in chosen if not row[c].strip())
-                raise FormatError(
-                    f"{file.name}, line {first + k}: {names[c]} is empty, other cells of that foot are not"
-                )
-        labels = [names[c] for c in chosen]
-        values = np.array(
-            [text.numbers([[rows[k][c] for c in chosen]], file, first + k, labels)[0] for k in there]
-        ).reshape(len(there), len(chosen))
+    chosen = {foot: _columns(names, foot, file, head) for foot in ("left", "right")}
+    t = Growing(file.name, t=((), np.int64))
+    read = {
+        foot: Growing(file.name, t=((), np.int64), values=((len(columns) - 1,), np.float32), total=((), np.float64))
+        for foot, columns in chosen.items()
+    }
+    marked: dict[tuple[str, str], list[int]] = {place: [] for place in MARKERS.values()}
+    table = (line.split("\t") for line in chain([begin], content))
+    for line, rows in text.grouped(table, file, first, len(names)):
+        seconds = text.numbers([[row[at]] for row in rows], file, line, ["time"])[:, 0]
+        times = whole_us(file.name, seconds, line)
+        t.add(t=times)
+        _mark(marked, rows, names, times, file, line)
+        for foot, columns in chosen.items():
+            there = [k for k, row in enumerate(rows) if _is_there(row, columns, names, file, line + k)]
+            labels, cells = [names[c] for c in columns], [[rows[k][c] for c in columns] for k in there]
+            values = _numbers(cells, file, [line + k for k in there], labels)
+            read[foot].add(t=times[there], values=values[:, :-1], total=values[:, -1])
+    ascending(file.name, t.column("t"), first)
+    for foot, columns in chosen.items():
+        own = read[foot]
         truth = {
             event: ascending_us(f"steps.csv, {file.stem}", np.array(steps[foot, event]))
             if steps
-            else marked[foot, event]
+            else np.array(marked[foot, event], np.int64)
             for event in ("contact", "foot_off")
         }
         ends = [times for times in truth.values() if len(times)]
@@ -118,10 +114,10 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             name=f"{file.stem} {foot}",
             person=about.get("Sensor insoles", "moticon"),
             recorded=Frames(
-                values[:, None, :-1],
-                t[there],
+                own.column("values").reshape(len(own), 1, -1),
+                own.column("t"),
                 unit="N/cm2",
-                array=Array(1, len(pressures), name="Moticon insole"),
+                array=Array(1, len(columns) - 1, name="Moticon insole"),
             ),
             truth=truth,
             source=_SOURCE,
@@ -129,9 +125,9 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             scored=(min(int(e[0]) for e in ends) - MARGIN_US, max(int(e[-1]) for e in ends) + MARGIN_US)
             if ends
             else (0, 0),
-            series={"total": values[:, -1]},
+            series={"total": own.column("total")},
             about=about,
-            unread=tuple(name for k, name in enumerate(names) if k not in chosen and name.startswith(f"{foot} ")),
+            unread=tuple(name for k, name in enumerate(names) if k not in columns and name.startswith(f"{foot} ")),
         )
 
 
@@ -142,10 +138,39 @@ def _column(names: list[str], pattern: str, file: Path, line: int) -> int:
     raise FormatError(f"{file.name}, line {line}: no column that matches {pattern!r}")
 
 
-def _markers(
-    rows: list[list[str]], names: list[str], t: NDArray[np.int64], file: Path, first: int
-) -> dict[tuple[str, str], NDArray[np.int64]]:
-    by_place: dict[tuple[str, str], list[int]] = {place: [] for place in MARKERS.values()}
+def _columns(names: list[str], foot: str, file: Path, line: int) -> list[int]:
+    """Return which columns are the pressures and, last, the total force of a foot."""
+    pressures = [k for k, name in enumerate(names) if re.match(rf"{foot} pressure \d+", name)]
+    if not pressures:
+        raise FormatError(f"{file.name}, line {line}: no column '{foot} pressure 1'")
+    return [*pressures, _column(names, rf"{foot} total force.*", file, line)]
+
+
+def _is_there(row: Sequence[str], columns: list[int], names: list[str], file: Path, line: int) -> bool:
+    """Return whether a foot has values in a row; a row that has some of them is an error."""
+    empty = [c for c in columns if not row[c].strip()]
+    if empty and len(empty) < len(columns):
+        raise FormatError(f"{file.name}, line {line}: {names[empty[0]]} is empty, other cells of that foot are not")
+    return not empty
+
+
+def _numbers(cells: list[list[str]], file: Path, lines: list[int], labels: list[str]) -> NDArray[np.float64]:
+    """Return the numbers of rows that have values; where one is none, the row is read by itself to name its line."""
+    try:
+        return text.numbers(cells, file, 0, labels)
+    except FormatError:
+        return np.concatenate([text.numbers([row], file, at, labels) for row, at in zip(cells, lines, strict=True)])
+
+
+def _mark(
+    marked: dict[tuple[str, str], list[int]],
+    rows: Sequence[Sequence[str]],
+    names: list[str],
+    t: NDArray[np.int64],
+    file: Path,
+    first: int,
+) -> None:
+    """Add the markers of some rows."""
     columns = [k for k, name in enumerate(names) if re.match(r"(left|right) steps", name)]
     for k, row in enumerate(rows):
         for c in columns:
@@ -153,8 +178,7 @@ def _markers(
                 code = int(text.number(row[c], file, first + k, names[c]))
                 if code not in MARKERS:
                     raise FormatError(f"{file.name}, line {first + k}: marker {code}; must be one of {sorted(MARKERS)}")
-                by_place[MARKERS[code]].append(int(t[k]))
-    return {place: np.array(times, np.int64) for place, times in by_place.items()}
+                marked[MARKERS[code]].append(int(t[k]))
 
 
 def _steps_table(path: Path) -> dict[str, dict[tuple[str, str], list[float]]]:

@@ -9,15 +9,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
+from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending_us
+from taxel.formats.checks import ascending, whole_us
 from taxel.formats.trial import MARGIN_US, Trial
 from taxel.frames import Frames
 
@@ -33,8 +35,7 @@ def files(path: Path) -> list[Path]:
 
 
 def _is_export(path: Path) -> bool:
-    with path.open("rb") as file:
-        return b"pressure values" in file.read(65_536)
+    return b"pressure values" in text.first_bytes(path, 65_536)
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -60,11 +61,12 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
 
 def _read(file: Path) -> Iterator[Trial]:
-    content = text.lines(file)
-    head = next((k for k, line in enumerate(content) if line.startswith("time[secs]")), None)
-    if head is None:
+    content = text.stream(file)
+    before, columns = text.before(content, lambda line: line.startswith("time[secs]"))
+    head = len(before)
+    if columns is None:
         raise FormatError(f"{file.name}: no line of column names (time[secs] 1 2 ...)")
-    header = "\n".join(content[:head])
+    header = "\n".join(before)
     rate = re.search(r"scanning rate\s*\[Hz\]:\s*(\S+)", header)
     if rate is None:
         raise FormatError(f"{file.name}, line {head + 1}: no 'scanning rate [Hz]' before it")
@@ -72,34 +74,37 @@ def _read(file: Path) -> Iterator[Trial]:
     if hertz <= 0:
         raise FormatError(f"{file.name}: scanning rate {hertz:g} Hz; must be above 0")
     unit = re.search(r"pressure values in\s+(\S+)", header)
-    names = content[head].split()
+    names = columns.split()
     begins = [k for k, name in enumerate(names) if name == "1"]
     if len(begins) != 2:
         raise FormatError(
             f"{file.name}, line {head + 1}: numbers begin at 1 {len(begins)} times; two insoles begin twice"
         )
-    rows = (line.split() for line in content[head + 1 :] if line.strip())
-    values = text.numbers(rows, file, head + 2, names)
-    t = ascending_us(file.name, values[:, 0], head + 2)
-    steps = np.diff(t)
-    off = np.flatnonzero(np.abs(steps - 1e6 / hertz) > 0.25e6 / hertz)
-    if len(off):
+    feet = {"left": slice(begins[0], begins[1]), "right": slice(begins[1], len(names))}
+    shapes: dict[str, Any] = {foot: ((len(names[part]),), np.float32) for foot, part in feet.items()}
+    read = Growing(file.name, t=((), np.int64), totals=((2,), np.float64), **shapes)
+    for line, values in text.blocks((line.split() for line in content if line.strip()), file, head + 2, names):
+        pressures = {foot: values[:, part] for foot, part in feet.items()}
+        totals = np.stack([pressure.sum(axis=1) for pressure in pressures.values()], axis=1)
+        read.add(t=whole_us(file.name, values[:, 0], line), totals=totals, **pressures)
+    t = ascending(file.name, read.column("t"), head + 2)
+    far = np.flatnonzero(np.abs((t[1:] - t[:-1]) - 1e6 / hertz) > 0.25e6 / hertz)
+    if len(far):
+        k = int(far[0])
         raise FormatError(
-            f"{file.name}, line {head + 3 + off[0]}: {steps[off[0]]} us after the line before, at {hertz:g} Hz"
+            f"{file.name}, line {head + 3 + k}: {t[k + 1] - t[k]} us after the line before, at {hertz:g} Hz"
         )
-    for foot, begin, end in (("left", begins[0], begins[1]), ("right", begins[1], len(names))):
-        pressure = values[:, begin:end]
-        total = pressure.sum(axis=1)
+    for foot, total in zip(feet, read.column("totals").T, strict=True):
         stances = contacts(total)
         truth = {"contact": t[stances[:, 0]], "foot_off": t[stances[:, 1]]}
         yield Trial(
             name=f"{file.stem} {foot}",
             person=file.stem,
             recorded=Frames(
-                pressure[:, None, :],
+                (pressure := read.column(foot)).reshape(len(t), 1, -1),
                 t,
                 unit=unit[1] if unit else "kPa",
-                array=Array(1, end - begin, name="pedar insole"),
+                array=Array(1, pressure.shape[1], name="pedar insole"),
             ),
             truth=truth,
             source=_SOURCE,
@@ -129,7 +134,7 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     array([[2, 5]])
     """
     total = arguments.floats("total", total)
-    loaded = (total >= 0.1 * total.max()).astype(np.int64) if len(total) else np.zeros(0, np.int64)
+    loaded = (total >= 0.1 * total.max()).astype(np.int8) if len(total) else np.zeros(0, np.int8)
     edges = np.diff(loaded)
     ups, downs = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
     downs = downs[np.searchsorted(downs, ups[0]) :] if len(ups) else downs[:0]

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
-from taxel._base.limits import TIME_US, VALUE, unpacked
+from taxel._base.columns import Growing
+from taxel._base.limits import TIME_US, VALUE
 from taxel._base.number_text import refuse_digits
 from taxel._core import FormatError
 from taxel.array import Array
@@ -47,10 +50,7 @@ def files(path: Path) -> list[Path]:
 
 
 def _is_export(path: Path) -> bool:
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        return file.read(64).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(_BEGINS)
+    return text.first_bytes(path, 64).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(_BEGINS)
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -82,11 +82,11 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
 
 def _read(file: Path) -> Trial:
-    content = text.lines(file)
-    begin = next((k for k, line in enumerate(content) if line.rstrip(", \t") == "ASCII_DATA @@"), None)
-    if begin is None:
+    content = text.stream(file)
+    above, begins = text.before(content, lambda line: line.rstrip(", \t") == "ASCII_DATA @@")
+    if begins is None:
         raise FormatError(f"{file.name}: no line ASCII_DATA @@ after the header")
-    header = _Header(file, content[:begin])
+    header = _Header(file, above)
     if header.text("DATA_TYPE") != "MOVIE":
         raise FormatError(
             f"{file.name}, line {header.line('DATA_TYPE')}: DATA_TYPE is "
@@ -97,32 +97,34 @@ def _read(file: Path) -> Trial:
     period, unit = header.positive("SECONDS_PER_FRAME"), header.text("UNITS")
     unit = _UNITS.get(unit.lower(), unit)
     sensor(f"{file.name}, line {header.line('ROWS')}", Array(rows, columns))
-    numbers, places, stated = _frames(file, content, begin + 1, rows)
-    if not numbers:
-        raise FormatError(f"{file.name}, line {begin + 1}: no frame after it")
-    t = _times(file, numbers, period, places, stated)
-    unpacked(file.name, 4 * len(numbers) * rows * columns)
     exists: NDArray[np.bool_] | None = None
-    values = np.zeros((len(numbers), rows, columns), np.float32)
-    sums = np.full(len(numbers), np.nan)
-    for k, at in enumerate(places):
-        cells = _cells(file, content[at + 1 : at + 1 + rows], at + 2, columns)
+    frames = list[_Frame]()
+    read = Growing(file.name, values=((rows, columns), np.float32), sums=((), np.float64))
+    for frame, lines in _frames(file, content, len(above) + 2, rows):
+        cells = _cells(file, lines, frame.line + 1, columns)
         there = cells != "B"
         if exists is None:
             exists = there
         elif not np.array_equal(there, exists):
             row, column = np.argwhere(there != exists)[0]
             raise FormatError(
-                f"{file.name}, line {at + 2 + row}: cell {column + 1} is {arguments.shown(str(cells[row, column]))}; "
-                f"in frame {numbers[0]} it is {'a number' if exists[row, column] else 'B'}"
+                f"{file.name}, line {frame.line + 1 + row}: cell {column + 1} is "
+                f"{arguments.shown(str(cells[row, column]))}; in frame {frames[0].number} it is "
+                f"{'a number' if exists[row, column] else 'B'}"
             )
-        values[k][there] = _numbers(file, cells, there, at + 2)
-        match = _RAW_SUM.search(content[at])
+        values, raw_sum = np.zeros((rows, columns), np.float32), np.nan
+        values[there] = _numbers(file, cells, there, frame.line + 1)
+        match = _RAW_SUM.search(frame.text)
         if match is not None:
-            sums[k] = text.number(match[1], file, at + 1, "Raw Sum")
-        made = values[k].sum(dtype=np.float64)
-        if unit == "counts" and not np.isnan(sums[k]) and sums[k] != made:
-            raise FormatError(f"{file.name}, line {at + 1}: Raw Sum is {sums[k]:g}; the cells make {made:g}")
+            raw_sum = text.number(match[1], file, frame.line, "Raw Sum")
+        made = values.sum(dtype=np.float64)
+        if unit == "counts" and not np.isnan(raw_sum) and raw_sum != made:
+            raise FormatError(f"{file.name}, line {frame.line}: Raw Sum is {raw_sum:g}; the cells make {made:g}")
+        frames.append(replace(frame, text=""))
+        read.add(values=values[None], sums=[raw_sum])
+    if not frames:
+        raise FormatError(f"{file.name}, line {len(above) + 1}: no frame after it")
+    t, sums = _times(file, frames, period), read.column("sums")
     about: dict[str, str | float] = {**header.values, "row_spacing_mm": down, "column_spacing_mm": across}
     array = Array(
         rows,
@@ -134,7 +136,7 @@ def _read(file: Path) -> Trial:
     return Trial(
         name=file.stem,
         person=file.stem,
-        recorded=Frames(values, t, unit=unit, array=array),
+        recorded=Frames(read.column("values"), t, unit=unit, array=array),
         truth={},
         source="",
         series={"raw_sum": sums} if np.isfinite(sums).all() else {},
@@ -195,58 +197,60 @@ class _Header:
 _NEEDED = {"DATA_TYPE", "ROWS", "COLS", "ROW_SPACING", "COL_SPACING", "SECONDS_PER_FRAME", "UNITS"}
 
 
-def _frames(file: Path, content: Sequence[str], begin: int, rows: int) -> tuple[list[int], list[int], list[str]]:
-    """Return each frame's number, the index of its line, and the time that it states ("" if none)."""
-    numbers: list[int] = []
-    places: list[int] = []
-    stated: list[str] = []
-    k, ended = begin, False
-    while k < len(content):
-        line = content[k].strip()
+@dataclass(frozen=True)
+class _Frame:
+    """The line that begins a frame: its number in the file, its text, the frame's number and time ("" if none)."""
+
+    line: int
+    text: str
+    number: int
+    time: str
+
+
+def _frames(file: Path, content: Iterator[str], begin: int, rows: int) -> Iterator[tuple[_Frame, list[str]]]:
+    """Yield each frame with its lines of cells; `begin` is the number of the first line."""
+    at, before = begin, 0
+    for whole in content:
+        line = whole.strip()
         if not line.strip(","):
-            k += 1
+            at += 1
             continue
         if line.rstrip(",") == "@@":
-            ended = True
-            break
+            return
         match = _FRAME.fullmatch(line)
         if match is None or len(match[1]) > 15:
-            raise FormatError(f"{file.name}, line {k + 1}: {arguments.shown(line)}; must begin a frame, as 'Frame 7'")
+            raise FormatError(f"{file.name}, line {at}: {arguments.shown(line)}; must begin a frame, as 'Frame 7'")
         number = int(match[1])
-        if numbers and number <= numbers[-1]:
-            raise FormatError(f"{file.name}, line {k + 1}: frame {number} after frame {numbers[-1]}")
-        if k + rows >= len(content):
-            raise FormatError(f"{file.name}, line {len(content)}: ends within frame {number}; the file was cut short")
-        numbers.append(number)
-        places.append(k)
-        stated.append(match[2] or "")
-        k += 1 + rows
-    if not ended:
-        raise FormatError(f"{file.name}, line {len(content)}: ends without @@; the file was cut short")
-    return numbers, places, stated
+        if before and number <= before:
+            raise FormatError(f"{file.name}, line {at}: frame {number} after frame {before}")
+        lines = list(islice(content, rows))
+        if len(lines) < rows:
+            raise FormatError(
+                f"{file.name}, line {at + len(lines)}: ends within frame {number}; the file was cut short"
+            )
+        yield _Frame(at, whole, number, match[2] or ""), lines
+        at, before = at + 1 + rows, number
+    raise FormatError(f"{file.name}, line {at - 1}: ends without @@; the file was cut short")
 
 
-def _times(
-    file: Path, numbers: Sequence[int], period: float, places: Sequence[int], stated: Sequence[str]
-) -> NDArray[np.int64]:
+def _times(file: Path, frames: Sequence[_Frame], period: float) -> NDArray[np.int64]:
     """Return the frames' times, us: those that they state if all do, else times computed from their numbers.
 
     The two differ: a movie of 0.1 s a frame states steps of 0.1 and 0.11 s.
     """
-    if all(stated):
-        pairs = zip(stated, places, strict=True)
-        seconds = np.array([text.number(time, file, at + 1, "time") for time, at in pairs])
+    if all(frame.time for frame in frames):
+        seconds = np.array([text.number(frame.time, file, frame.line, "time") for frame in frames])
     else:
-        seconds = (np.array(numbers, np.float64) - 1) * period
+        seconds = (np.array([frame.number for frame in frames], np.float64) - 1) * period
     far = np.flatnonzero(np.abs(seconds) * 1e6 > TIME_US)
     if len(far):
         k = int(far[0])
-        raise FormatError(f"{file.name}, line {places[k] + 1}: at {seconds[k]:g} s; must lie within 142 years of 0")
+        raise FormatError(f"{file.name}, line {frames[k].line}: at {seconds[k]:g} s; must lie within 142 years of 0")
     t = np.rint(seconds * 1e6).astype(np.int64)
     back = np.flatnonzero(np.diff(t) <= 0)
     if len(back):
         k = int(back[0])
-        raise FormatError(f"{file.name}, line {places[k + 1] + 1}: at {t[k + 1]} us, not after {t[k]} us")
+        raise FormatError(f"{file.name}, line {frames[k + 1].line}: at {t[k + 1]} us, not after {t[k]} us")
     return np.asarray(t)
 
 

@@ -5,41 +5,130 @@ from __future__ import annotations
 import gzip
 import re
 import zlib
-from collections.abc import Iterable, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base import limits
 from taxel._base.arguments import shown
+from taxel._base.columns import Growing
+from taxel._base.files import open_file
 from taxel._base.header_table import HeaderTable
-from taxel._base.limits import TEXT, VALUE
+from taxel._base.limits import LINE, TEXT, VALUE, unpacked
 from taxel._base.number_text import float_of, refuse_digits
 from taxel._core import FormatError
 
-__all__ = ["beginning", "head", "lines", "number", "numbers", "table"]
+__all__ = [
+    "before",
+    "beginning",
+    "blocks",
+    "first_bytes",
+    "grouped",
+    "head",
+    "lines",
+    "number",
+    "numbers",
+    "stream",
+    "table",
+]
 
-#: Number of rows of a table that are in memory as cells of text at once.
-_AT_ONCE = 4096
+#: Number of cells of a table, and of lines of a text, that are in memory as texts at once.
+_CELLS, _LINES = 1 << 17, 4096
+#: Bytes of a text that are read at once.
+_PIECE = 1 << 20
+#: Bytes in memory of a line of text, beside its characters.
+_PER_LINE = 64
+#: The most bytes that a byte of a gzip file unpacks to.
+_PACKED = 1032
+#: Characters of the lines before the data of a file.
+_HEAD = 1 << 20
 #: Bytes of the beginning of a text.
 _BEGINNING = 1 << 16
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
+_UTF_8 = b"\xef\xbb\xbf"
 
 
 def lines(path: Path) -> list[str]:
-    """Read the lines of a text file, compressed by gzip or not, without line ends.
+    """Read the lines of a text file, compressed by gzip or not, without line ends; `stream` holds none of them.
 
     The text is UTF-8 with or without BOM, or else Latin-1, which instruments of the 1990s write.
 
     Raises
     ------
-    FormatError : not a text, or a damaged gzip file
+    FormatError : not a text, a damaged gzip file, more than may be read, or no file but a pipe, a socket or a device
     """
-    data = _bytes(path, TEXT + 1)
-    if len(data) > TEXT:
-        raise FormatError(f"{path.name}: more than {TEXT} bytes of text; at most that are read")
-    return _lines(path, data)
+    content, size = [], 0
+    for line in stream(path):
+        content.append(line)
+        size += len(line) + _PER_LINE
+        if len(content) % _LINES == 0:
+            unpacked(path.name, size)
+    return content
+
+
+def stream(path: Path) -> Iterator[str]:
+    """Yield the lines of a text file as `lines` does, a piece of the file after the other.
+
+    Raises
+    ------
+    FormatError : as of `lines`, or a line of more than 4 MiB
+    """
+    rest, number, begin = b"", 1, 0
+    for piece in _pieces(path):
+        if not begin and not rest and piece.startswith(_UTF_8):
+            piece, begin = piece[len(_UTF_8) :], len(_UTF_8)  # noqa: PLW2901
+        data = rest + piece
+        # A carriage return at the end of a piece may be half of a line end.
+        end = max(data.rfind(b"\n"), data.rfind(b"\r", 0, len(data) - 1)) + 1
+        if len(data) - end > LINE:
+            raise FormatError(f"{path.name}, line {number}: more than {LINE} bytes; at most that are read")
+        found = _lines(path, data[:end], begin)
+        yield from found
+        rest, number, begin = data[end:], number + len(found), begin + end
+    yield from _lines(path, rest, begin)
+
+
+def _pieces(path: Path) -> Iterator[bytes]:
+    """Yield the bytes of a text file, unpacked, as far as they are not too many."""
+    most = max(TEXT, limits.given() or 0)
+    # A file that may unpack to too much is unpacked before any of it is read as numbers, which takes far longer.
+    if path.suffix == ".gz" and path.stat().st_size * _PACKED > most:
+        for _ in _up_to(path, most):
+            pass
+    yield from _up_to(path, most)
+
+
+def _up_to(path: Path, most: int) -> Iterator[bytes]:
+    total = 0
+    with _opened(path) as file:
+        while piece := file.read(_PIECE):
+            total += len(piece)
+            if total > most:
+                raise FormatError(
+                    f"{path.name}: {total} bytes of text or more; at most {most} are read: --limit BYTES (limit=) says "
+                    "how many may be"
+                )
+            yield piece
+
+
+def before(content: Iterator[str], ends: Callable[[str], bool]) -> tuple[list[str], str | None]:
+    """Take the lines before the first one that `ends` returns true for, and that one; the others are left.
+
+    None stands for that one where no line of the first 1 MiB is.
+    """
+    taken, left = list[str](), _HEAD
+    for line in content:
+        if ends(line):
+            return taken, line
+        left -= len(line) + 1
+        if left < 0:
+            break
+        taken.append(line)
+    return taken, None
 
 
 def head(path: Path) -> str:
@@ -49,7 +138,7 @@ def head(path: Path) -> str:
     ------
     FormatError : not a text, or a damaged gzip file
     """
-    return (_lines(path, _bytes(path, _BEGINNING).partition(b"\n")[0]) or [""])[0]
+    return (_lines(path, _bytes(path, _BEGINNING).removeprefix(_UTF_8).partition(b"\n")[0]) or [""])[0]
 
 
 def beginning(path: Path) -> list[str]:
@@ -59,29 +148,53 @@ def beginning(path: Path) -> list[str]:
     ------
     FormatError : not a text, or a damaged gzip file
     """
-    data = _bytes(path, _BEGINNING)
+    data = _bytes(path, _BEGINNING).removeprefix(_UTF_8)
     return _lines(path, data if len(data) < _BEGINNING else data[: data.rfind(b"\n") + 1])
 
 
+def first_bytes(path: Path, count: int) -> bytes:
+    """Read the beginning of a file; nothing of what is no file, as a folder may hold pipes, sockets and folders too."""
+    try:
+        with open_file(path) as file:
+            return file.read(count)
+    except (FormatError, IsADirectoryError):
+        return b""
+
+
 def _bytes(path: Path, most: int) -> bytes:
-    try:
-        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
-            return file.read(most)
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise FormatError(f"{path.name}: not a whole gzip file ({error}); get it again") from None
+    with _opened(path) as file:
+        return file.read(most)
 
 
-def _lines(path: Path, data: bytes) -> list[str]:
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    """Open a text file, to be read unpacked."""
+    with open_file(path) as raw:
+        try:
+            yield cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if path.suffix == ".gz" else raw
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise FormatError(f"{path.name}: not a whole gzip file ({error}); get it again") from None
+
+
+def _lines(path: Path, data: bytes, begin: int = 0) -> list[str]:
+    """Return the lines of bytes that begin at an offset of a file."""
     if b"\0" in data:
-        is_utf_16 = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        is_utf_16 = not begin and data.startswith((b"\xff\xfe", b"\xfe\xff"))
         why = "it is in UTF-16: save it as UTF-8" if is_utf_16 else "this is not a text file"
-        raise FormatError(f"{path.name}, byte {data.index(0)}: a zero byte; {why}")
+        raise FormatError(f"{path.name}, byte {begin + data.index(0)}: a zero byte; {why}")
+    ends = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     try:
-        text = data.decode("utf-8-sig")
+        content = ends.decode().split("\n")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    content = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        content = [_decoded(line) for line in ends.split(b"\n")]
     return content[:-1] if content and not content[-1] else content
+
+
+def _decoded(line: bytes) -> str:
+    try:
+        return line.decode()
+    except UnicodeDecodeError:
+        return line.decode("latin-1")
 
 
 def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = False) -> float:
@@ -128,11 +241,50 @@ def numbers(
     ------
     FormatError : a row of another length, or a cell that is not a number (names file, line and column)
     """
-    rows, blocks, line = iter(rows), [np.empty((0, len(names)))], first_line
-    while block := list(islice(rows, _AT_ONCE)):
-        blocks.append(_block(block, path, line, names, missing, unmarked))
-        line += len(block)
-    return np.concatenate(blocks)
+    values = Growing(path.name, values=((len(names),), np.float64))
+    for _, block in blocks(rows, path, first_line, names, missing, unmarked=unmarked):
+        values.add(values=block)
+    return np.array(values.column("values"))
+
+
+def blocks(
+    rows: Iterable[Sequence[str]],
+    path: Path,
+    first_line: int,
+    names: Sequence[str],
+    missing: frozenset[str] = frozenset(),
+    *,
+    unmarked: bool = False,
+) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """Yield the numbers of a table as `numbers` returns them, some rows after the others, each with its first line.
+
+    Raises
+    ------
+    FormatError : as of `numbers`
+    """
+    for line, some in grouped(rows, path, first_line, len(names)):
+        yield line, _block(some, path, line, names, missing, unmarked)
+
+
+def grouped(
+    rows: Iterable[Sequence[str]], path: Path, first_line: int, columns: int
+) -> Iterator[tuple[int, list[Sequence[str]]]]:
+    """Yield the rows of a table some after the others, each time with the number of the first line.
+
+    Raises
+    ------
+    FormatError : a row of another number of cells
+    """
+    line, some = first_line, list[Sequence[str]]()
+    for row in rows:
+        if len(row) != columns:
+            raise FormatError(f"{path.name}, line {line + len(some)}: {len(row)} cells, must have {columns}")
+        some.append(row)
+        if len(some) * columns >= _CELLS:
+            yield line, some
+            line, some = line + len(some), []
+    if some:
+        yield line, some
 
 
 def _block(
@@ -144,9 +296,6 @@ def _block(
     unmarked: bool,
 ) -> NDArray[np.float64]:
     columns = len(names)
-    for k, row in enumerate(rows):
-        if len(row) != columns:
-            raise FormatError(f"{path.name}, line {first_line + k}: {len(row)} cells, must have {columns}")
     absent = np.array([[cell in missing for cell in row] for row in rows]) if missing else None
     if missing:
         rows = [["0" if cell in missing else cell for cell in row] for row in rows]

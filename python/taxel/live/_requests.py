@@ -12,7 +12,6 @@ import struct
 import subprocess
 import sys
 import threading
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.documents import read_toml
 from taxel._base.files import whole_file
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -373,11 +373,8 @@ class RequestHandler:
     def read_presets(self) -> tuple[Path, dict[str, dict[str, object]]]:
         """Return the file of the user's presets, and the presets: value by register name."""
         place = presets_path()
-        try:
-            with _reasons():
-                own = tomllib.loads(place.read_text("utf-8")) if place.exists() else {}
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ProblemError(f"{place}: no table of presets: {error}") from None
+        with _reasons():
+            own = read_toml(place) if place.exists() else {}
         return place, {name: values for name, values in own.items() if isinstance(values, dict)}
 
     def write_presets(self, presets: Mapping[str, Mapping[str, object]]) -> None:

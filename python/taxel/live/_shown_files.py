@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.files import open_file
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places, names_beside
 from taxel.frames import Frames
@@ -168,7 +169,7 @@ class ShownFiles:
         size = path.stat().st_size
         if path.suffix.lower() not in _TEXTS or size <= _LARGE:
             return None
-        with path.open("rb") as file:
+        with open_file(path) as file:
             head = file.read(_BEGINNING)
         place = self._temporary() / path.name
         place.write_bytes(head[: head.rfind(b"\n") + 1])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.files import open_file
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.recording.contents import UNKNOWN, Contents, once, together
@@ -71,7 +72,7 @@ def _verdict(of: Contents) -> Verdict | None:
 
 def _ends(path: Path) -> bytes:
     """Return a file's size and its first and last bytes, in which times and checksums stand: a copy has the same."""
-    with path.open("rb") as file:
+    with open_file(path) as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(size - _END, 0))
         last = file.read(_END)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from taxel import _core
+from taxel._base import limits
 from taxel._base.arguments import flag, path, shown, text
 from taxel._base.files import whole_file, write_whole
 from taxel._base.messages import counted
@@ -149,7 +150,7 @@ def _read_otherwise(part: Path, of: Contents) -> list[str]:
         return []
     events = of.events
     assert events is not None  # it has events
-    again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)
+    again = Events._from_parts(_core.RecordingReader(part, limits.memory(None)).decode("direct")[0], events.array)
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
         return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]
     return ["the order of times that step back by more than 0.1 s"] * (not np.array_equal(again.t, events.t))

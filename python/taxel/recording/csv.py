@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
-from taxel._base.columns import frozen
-from taxel._base.limits import COLUMNS, TAXELS, VALUE, unpacked
+from taxel._base.columns import Growing
+from taxel._base.files import open_file
+from taxel._base.limits import COLUMNS, LINE, TAXELS, VALUE
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -37,7 +38,7 @@ _MORE = ("intensity", "repaired")
 _TAXEL = re.compile(r"x([0-9]{1,5})y([0-9]{1,5})")
 #: Columns of events: the least and the largest number in the file, and the type in memory. -1 is an absent intensity.
 _LIMITS: dict[str, tuple[int, int, type[Any]]] = {
-    "p": (0, 1, np.uint8),
+    "p": (0, 1, np.bool_),
     "x": (0, 65_535, np.uint16),
     "y": (0, 65_535, np.uint16),
     "intensity": (-1, 65_535, np.uint16),
@@ -45,6 +46,8 @@ _LIMITS: dict[str, tuple[int, int, type[Any]]] = {
 }
 #: Number of pictures that are written at once.
 _PICTURES = 4096
+#: Bytes of the first line, whose columns are counted for the error.
+_HEAD = 1 << 26
 #: Bytes of a table that are read at once.
 _AT_ONCE = 1 << 22
 #: The number of a table's line, and whole lines from there on.
@@ -112,20 +115,23 @@ def check_head(path: Path) -> None:
     ------
     FormatError : another header
     """
-    with path.open("rb") as file:
+    with open_file(path) as file:
         _head(path, file)
 
 
 def _head(path: Path, file: BinaryIO) -> list[str]:
-    return _names(path, file.readline().removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n"))
+    head = file.readline(_HEAD + 1)
+    if len(head) > _HEAD:
+        raise FormatError(f"{path}, line 1: more than {_HEAD} bytes; at most that are read")
+    return _names(path, head.removeprefix(b"\xef\xbb\xbf").rstrip(b"\r\n"))
 
 
 def _table(path: Path, array: Array | None) -> Events | Frames:
-    with path.open("rb") as file:
+    with open_file(path) as file:
         names = _head(path, file)
         if tuple(names[:4]) == _EVENTS:
-            return _csv_events(path, names, _blocks(file), array)
-        return _csv_frames(path, names, _blocks(file), array)
+            return _csv_events(path, names, _blocks(path, file), array)
+        return _csv_frames(path, names, _blocks(path, file), array)
 
 
 def _names(path: Path, head: bytes) -> list[str]:
@@ -159,17 +165,22 @@ def _names(path: Path, head: bytes) -> list[str]:
     return names
 
 
-def _blocks(file: BinaryIO) -> Iterator[_Block]:
+def _blocks(path: Path, file: BinaryIO) -> Iterator[_Block]:
     """Yield whole lines below the header, and the number of the first of them: a large table is not in memory twice."""
     first = 2
     while block := file.read(_AT_ONCE):
-        block += file.readline()
+        block += (end := file.readline(LINE + 1))
+        if len(end) > LINE:
+            line = first + block.count(b"\n")
+            raise FormatError(f"{path}, line {line}: more than {LINE} bytes; at most that are read")
         yield first, block.replace(b"\r\n", b"\n")
         first += block.count(b"\n")
 
 
 def _csv_events(path: Path, names: list[str], blocks: Iterator[_Block], array: Array | None) -> Events:
-    parts: dict[str, list[NDArray[Any]]] = {name: [] for name in (*names, "present")}
+    kinds = {name: _LIMITS[name][2] for name in names if name in _LIMITS}
+    kinds |= {"t_us": np.int64} | ({"present": np.bool_} if "intensity" in names else {})
+    read = Growing(str(path), **{name: ((), kind) for name, kind in kinds.items()})
     for first, block in blocks:
         # An empty intensity is an absent one; -1 stands for it while numbers are read.
         body = re.sub(rb",[ \t]*(?=,|\n|$)", b",-1", block) if "intensity" in names else block
@@ -180,15 +191,11 @@ def _csv_events(path: Path, names: list[str], blocks: Iterator[_Block], array: A
         if "intensity" in columns:
             columns["present"] = columns["intensity"] >= 0
             columns["intensity"] = np.maximum(columns["intensity"], 0)
-        for name, column in columns.items():
-            parts[name].append(column.astype(_LIMITS[name][2] if name in _LIMITS else column.dtype))
-    joined = {name: np.concatenate(of) if of else np.empty(0, np.int64) for name, of in parts.items()}
-    t, x, y, p = (joined[name] for name in _EVENTS)
-    extra: dict[str, Any] = {name: joined[name] for name in _MORE if name in names}
-    if "intensity" in names:
-        extra["present"] = joined["present"].astype(bool)
+        read.add(**columns)
+    t, x, y, p = (read.column(name) for name in _EVENTS)
+    extra: dict[str, Any] = {name: read.column(name) for name in (*_MORE, "present") if name in kinds}
     try:
-        return Events(t, x, y, p.astype(bool), array=array or around(x, y), **extra)
+        return Events(t, x, y, p, array=array or around(x, y), **extra)
     except ProblemError as error:
         raise FormatError(f"{path}: {error}") from None
 
@@ -221,25 +228,23 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
         raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {rows} x {columns} taxels")
     else:
         sensor = array if called is None else replace(array, names=called)
-    t, values, n = [np.empty(0)], [np.empty((0, rows, columns), np.float32)], 0
+    read = Growing(str(path), t=((), np.int64), values=((rows, columns), np.float32))
+    # A line may stand for many taxels that are not there.
+    at_once = max(1, _AT_ONCE // (rows * columns))
     for first, body in blocks:
         table = _numbers(path, names, first, body, np.float64)
-        large = np.argwhere(np.abs(table[:, 1:]) > VALUE)
-        if len(large):
-            k, c = large[0]
-            raise FormatError(
-                f"{path}, line {first + _line_number(body, k)}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit "
-                "32 bits"
-            )
-        n += len(table)
+        _check_values(path, names, first, body, table)
+        t = _whole(path, first, body, table[:, 0])
+        n = len(read) + len(table)
         if array is None and n * rows * columns > max(1 << 24, 16 * n * len(names)):
             raise FormatError(sparse)
-        unpacked(str(path), 4 * n * rows * columns)
-        t.append(table[:, 0].copy())
-        values.append(np.zeros((len(table), rows, columns), np.float32))
-        values[-1][:, y, x] = table[:, 1:]
+        for k in range(0, len(table), at_once):
+            part = table[k : k + at_once]
+            pictures = np.zeros((len(part), rows, columns), np.float32)
+            pictures[:, y, x] = part[:, 1:]
+            read.add(t=t[k : k + at_once], values=pictures)
     try:
-        return Frames(frozen(np.concatenate(values)), np.concatenate(t), array=sensor)
+        return Frames(read.column("values"), read.column("t"), array=sensor)
     except ProblemError as error:
         raise FormatError(f"{path}: {error}") from None
 
@@ -265,6 +270,27 @@ def _numbers(path: Path, names: list[str], first: int, body: bytes, dtype: type[
             "line"
         )
     return table
+
+
+def _check_values(path: Path, names: list[str], first: int, body: bytes, table: NDArray[np.float64]) -> None:
+    """Refuse a value that 32 bits do not hold, in lines of which the first has a number."""
+    large = np.argwhere(np.abs(table[:, 1:]) > VALUE)
+    if len(large):
+        k, c = large[0]
+        line = first + _line_number(body, k)
+        raise FormatError(f"{path}, line {line}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit 32 bits")
+
+
+def _whole(path: Path, first: int, body: bytes, times: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the times of some lines as whole us; the first line has a number."""
+    with np.errstate(invalid="ignore"):
+        t = times.astype(np.int64)
+    broken = np.flatnonzero(t != times)
+    if len(broken):
+        k = int(broken[0])
+        line = first + _line_number(body, k)
+        raise FormatError(f"{path}, line {line}, column t_us: is {times[k]:g}; must be a whole number of us")
+    return t
 
 
 def _line_number(body: bytes, row: int) -> int:

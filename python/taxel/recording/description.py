@@ -10,6 +10,7 @@ import numpy as np
 
 from taxel._base import limits
 from taxel._base.arguments import flag, number, text, whole
+from taxel._base.documents import of_json
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -63,11 +64,10 @@ def about_of(place: str, document: str) -> dict[str, Any]:
     ------
     FormatError : not JSON of the expected form (names the entry)
     """
-    limits.unpacked(place, len(document), limits.DESCRIPTION)
     entry = "the whole"
     fields: dict[str, Any] = {}
     try:
-        about = json.loads(document)
+        about = of_json(place, document, limits.DESCRIPTION, with_nan=True)
         if not isinstance(about, dict):
             raise ProblemError("no object")
         for entry, read in _ENTRIES.items():
@@ -79,8 +79,6 @@ def about_of(place: str, document: str) -> dict[str, Any]:
                 fields[entry] = _registers(fields[entry], driven)
     except FormatError:
         raise
-    except RecursionError:
-        raise FormatError(f"{place}: nested too deeply; must be JSON as taxel writes it") from None
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, ProblemError) as error:
         raise FormatError(f"{place}, {entry}: {first_line(error)}; must be JSON as taxel writes it") from None
     return fields

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from taxel._base.files import open_file
 from taxel._core import FormatError
 from taxel.formats.layout import advice
 from taxel.formats.ros import is_bag
@@ -48,7 +49,7 @@ def is_label_table(path: Path) -> bool:
 
 def _columns(path: Path) -> list[bytes]:
     """Return the names in the first line of a table, as far as they are within 64 kB."""
-    with path.open("rb") as table:
+    with open_file(path) as table:
         head = table.readline(1 << 16).removeprefix(b"\xef\xbb\xbf").lstrip()
     return [name.strip() for name in head.split(b",")]
 
@@ -86,7 +87,7 @@ def kind_of(path: Path) -> str:
     """
     if is_bag(path):
         return "ros"
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(16)
     ending = ENDINGS.get(path.suffix.lower())
     by_magic = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)

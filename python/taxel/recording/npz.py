@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.archive import read_arrays, stored_names
-from taxel._base.columns import frozen
+from taxel._base.columns import frozen_whole
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -97,8 +97,10 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
     values = columns.get("values")
     if values is not None and values.dtype.kind == "f" and values.flags.writeable:
         # Of the NaNs of a damaged file some may be signalling ones, of which each computation would warn.
-        np.copyto(values, np.nan, where=np.isnan(values))
-    columns = {name: frozen(values) for name, values in columns.items()}
+        for k in range(0, len(values) if values.ndim else 0, step := max(1, _PIECE_BYTES // max(1, values[:1].nbytes))):
+            part = values[k : k + step]
+            np.copyto(part, np.nan, where=np.isnan(part))
+    columns = {name: frozen_whole(values) for name, values in columns.items()}
     about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
     described = about.pop("array", None)
     # A sensor of unknown pitch says nothing against the pitch of the file.

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from taxel import _core, formats
-from taxel._base import arguments
-from taxel._base.arguments import flag, instance, text
+from taxel._base import arguments, limits
+from taxel._base.arguments import flag, instance, text, whole
+from taxel._base.limits import opening
 from taxel._base.messages import warn
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -19,6 +23,7 @@ from taxel.events import Events
 from taxel.formats import Trial
 from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
+from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording.contents import Contents, several
 from taxel.recording.csv import check_head, read_csv
@@ -63,6 +68,7 @@ def open_any(
     field: str | Sequence[str] | None = None,
     types: str | os.PathLike[str] | None = None,
     ros: str | None = None,
+    limit: int | None = None,
 ) -> Any:
     r"""Open a recording, or a folder of trials.
 
@@ -90,6 +96,9 @@ def open_any(
         list too.
     types, ros : path and str, optional
         For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
+    limit : int, bytes, 1 or more, optional
+        How much may be read into memory; default: three quarters of what is available, and at most the sizes of
+        docs/files.md.
 
     Returns
     -------
@@ -99,11 +108,14 @@ def open_any(
 
     Raises
     ------
-    FormatError : not a recording, or damaged so that nothing can be read (names the place)
+    FormatError : not a recording, damaged so that nothing can be read, or more than may be read (names the place)
     OSError : the file does not exist, or cannot be read
 
     Notes
     -----
+    At most half as much memory as the arrays take is used beside them, and 256 MiB. A .mcap is read where its parts are
+    first used.
+
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
     is described in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) become
     notes of the recordings that it names, also of a file of pictures that is opened alone. In a folder with files that
@@ -122,14 +134,15 @@ def open_any(
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
     place = Path(arguments.path("path", path))
-    how = How(array, layout, pairing, differences, topic, field, types, ros)
-    if place.is_dir() and not is_bag(place):
-        return _folder(place, how)
-    # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
-    if place.exists() and (names := _formats(place)) and not _is_own(place):
-        trials = formats.trials(place, names[0])
-        return [_named_beside(place, Path(one.name), _of(one, place, names[0], layout)) for one in trials]
-    return _named_beside(place, Path(place.name), _open_one(place, how))
+    how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
+    with how.within():
+        if place.is_dir() and not is_bag(place):
+            return _folder(place, how)
+        # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
+        if place.exists() and (names := _formats(place)) and not _is_own(place):
+            trials = _kept(formats.trials(place, names[0]))
+            return [_named_beside(place, Path(one.name), _of(one, place, names[0], layout)) for one in trials]
+        return _named_beside(place, Path(place.name), _open_one(place, how))
 
 
 @dataclass(frozen=True)
@@ -144,6 +157,11 @@ class How:
     field: str | Sequence[str] | None = None
     types: str | os.PathLike[str] | None = None
     ros: str | None = None
+    limit: int | None = None
+
+    def within(self) -> AbstractContextManager[None]:
+        """Return a context in which no more is read than may be."""
+        return opening(None if self.limit is None else whole("limit", self.limit, 1, unit="bytes"))
 
     @property
     def topics(self) -> Topics:
@@ -173,7 +191,9 @@ def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
     -----
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel.
     """
-    return _open_one(Path(arguments.path("path", path)), How(**how))
+    said = How(**how)
+    with said.within():
+        return _open_one(Path(arguments.path("path", path)), said)
 
 
 def _open_one(place: Path, how: How) -> Recording:
@@ -229,16 +249,17 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
 
 def _folder(folder: Path, how: How) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
-    files = sorted((file for file in folder.iterdir() if file.name != LABELS), key=_order)
+    inside = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
+    files = sorted(inside, key=_order)
     own = [file for file in files if _is_own(file)]
     if how.topic or not own:
         own = [file for file in files if file in own or is_bag(file)]
     if own:
         _warn_of_tables(folder, own, files, how)
-        opened = [_open_one(file, how) for file in own]
+        opened = [_kept_one(_open_one(file, how)) for file in own]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
     elif not (names := _formats(folder)) and (foreign := _laid_out_in(files, how.layout)):
-        pairs = [(file.relative_to(folder), _open_one(file, how)) for file in foreign]
+        pairs = [(file.relative_to(folder), _kept_one(_open_one(file, how))) for file in foreign]
     else:
         if len(names) != 1:
             for file in files if not names else ():
@@ -251,9 +272,29 @@ def _folder(folder: Path, how: How) -> list[Recording]:
                 "layout file .npy, .txt and other arrays and tables (docs/files.md)"
             )
             raise FormatError(f"{folder}: holds {problem}; {hint or there}")
-        trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
+        trials = sorted(_kept(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
         pairs = [(Path(trial.name), _of(trial, folder, names[0], how.layout)) for trial in trials]
     return _labelled(folder / LABELS, pairs)
+
+
+def _kept(trials: Iterable[Trial]) -> Iterator[Trial]:
+    """Count the arrays of trials, which stay in memory while others are read."""
+    for trial in trials:
+        limits.keep(_size(trial.recorded))
+        yield trial
+
+
+def _kept_one(recording: Recording) -> Recording:
+    """Count the arrays of a recording as far as they are read already."""
+    for one in recording._contents.sources.values() or [recording._contents]:
+        limits.keep(sum(_size(table) for table in (vars(one)["events"], vars(one)["frames"])))
+    return recording
+
+
+def _size(table: object) -> int:
+    """Return the bytes of the columns of events or pictures; 0 of those that are not read yet."""
+    columns = vars(table).values() if isinstance(table, Events | Frames) else ()
+    return sum(column.nbytes for column in columns if isinstance(column, np.ndarray))
 
 
 def _warn_of_tables(folder: Path, own: Sequence[Path], files: Sequence[Path], how: How) -> None:
@@ -393,7 +434,7 @@ def check_recording(file: Path, layout: str | os.PathLike[str] | None = None) ->
         refuse_without_layout(file)
     kind = _kind(file, layout)
     if kind == "mcap":
-        _core.RecordingReader(file)
+        _core.RecordingReader(file, limits.memory(None))
     elif kind == "csv":
         check_head(file)
 

@@ -6,10 +6,11 @@ import csv
 import json
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +19,15 @@ from numpy.typing import NDArray
 
 from taxel._base.archive import read_array, read_arrays, shapes, stored_names
 from taxel._base.arguments import shown
-from taxel._base.columns import frozen
+from taxel._base.columns import Growing, frozen_whole
 from taxel._base.h5_file import H5File
-from taxel._base.limits import COLUMNS, VALUE, unpacked
+from taxel._base.limits import COLUMNS, VALUE
 from taxel._base.messages import counted, first_line
 from taxel._base.number_text import float_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending_us
+from taxel.formats.checks import ascending, whole_us
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
@@ -114,8 +115,7 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
     """
     is_table = path.suffix.lower() not in ARRAYS
     read = _table(path, layout) if is_table else _data(path, layout.data or Data())
-    values, seconds = read.values, read.seconds
-    t = np.arange(len(values)) if seconds is None else ascending_us(path.name, seconds, read.first)
+    values, t = read.values, np.arange(len(read.values)) if read.t is None else ascending(path.name, read.t, read.first)
     try:
         taxels = math.prod(values.shape[1:])
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
@@ -125,13 +125,13 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
         array = layout.array(
             taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
         )
-        unpacked(str(path), 4 * values.size)
-        frames = Frames(frozen(values.astype(np.float32).reshape(-1, *array.shape)), t, array=array)
+        pictures = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
+        frames = Frames(frozen_whole(pictures), t, array=array)
     except ProblemError as error:
         raise FormatError(f"{layout.place}: {first_line(error)}") from None
     limited(path, frames)
     kind = "table" if is_table else "arrays"
-    return Contents(path, path.name, kind, array, frames=frames, untimed=seconds is None, lost=read.lost)
+    return Contents(path, path.name, kind, array, frames=frames, untimed=read.t is None, lost=read.lost)
 
 
 def times_of(names: Sequence[str]) -> list[int]:
@@ -161,10 +161,10 @@ def listed(there: Mapping[str, tuple[int, ...]]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Read:
-    """Hold what a file of another program says: readings, times in s, and the names of the taxels and of the rest."""
+    """Hold what a file of another program says: readings, times in us, and the names of the taxels and of the rest."""
 
     values: NDArray[Any]
-    seconds: NDArray[np.float64] | None
+    t: NDArray[np.int64] | None
     #: The number of the first line of numbers.
     first: int = 0
     names: Sequence[str] | None = None
@@ -174,7 +174,7 @@ class _Read:
 def _table(path: Path, layout: Layout) -> _Read:
     how = layout.table or Table()
     first = how.skip_lines + 1
-    lines = [line for line in text.lines(path)[how.skip_lines :] if line.strip()]
+    lines = list(islice(_lines(path, how), 3))
     if not lines:
         raise FormatError(f"{path.name}, line {first}: no line after {how.skip_lines} skipped ones")
     names = cells(lines[0], how.separator)
@@ -192,16 +192,18 @@ def _table(path: Path, layout: Layout) -> _Read:
     # A line of units may stand between names and numbers.
     units = cells(below[0], how.separator) if named and len(below) > 1 else []
     in_units = are_units(names, units) and (how.missing is None or _unquoted(how.missing) not in units)
-    below = below[in_units:]
+    above = named + in_units
+    begin = next(islice(_lines(path, how), above, None), None)
     # A last column may be empty everywhere, as of a taxel that is dead.
     taxels = None if layout.rows is None or layout.columns is None else layout.rows * layout.columns
     others = len(how.leave_out) + (how.time_column is not None)
-    is_whole = bool(below) and taxels is not None and len(cells(below[0], how.separator)) == taxels + others
-    if not is_whole and ends_in_separator(names if named else None, below, how.separator):
-        below = [line.rstrip(" ").removesuffix(how.separator) for line in below]
-        names = names[: len(cells(below[0], how.separator))]
+    is_whole = begin is not None and taxels is not None and len(cells(begin, how.separator)) == taxels + others
+    body: Iterator[str] = islice(_lines(path, how), above, None)
+    if not is_whole and begin is not None and _all_end(names if named else None, begin, path, how, above):
+        body = (line.rstrip(" ").removesuffix(how.separator) for line in body)
+        names = names[: len(cells(begin.rstrip(" ").removesuffix(how.separator), how.separator))]
     names = names if named else [f"column {k}" for k in range(1, len(names) + 1)]
-    first += named + in_units
+    first += above
     column = None if how.time_column is None else _column(path, "time_column", how.time_column, names, named)
     left = {_column(path, "leave_out", one, names, named) for one in how.leave_out}
     if column in left:
@@ -214,25 +216,53 @@ def _table(path: Path, layout: Layout) -> _Read:
             f"time_column = {json.dumps(time, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, skip "
             f"the names: skip_lines = {first - 1}"
         )
-    missing = frozenset() if how.missing is None else frozenset({_unquoted(how.missing), "nan"})
-    rows = (cells(line, how.separator) for line in below)
+    rows = (cells(line, how.separator) for line in body)
     if column is not None and how.time_unit == ISO:
         rows = (_with_seconds(row, column, path, line) for line, row in enumerate(rows, first))
     if left:
         rows = (_without(row, left, len(names), path, line) for line, row in enumerate(rows, first))
     kept = [name for k, name in enumerate(names) if k not in left]
-    values = text.numbers(rows, path, first, kept, missing, unmarked=how.missing is None)
     lost = ", ".join(names[k] or f"column {k + 1}" for k in sorted(left))
     lines_of_lost = (f"columns that are no taxels: {lost}",) if lost else ()
-    if column is None:
-        return _Read(values, None, first, kept if named else None, lines_of_lost)
-    column -= sum(k < column for k in left)
-    seconds = values[:, column] * UNITS_US.get(how.time_unit, UNITS_US["s"]) / 1e6
-    if np.isnan(seconds).any():
-        line = first + int(np.flatnonzero(np.isnan(seconds))[0])
-        raise FormatError(f"{path.name}, line {line}: {kept[column]} is missing; every picture has a time")
-    values = np.delete(values, column, axis=1)
-    return _Read(values, seconds, first, kept[:column] + kept[column + 1 :] if named else None, lines_of_lost)
+    at = None if column is None else column - sum(k < column for k in left)
+    values, t = _read(rows, path, first, kept, at, how)
+    taxel_names = [name for k, name in enumerate(kept) if k != at] if named else None
+    return _Read(values, t, first, taxel_names, lines_of_lost)
+
+
+def _read(
+    rows: Iterable[Sequence[str]], path: Path, first: int, names: Sequence[str], time: int | None, how: Table
+) -> tuple[NDArray[np.float32], NDArray[np.int64] | None]:
+    """Return the readings of a table and its times, us, which are the column `time`."""
+    missing = frozenset() if how.missing is None else frozenset({_unquoted(how.missing), "nan"})
+    read = Growing(str(path), values=((len(names) - (time is not None),), np.float32), t=((), np.int64))
+    for line, block in text.blocks(rows, path, first, names, missing, unmarked=how.missing is None):
+        if time is None:
+            read.add(values=block, t=np.zeros(len(block)))
+        else:
+            t = _us(block[:, time], names[time], how, path, line)
+            read.add(values=np.delete(block, time, axis=1), t=t)
+    return read.column("values"), None if time is None else read.column("t")
+
+
+def _lines(path: Path, how: Table) -> Iterator[str]:
+    """Yield the lines of a table that are not empty, below those that its layout skips."""
+    return (line for line in islice(text.stream(path), how.skip_lines, None) if line.strip())
+
+
+def _all_end(names: Sequence[str] | None, begin: str, path: Path, how: Table, above: int) -> bool:
+    """Return whether each line of numbers ends in a separator (`ends_in_separator`), of which `begin` is the first."""
+    if not ends_in_separator(names, [begin], how.separator):
+        return False
+    return all(line.rstrip(" ").endswith(how.separator) for line in islice(_lines(path, how), above, None))
+
+
+def _us(times: NDArray[np.float64], name: str, how: Table, path: Path, first: int) -> NDArray[np.int64]:
+    """Return the times of some lines in us; `first` is the number of the first."""
+    missing = np.flatnonzero(np.isnan(times))
+    if len(missing):
+        raise FormatError(f"{path.name}, line {first + missing[0]}: {name} is missing; every picture has a time")
+    return whole_us(path.name, times * UNITS_US.get(how.time_unit, UNITS_US["s"]) / 1e6, first)
 
 
 def cells(line: str, separator: str) -> list[str]:
@@ -361,13 +391,12 @@ def _data(path: Path, how: Data) -> _Read:
             f"{path}, {wanted[0] or 'the array'}: {values.dtype} of shape {shape}; must be numbers of shape "
             "pictures x rows x columns, or pictures x taxels"
         )
-    # VALUE is no number of 16 bits.
-    large = np.argwhere(np.abs(values) > np.float64(VALUE))
-    if len(large):
-        picture, *place = map(int, large[0])
+    large = _too_large(values)
+    if large is not None:
+        picture, *place = large
         at = f"row {place[0]}, column {place[1]}" if len(place) == 2 else f"taxel {place[0]}"
         raise FormatError(
-            f"{path}, {wanted[0] or 'the array'}, picture {picture}, {at}: {values[tuple(large[0])]}; must fit 32 "
+            f"{path}, {wanted[0] or 'the array'}, picture {picture}, {at}: {values[large]}; must fit 32 "
             "bits, or be NaN where it is missing"
         )
     if len(wanted) == 1:
@@ -378,7 +407,17 @@ def _data(path: Path, how: Data) -> _Read:
     times = times.astype(np.float64)
     if times.shape != values.shape[:1]:
         raise FormatError(f"{path}, {wanted[1]}: {counted(times.size, 'time')} for {counted(len(values), 'picture')}")
-    return _Read(values, times * UNITS_US[how.time_unit] / 1e6, lost=lost)
+    return _Read(values, whole_us(path.name, times * UNITS_US[how.time_unit] / 1e6, 0), lost=lost)
+
+
+def _too_large(values: NDArray[Any]) -> tuple[int, ...] | None:
+    """Return the place of the first value that 32 bits do not hold; None if there is none."""
+    for k, picture in enumerate(values):
+        # VALUE is no number of 16 bits.
+        large = np.argwhere(np.abs(picture) > np.float64(VALUE))
+        if len(large):
+            return (k, *map(int, large[0]))
+    return None
 
 
 def shapes_of(path: Path) -> dict[str, tuple[int, ...]]:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from taxel import _core
+from taxel._base import limits
 from taxel.array import Array
 from taxel.events import Events
 from taxel.recording.contents import Contents
@@ -28,9 +29,11 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Conte
 
     Raises
     ------
+    FormatError : more than may be read, or wire version 2
     OSError : the file cannot be read
     """
-    payload, parts, decoder, complete = _core.read_lsa(path, array._parts(), pairing, differences)
+    memory = limits.memory(limits.given())
+    payload, parts, decoder, complete = _core.read_lsa(path, array._parts(), pairing, differences, memory)
     unmarked = None if complete else path.with_suffix(".lss").name
     verdict = Verdict._of({"raw": [unmarked, json.loads(_core.recording_damage(decoder))]})
     return Contents(

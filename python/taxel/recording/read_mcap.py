@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base import limits
 from taxel._base.columns import frozen
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -37,10 +38,11 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     FormatError : not a recording of the live format, or damaged so that nothing can be read
     OSError : the file cannot be read
     """
-    reader = _core.RecordingReader(path)
+    limit = limits.given()
+    reader = _core.RecordingReader(path, limits.memory(limit))
     sources: dict[str, Contents] = {}
     for name in reader.sources():
-        one = _Source(path, reader.of_source(name), sources)
+        one = _Source(path, reader.of_source(name), sources, limit)
         if one.header.get("pictures") is not None:
             sources[name] = one.pictures()
         else:
@@ -55,12 +57,14 @@ def read_mcap(path: Path, pairing: str) -> Contents:
 class _Source:
     """Reader of one source of a file: its header and trailer, and the values that several fields share."""
 
-    def __init__(self, path: Path, reader: _core.RecordingReader, sources: dict[str, Contents]) -> None:
-        self.reader = reader
+    def __init__(
+        self, path: Path, reader: _core.RecordingReader, sources: dict[str, Contents], limit: int | None
+    ) -> None:
+        self._reader, self._limit = reader, limit
         about = json.loads(reader.about())
         self.header, self.ending, self.opened = about["header"], about["ending"] or {}, about["rebuilt"]
         self.array = array_of(self.header["array"])
-        self.remarks = Once(lambda: json.loads(reader.remarks()))
+        self.remarks = Once(lambda: json.loads(self.reader().remarks()))
         self.common: dict[str, Any] = {
             "path": path,
             "name": path.name,
@@ -78,9 +82,13 @@ class _Source:
             "heel": self.header.get("heel", ""),
         }
 
+    def reader(self) -> _core.RecordingReader:
+        """Return the reader of this source, which reads as much as the memory that is available now allows."""
+        return self._reader.within(limits.memory(self._limit))
+
     def board(self, pairing: str) -> Contents:
         """Return the contents of a board."""
-        decoded = Once(lambda: self.reader.decode(pairing))
+        decoded = Once(lambda: self.reader().decode(pairing))
         arrived = lambda: self.remarks()["datagrams"] > 0  # noqa: E731  the same for two fields
         return Contents(
             **self.common | {"verdict": once(lambda: self.verdict(lambda: decoded()[7]))},
@@ -88,7 +96,7 @@ class _Source:
             events=once(lambda: Events._from_parts(decoded()[0], self.array)),
             clock=once(lambda: _clock(decoded()), arrived),
             counts=once(lambda: self.counts_of_board(decoded()), lambda: True),
-            datagrams=once(lambda: Datagrams(*self.reader.datagrams()), arrived),
+            datagrams=once(lambda: Datagrams(*self.reader().datagrams()), arrived),
             version_2=once(lambda: bool(json.loads(decoded()[5])["intact"])),
             differences=bool(self.header["difference"]),
             origin_us=int(self.header["origin_us"]),
@@ -110,7 +118,7 @@ class _Source:
     def pictures(self) -> Contents:
         """Return the contents of a source of pictures."""
         about, place = self.header["pictures"], self.common["path"]
-        read = Once(self.reader.pictures)
+        read = Once(lambda: self.reader().pictures())
 
         def frames() -> Frames:
             t, values, _ = read()
@@ -138,7 +146,7 @@ class _Source:
     def stream(self) -> Contents:
         """Return the contents of a stream of numbers, whose lines are pictures of one row."""
         stream = self.header["stream"]
-        read = Once(self.reader.samples)
+        read = Once(lambda: self.reader().samples())
 
         def samples() -> Samples:
             arrived, number, t, values, _ = read()

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base import arguments
+from taxel._base.columns import frozen_whole
 from taxel._base.messages import counted, warn
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -107,7 +108,7 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
             one.array,
             label=name,
             source=one.topic + f".{one.field}" * bool(one.field) + f" ({one.type})",
-            frames=Frames(one.values, ascending(one.t), unit=one.unit, array=one.array),
+            frames=Frames(frozen_whole(one.values), frozen_whole(ascending(one.t)), unit=one.unit, array=one.array),
             counts={
                 "messages": len(one.t),
                 "messages_of_another_length": one.left_out,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 from typing import IO, Any
 
 from taxel._base.arguments import number, shown, whole
+from taxel._base.documents import of_json
 from taxel._core import DeviceError, FormatError, ProblemError
 from taxel.array import Array
 from taxel.wire import Registers
@@ -45,9 +45,9 @@ class Pipe:
             raise ProblemError(f"source is {shown(source)}: must be a pipe or a file, opened to read bytes") from None
         line = self._line()
         try:
-            header = json.loads(line)
+            header = of_json("standard input, line 1", line.decode())
             rows, columns, rate, bits = (header[name] for name in ("rows", "columns", "rate", "bits"))
-        except (ValueError, TypeError, KeyError) as error:
+        except (FormatError, ValueError, TypeError, KeyError) as error:
             expected = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
             begin = line[:60].decode("utf-8", "replace")
             raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {expected}") from None

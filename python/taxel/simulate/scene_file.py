@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import json
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +15,8 @@ import numpy as np
 from taxel import _core
 from taxel._base.arguments import number, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.documents import read_text, read_toml
+from taxel._base.limits import DESCRIPTION
 from taxel._core import SceneError
 from taxel.array import Array
 from taxel.simulate.acts import Act, Scene, Silence
@@ -101,7 +102,8 @@ class SceneFile:
 
         Raises
         ------
-        SceneError : no TOML, an unknown key, a value that is invalid; names the file and the place
+        FormatError : not TOML, or longer than 1 MiB; names the file and the place
+        SceneError : an unknown key, a value that is invalid; names the file and the place
         OSError : a file that cannot be read
 
         Warns
@@ -109,10 +111,7 @@ class SceneFile:
         UserWarning : a touch narrower than its cells resolve, as a `Scene` does
         """
         place = Path(checked_path("path", path))
-        try:
-            document = tomllib.loads(place.read_text(encoding="utf-8-sig"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise SceneError(f"{place}: not TOML: {error}") from None
+        document = read_toml(place)
         try:
             return cls._of(document, place.parent)
         except _core.Error as error:
@@ -200,7 +199,7 @@ def _bodies(described: Any, folder: Path) -> Any:
                 raise SceneError(f"{where} has heights_mm and a file: must have one of both")
             place = folder / text(f"{where}.file", relief["file"])
             try:
-                rows = place.read_text(encoding="utf-8").replace(",", " ").splitlines()
+                rows = read_text(place, DESCRIPTION).replace(",", " ").splitlines()
                 heights = np.loadtxt(rows, ndmin=2).tolist()
             except FileNotFoundError:
                 raise SceneError(f"{where}.file {place}: no such file") from None

@@ -2,10 +2,20 @@
 //! verdict, and documented in docs/files.md. A file may come from an untrusted source or a damaged disk, and a few
 //! bytes can claim a size of 2^64.
 
+use std::path::Path;
+
 use mcap::records::op;
+
+use crate::{Error, Result};
+
+/// Largest size of what is read of a file into memory where the caller says no other, bytes: 4 GiB.
+pub(super) const MEMORY: u64 = 1 << 32;
 
 /// Largest unpacked size of a chunk, bytes: 64 MiB. Our chunks have 1 MiB, those of other tools 1 to 8.
 pub(super) const CHUNK: u32 = 1 << 26;
+
+/// Bytes in memory of a byte of JSON that is read into objects, about.
+pub(super) const OBJECTS: usize = 16;
 
 /// Largest metadata record, bytes.
 pub(super) const METADATA: u64 = 1 << 24;
@@ -19,26 +29,32 @@ pub(super) const COLUMNS: usize = 1024;
 /// Largest number of taxels in a sensor: 2048 x 2048.
 pub(super) const TAXELS: usize = 1 << 22;
 
-/// Largest number of values in the pictures of a source: 4 GiB in memory.
-pub(super) const VALUES: usize = 1 << 30;
-
 /// Largest distance from 0 at which a converted file's time may begin, us: 142 years, so that ns fit in 64 bits too.
 pub(super) const TIME_US: i64 = 1 << 52;
 
-/// Largest unpacked size of all chunks of a file of `length` bytes together.
+/// Largest unpacked size of all chunks of a file of `length` bytes together, of which `memory` bytes may be read.
 ///
 /// Pictures of a board at rest compress by a factor of a few hundred; a factor of a thousand indicates a decompression
-/// bomb.
-pub(super) fn unpacked(length: u64) -> u64 {
-    length.saturating_mul(1000).saturating_add(1 << 28)
+/// bomb, unless all of it fits into the memory: large pictures without a touch compress by a factor of ten thousand.
+pub(super) fn unpacked(length: u64, memory: u64) -> u64 {
+    length.saturating_mul(1000).saturating_add(1 << 28).max(memory)
 }
 
-/// Largest total size of the datagrams in a file of `length` bytes, because they become events in memory.
+/// Largest total size of the datagrams in a file of `length` bytes.
 ///
 /// Each datagram has 47 bytes of overhead that are not compressed, so a valid file's datagrams stay far below a hundred
 /// times its length.
 pub(super) fn datagrams(length: u64) -> u64 {
     length.saturating_mul(100).saturating_add(1 << 26)
+}
+
+/// Refuses more bytes in memory than a caller allows.
+pub(super) fn in_memory(path: &Path, what: &str, size: u64, most: u64) -> Result<()> {
+    if size > most {
+        let reason = format!("{what} of {size} bytes or more, unpacked; at most {most} are read");
+        return Err(Error::format(path, &format!("{reason}: --limit BYTES (limit=) says how many may be")));
+    }
+    Ok(())
 }
 
 /// Whether the strings in a channel or metadata record end within it: the parser allocates their memory before it

@@ -2,13 +2,14 @@
 //! an empty `NAME.lss` marks it as complete. The manual's program overwrites files without a warning; this one refuses.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Array, Events, Stop};
 
-use super::OutputFile;
+use super::{OutputFile, limits};
+use crate::regular_file::open_regular;
 use crate::{Error, Result};
 
 /// Writes a `.lsa`. Its `.lss` is created by [`LsaWriter::finish`] only.
@@ -147,18 +148,23 @@ pub struct DecodedLsa {
 ///
 /// # Errors
 ///
-/// `File` if it cannot be read; `Core` (format) if it contains datagrams of version 2; `Core(Interrupted)` if asked to
+/// `File` if it cannot be read; `Core` (format) if it contains datagrams of version 2, or makes more than `memory` bytes;
+/// `Core(Interrupted)` if asked to
 /// stop.
 pub fn decode_lsa(
     path: &Path,
     array: Array,
     pairing: Pairing,
     differences: bool,
+    memory: u64,
     stop: Stop<'_>,
 ) -> Result<DecodedLsa> {
     /// Bytes between two checks of `stop`.
     const PIECE: usize = 1 << 22;
-    let bytes = std::fs::read(path).map_err(Error::file(path))?;
+    let (mut bytes, file) = (vec![], open_regular(path)?);
+    let length = file.metadata().map_err(Error::file(path))?.len();
+    limits::in_memory(path, "raw data", length, memory)?;
+    file.take(length).read_to_end(&mut bytes).map_err(Error::file(path))?;
     if wire::v2::begins(&bytes) {
         let name = path.display();
         let reason = "begins with a datagram of wire version 2; a .lsa holds version 1";
@@ -169,6 +175,7 @@ pub fn decode_lsa(
     for piece in bytes.chunks(PIECE) {
         stop.check()?;
         decoder.push_into(piece, None, &mut events);
+        limits::in_memory(path, "events", length + events.size() as u64, memory)?;
     }
     decoder.finish_into(&mut events);
     Ok(DecodedLsa { bytes, events, counts: *decoder.counts(), complete: done(path).exists() })

@@ -11,7 +11,6 @@ mod summary;
 mod walk;
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,6 +21,7 @@ use taxel_core::{Events, Stop, problem};
 use super::stream::Sampling;
 use super::{BoardChange, Change, Condition, Counts, Ending, Found, Header, Pictures, Rebuilt, Samples, Topic, limits};
 use crate::clock::leaves;
+use crate::regular_file::open_regular;
 use crate::{Error, Result};
 use blocks::{Blocks, Indexed};
 pub use message::Message;
@@ -38,6 +38,8 @@ pub struct Reader {
     ending: Option<Ending>,
     ends: Arc<BTreeMap<String, Counts>>,
     rebuilt: Rebuilt,
+    /// How many bytes of a source may be in memory at once.
+    memory: u64,
 }
 
 /// State between blocks: the file's channels, and the last arrival number.
@@ -157,9 +159,18 @@ impl Reader {
     ///
     /// `File` if it cannot be read; `Core` (format) if it is not an MCAP file, or not one of ours.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(Error::file(path))?;
+        Self::open_within(path, limits::MEMORY)
+    }
+
+    /// As [`Reader::open`], where a function that returns all of a source may return at most `memory` bytes.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reader::open`].
+    pub fn open_within(path: &Path, memory: u64) -> Result<Self> {
+        let file = open_regular(path)?;
         let length = file.metadata().map_err(Error::file(path))?.len();
-        let mut walk = Walk::of(path, &file, length);
+        let mut walk = Walk::of(path, &file, length, memory);
         walk.magic()?;
         walk.records()?;
         let Walk { begin, end, ending, ends, blocks, skipped, summary, rebuilt, .. } = walk;
@@ -173,7 +184,7 @@ impl Reader {
         };
         header.check().map_err(|error| Error::format(path, &format!("header: {error}")))?;
         let (blocks, header, ends) = (Arc::new(blocks), Arc::new(header), Arc::new(ends));
-        Ok(Self { blocks, header, source: 0, ending, ends, rebuilt })
+        Ok(Self { blocks, header, source: 0, ending, ends, rebuilt, memory })
     }
 
     /// The names of the sources; the reader starts with the first.
@@ -201,6 +212,17 @@ impl Reader {
             whole => whole.clone(),
         };
         Ok(Self { source, ending, ..self.clone() })
+    }
+
+    /// The same reader, where a function that returns all of a source may return at most `memory` bytes.
+    #[must_use]
+    pub fn within(&self, memory: u64) -> Self {
+        Self { memory, ..self.clone() }
+    }
+
+    /// Refuses more bytes of a source than may be in memory.
+    fn fits(&self, what: &str, size: usize) -> Result<()> {
+        limits::in_memory(&self.blocks.path, what, size as u64, self.memory)
     }
 
     /// Whether the summary lists no datagram, line or picture of a source.
@@ -343,7 +365,7 @@ impl Reader {
         mut take: impl FnMut(Message<'_>) -> Result<()>,
     ) -> Result<Unread> {
         let skipped = self.blocks.skipped.binary_search_by_key(&(block + 1), |(before, _)| *before);
-        let (block, most) = (self.blocks.places[block], limits::datagrams(self.blocks.length));
+        let (block, most) = (self.blocks.places[block], limits::datagrams(self.blocks.length).max(self.memory));
         let Place { topics, last, in_datagrams, bytes } = place;
         let (mut wrong, mut read) = (None, Indexed::new());
         let sound = self.blocks.records(block, bytes, |record| {
@@ -366,8 +388,8 @@ impl Reader {
                                 wrong = Some(Error::format(
                                     &self.blocks.path,
                                     &format!(
-                                        "chunk at byte {}: the datagrams up to here unpack to more than {most} bytes \
-                                         (100 times the file and 64 MiB)",
+                                        "the datagrams up to byte {} unpack to {in_datagrams} bytes; at most {most} are read \
+                                         (100 times the file and 64 MiB): --limit BYTES (limit=) says how many may be",
                                         block.offset
                                     ),
                                 ));
@@ -401,11 +423,15 @@ impl Reader {
     ///
     /// # Errors
     ///
-    /// As [`Reader::messages`].
+    /// `Core` (format) if it is more than may be in memory; otherwise as [`Reader::messages`].
     pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, Unread)> {
-        let mut all = Remarks::default();
+        let (mut all, mut size) = (Remarks::default(), 0);
         let unread = self.messages(stop, |message| {
             all.add(&message);
+            if !message.topic.is_data() && message.topic != Topic::Pressure {
+                size += limits::OBJECTS * message.data.len();
+                self.fits("notes, detections and the like", size)?;
+            }
             Ok(())
         })?;
         Ok((all, unread))
@@ -424,6 +450,7 @@ impl Reader {
                 all.number.push(message.number);
                 all.bytes.extend_from_slice(message.data);
                 all.offsets.push(i64::try_from(all.bytes.len()).unwrap_or(i64::MAX));
+                self.fits("datagrams", all.bytes.len() + 24 * all.number.len())?;
             }
             Ok(())
         })?;
@@ -443,6 +470,7 @@ impl Reader {
         self.messages(stop, |message| {
             if message.topic == Topic::Samples {
                 sampling.push(message.at_ns, message.number, message.data);
+                self.fits("lines of numbers", sampling.size())?;
             }
             Ok(())
         })?;
@@ -463,10 +491,7 @@ impl Reader {
         let mut all = Pictures::default();
         self.messages(stop, |message| {
             if message.topic == Topic::Pictures {
-                if all.values.len() + array.len() > limits::VALUES {
-                    let most = limits::VALUES;
-                    return Err(Error::format(&self.blocks.path, &format!("pictures of more than {most} values")));
-                }
+                self.fits("pictures", 4 * (all.values.len() + array.len()) + 8 * all.t.len())?;
                 all.push(message.data, array.rows, array.columns);
             }
             Ok(())
@@ -498,6 +523,7 @@ impl Reader {
                 decoded.arrived_ns.push(message.at_ns);
                 decoded.number.push(message.number);
                 decoded.first.push(before as u64);
+                self.fits("events", decoded.events.size() + 32 * decoded.first.len())?;
             }
             if message.topic == Topic::Held {
                 begin_with(&mut sender, message.data);

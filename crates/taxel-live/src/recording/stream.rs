@@ -147,6 +147,11 @@ impl<'a> Sampling<'a> {
         self.samples.values.extend(values);
     }
 
+    /// Bytes of all samples so far.
+    pub(super) fn size(&self) -> usize {
+        8 * self.samples.values.len() + 24 * self.samples.t.len()
+    }
+
     /// The time and the values of a message; a value that JSON cannot represent becomes NaN.
     fn parse(&mut self, at_ns: i64, data: &[u8]) -> Option<(i64, Vec<f64>)> {
         let message: Value = serde_json::from_slice(data).ok()?;

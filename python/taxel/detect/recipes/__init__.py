@@ -10,9 +10,7 @@ without `other` it is for its neurons' labels alone. A new recipe is a new file 
 
 from __future__ import annotations
 
-import json
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -20,6 +18,7 @@ from typing import Any
 
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown, text
+from taxel._base.documents import read_json, read_toml
 from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.events import Events
@@ -107,7 +106,7 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     ProblemError : no recipe of this name
-    FormatError : neither TOML nor JSON
+    FormatError : neither TOML nor JSON, or longer than 1 MiB
     FileNotFoundError : no such file
 
     Examples
@@ -122,12 +121,7 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
                 f"recipe {shown(recipe)}: there are {', '.join(names())}; the path of a file holds a dot or a slash"
             )
         place = Path(__file__).parent / f"{recipe}.toml"
-    try:
-        content = place.read_text(encoding="utf-8-sig")
-        values = json.loads(content) if place.suffix.lower() == ".json" else tomllib.loads(content)
-    except (UnicodeDecodeError, json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
-        kind = "JSON" if place.suffix.lower() == ".json" else "TOML"
-        raise FormatError(f"{place}: not {kind}: {error}") from None
+    values = read_json(place) if place.suffix.lower() == ".json" else read_toml(place)
     if not isinstance(values, dict):
         raise FormatError(f"{place}: holds no recipe, which is values by name")
     return values

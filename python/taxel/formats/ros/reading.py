@@ -10,12 +10,13 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.limits import TIME_US, VALUE, unpacked
+from taxel._base.columns import Growing
+from taxel._base.limits import TIME_US, VALUE
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats.checks import sensor
@@ -114,20 +115,29 @@ def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: s
         return [one.read(connections[one.topic][0].msgtype, unread) for one in held]
 
 
+class _Shape(NamedTuple):
+    """The shape of a message's numbers, named as NumPy names it."""
+
+    shape: tuple[int, ...]
+    size: int
+    ndim: int
+
+
 class _Held:
     """The messages of one field so far."""
 
     def __init__(self, bag: Bag, chosen: Chosen) -> None:
         self.bag, self.array = bag, chosen.array
         self.topic, self.field = chosen.topic, chosen.field
-        self.values: list[NDArray[np.float32]] = []
+        #: The shape of each message's numbers, and all numbers one after the other.
+        self.values: list[_Shape] = []
+        self.numbers = Growing(self.place, numbers=((), np.float32))
         self.bag_ns: list[int] = []
         self.stamps_ns: list[int | None] = []
         self.grids: list[tuple[int, int] | None] = []
         self.are_whole: list[bool] = []
         #: Why a message has no numbers to read: those of most may have some.
         self.trouble = ""
-        self.bytes = 0
 
     @property
     def place(self) -> str:
@@ -148,9 +158,8 @@ class _Held:
             raise FormatError(
                 f"{self.place}, message {len(self.values)}: a value is infinite, or too large for 32 bits"
             )
-        self.values.append(numbers.astype(np.float32))
-        self.bytes += self.values[-1].nbytes
-        unpacked(self.place, self.bytes)
+        self.values.append(_Shape(numbers.shape, numbers.size, numbers.ndim))
+        self.numbers.add(numbers=numbers.reshape(-1))
         self.bag_ns.append(at)
         header = getattr(message, "header", None)
         stamp = getattr(header, "stamp", None)
@@ -187,11 +196,10 @@ class _Held:
             raise FormatError(
                 f"{self.place}: its messages hold {size} values; the array has {array.rows} x {array.columns}"
             )
-        pictures = np.stack([v.reshape(array.shape) for v, fit in zip(self.values, fits, strict=True) if fit])
         bag = np.array(self.bag_ns, np.int64)[fits]
         stamps = [stamp for stamp, fit in zip(self.stamps_ns, fits, strict=True) if fit]
         order = np.argsort(bag, kind="stable")  # files of a bag may overlap
-        bag, pictures = bag[order], pictures[order]
+        bag, pictures = bag[order], self._pictures(np.flatnonzero(fits)[order], array)
         has_stamps = None not in stamps
         t, by_the_bag = _times(np.array(stamps, np.int64)[order], bag) if has_stamps else (bag, 0)
         if np.abs(t).max() // 1000 > TIME_US:
@@ -210,6 +218,20 @@ class _Held:
             unread,
         )
 
+    def _pictures(self, chosen: NDArray[np.int64], array: Array) -> NDArray[np.float32]:
+        """Return the numbers of messages as pictures; those that are read in their order are moved, not copied."""
+        begins = np.concatenate([[0], np.cumsum([one.size for one in self.values])])
+        numbers, size = self.numbers.column("numbers"), array.rows * array.columns
+        if (np.diff(chosen) > 0).all():
+            numbers.setflags(write=True)
+            held = numbers[: len(chosen) * size]
+        else:
+            held = np.empty(len(chosen) * size, np.float32)
+        for k, begin in enumerate(begins[chosen]):
+            if held is not numbers or begin != k * size:
+                held[k * size : (k + 1) * size] = numbers[begin : begin + size]
+        return held.reshape(-1, *array.shape)
+
     def _stated(self) -> Array:
         """Return the most frequent length: in rows and columns as most of its messages state them, else in one row."""
         lengths = Counter(one.shape for one in self.values if one.size)
@@ -221,7 +243,7 @@ class _Held:
         return Array(rows, columns, name=self.topic)
 
 
-def _fits(numbers: NDArray[np.float32], array: Array) -> bool:
+def _fits(numbers: _Shape, array: Array) -> bool:
     """Return whether a message's numbers are a picture of an array: as many, and an image of its rows and columns."""
     return numbers.shape == array.shape if numbers.ndim == 2 else numbers.size == array.rows * array.columns
 

@@ -36,6 +36,8 @@ pub(super) struct Walk<'a> {
     path: &'a Path,
     file: &'a File,
     length: u64,
+    /// How many bytes may be read into memory.
+    memory: u64,
     pub(super) begin: Option<Header>,
     pub(super) end: Option<Header>,
     pub(super) ending: Option<Ending>,
@@ -54,12 +56,13 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    pub(super) fn of(path: &'a Path, file: &'a File, length: u64) -> Self {
+    pub(super) fn of(path: &'a Path, file: &'a File, length: u64, memory: u64) -> Self {
         let rebuilt = Rebuilt { unfinished: true, ..Rebuilt::default() };
         Self {
             path,
             file,
             length,
+            memory,
             begin: None,
             end: None,
             ending: None,
@@ -178,7 +181,7 @@ impl<'a> Walk<'a> {
                     return Ok(());
                 }
                 op::METADATA => self.metadata(at, length)?,
-                op::CHUNK if size.max(length) > u64::from(limits::CHUNK) => {
+                op::CHUNK | op::SCHEMA | op::CHANNEL | op::MESSAGE if size.max(length) > u64::from(limits::CHUNK) => {
                     self.rebuilt.large_chunks += 1;
                     self.since.1 = self.since.1.max(Skipped::Records);
                 }
@@ -190,14 +193,13 @@ impl<'a> Walk<'a> {
                 op::CHUNK => {
                     self.next_block();
                     self.unpacked += size;
-                    let most = limits::unpacked(self.length);
+                    let most = limits::unpacked(self.length, self.memory);
                     if self.unpacked > most {
-                        let limit = "bytes (1000 times the file and 256 MiB)";
+                        let said = format!("the chunks up to byte {at} say that they unpack to {}", self.unpacked);
+                        let right = "(1000 times the file and 256 MiB): --limit BYTES (limit=) says how many may be";
                         return Err(Error::format(
                             self.path,
-                            &format!(
-                                "chunk at byte {at}: the chunks up to here say that they unpack to more than {most} {limit}"
-                            ),
+                            &format!("{said} bytes; at most {most} are read {right}"),
                         ));
                     }
                     self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: false });

@@ -1,0 +1,208 @@
+"""Reads TOML and JSON that anybody may have written: files, options, entries of a recording."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any, NoReturn
+
+from taxel._base.arguments import shown
+from taxel._base.files import open_file
+from taxel._base.limits import unpacked
+from taxel._base.messages import first_line
+from taxel._core import FormatError
+
+__all__ = [
+    "BY_HAND",
+    "BY_TAXEL",
+    "NotTomlError",
+    "of_json",
+    "of_toml",
+    "read_json",
+    "read_text",
+    "read_toml",
+    "text_of_json",
+]
+
+#: Bytes of a document that people write, as a layout, a recipe or a scene: 1 MiB.
+BY_HAND = 1 << 20
+#: Bytes of one that taxel writes, with numbers of each taxel or input, as a readout, a tare or a calibration: 256 MiB.
+BY_TAXEL = 1 << 28
+#: Dots in a key of TOML, for each of which tomllib goes through all before it.
+_DOTS = 100
+#: Tables or lists within each other.
+_DEPTH = 64
+#: Bytes in memory of a value, or of a list or an object, at most.
+_VALUE = 100
+#: Where a string or a comment of TOML begins, and what ends a key.
+_MARKS = re.compile(r"[\"'#\n,=\[\]{}]")
+
+
+class NotTomlError(FormatError):
+    """Says that a text is not TOML, and not that it is too long or too deep."""
+
+
+def read_text(path: str | os.PathLike[str], most: int = BY_HAND) -> str:
+    """Return the text of a file, UTF-8 with or without BOM.
+
+    Raises
+    ------
+    FormatError : more than `most` bytes, not UTF-8 (names the byte), or no file but a pipe, a socket or a device
+    OSError : the file is not there, or cannot be read
+    """
+    with open_file(path) as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise FormatError(f"{path}: more than {most} bytes; must be at most that")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{path}, byte {error.start}: not text in UTF-8 ({error.reason})") from None
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the values of a file of TOML; errors as of `read_text` and `of_toml`."""
+    return of_toml(str(path), read_text(path))
+
+
+def read_json(path: str | os.PathLike[str], most: int = BY_HAND) -> Any:
+    """Return the value of a file of JSON; errors as of `read_text` and `of_json`."""
+    return of_json(str(path), read_text(path, most), most)
+
+
+def text_of_json(path: str | os.PathLike[str], most: int = BY_TAXEL) -> str:
+    """Return the text of a file of JSON that the compiled part reads; errors as of `read_json`."""
+    text = read_text(path, most)
+    of_json(str(path), text, most)
+    return text
+
+
+def of_toml(place: str, text: str) -> dict[str, Any]:
+    """Return the values of a text in TOML.
+
+    Parameters
+    ----------
+    place : str
+        For errors.
+    text : str, at most 1 MiB
+
+    Raises
+    ------
+    FormatError : not TOML, too long, nested too deeply, or a key with too many dots (names the line)
+    """
+    _check_length(place, text, BY_HAND)
+    for line, key in _between_marks(text):
+        if key.count(".") > _DOTS:
+            raise FormatError(f"{place}, line {line}: a key of {key.count('.')} dots; must have at most {_DOTS}")
+    try:
+        values = tomllib.loads(text)
+    except RecursionError:
+        raise _too_deep(place) from None
+    # A whole number of more digits than Python reads is a ValueError too.
+    except ValueError as error:
+        raise NotTomlError(f"{place}: not TOML: {first_line(error)}") from None
+    _check_depth(place, values)
+    return values
+
+
+def of_json(place: str, text: str, most: int = BY_HAND, *, with_nan: bool = False) -> Any:
+    """Return the value of a text in JSON.
+
+    Parameters
+    ----------
+    place : str
+        For errors.
+    text : str
+    most : int, characters
+    with_nan : bool
+        Whether NaN and Infinity, which are not JSON, are read, as earlier versions of taxel wrote them.
+
+    Raises
+    ------
+    FormatError : not JSON, as NaN and Infinity are not, a key that stands twice in an object, too long, or nested too
+        deeply
+    """
+    _check_length(place, text, most)
+    unpacked(place, len(text) + _VALUE * sum(map(text.count, ",[{:")))
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        values = dict(pairs)
+        if len(values) < len(pairs):
+            twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
+            raise FormatError(f"{place}: not JSON: {shown(twice)} stands twice in one object")
+        return values
+
+    def refuse(constant: str) -> NoReturn:
+        raise FormatError(f"{place}: not JSON: {constant} is no number there")
+
+    try:
+        value = json.loads(text, object_pairs_hook=once, parse_constant=None if with_nan else refuse)
+    except RecursionError:
+        raise _too_deep(place) from None
+    # A whole number of more digits than Python reads is a ValueError too.
+    except ValueError as error:
+        raise FormatError(f"{place}: not JSON: {first_line(error)}") from None
+    _check_depth(place, value)
+    return value
+
+
+def _check_length(place: str, text: str, most: int) -> None:
+    if len(text) > most:
+        raise FormatError(f"{place}: {len(text)} characters; must be at most {most}")
+
+
+def _too_deep(place: str) -> FormatError:
+    return FormatError(f"{place}: nested too deeply; must be at most {_DEPTH} levels")
+
+
+def _check_depth(place: str, value: Any) -> None:
+    """Refuse values that later steps, which call themselves for each level, could not go through."""
+    level = [value]
+    for _ in range(_DEPTH + 1):
+        inner: list[Any] = []
+        for one in level:
+            entries = one.values() if isinstance(one, dict) else one if isinstance(one, list) else ()
+            inner += [entry for entry in entries if isinstance(entry, dict | list)]
+        level = inner
+        if not level:
+            return
+    raise _too_deep(place)
+
+
+def _between_marks(text: str) -> Iterator[tuple[int, str]]:
+    """Yield what may be a key of TOML, without its quoted parts, and its line: it ends at = , [ ] { } or the line."""
+    at, line, key = 0, 1, ""
+    while found := _MARKS.search(text, at):
+        begin, mark = found.start(), found[0]
+        key += text[at:begin]
+        if mark in "\"'":
+            # The end of a quote that is not closed is refused later.
+            quote = mark * 3 if text.startswith(mark * 3, begin) else mark
+            at = _end_of_quote(text, begin + len(quote), quote)
+            line += text.count("\n", begin, at)
+            continue
+        at = begin + 1
+        if mark == "#":
+            at = text.find("\n", begin)
+            at = len(text) if at < 0 else at
+            continue
+        yield line, key
+        key = ""
+        line += mark == "\n"
+    yield line, key + text[at:]
+
+
+def _end_of_quote(text: str, at: int, quote: str) -> int:
+    """Return where a quoted text ends that begins at `at`; in double quotes a backslash takes the next character."""
+    while (end := text.find(quote, at)) >= 0:
+        if quote[0] == "'":
+            return end + len(quote)
+        before = text[at:end]
+        if (len(before) - len(before.rstrip("\\"))) % 2 == 0:
+            return end + len(quote)
+        at = end + 1
+    return len(text)

@@ -1,0 +1,252 @@
+"""The memory of opening a recording: little beside its arrays, and no more than there is, or than a caller allows."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import re
+import resource
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from formats import bags
+from refusal import refused
+from rosbags import rosbag1, rosbag2
+
+import taxel
+from taxel import FormatError, ProblemError, formats
+from taxel._base import limits
+from taxel._base.columns import Growing
+
+from . import large
+from .hostile import KINDS as SMALL
+from .making import some_events
+
+MIB = 1 << 20
+
+
+def opened(path: Path, *, at_most: int = 0, **how: Any) -> dict[str, Any]:
+    """Open a recording in a process of its own, within so many bytes of addresses; return what it said of memory."""
+
+    def limited() -> None:
+        if at_most:
+            resource.setrlimit(resource.RLIMIT_AS, (at_most, at_most))
+
+    command = [sys.executable, large.__file__, str(path), json.dumps(how)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, preexec_fn=limited)
+    assert done.returncode == 0, done.stderr[-2000:]
+    said: dict[str, Any] = json.loads(done.stdout)
+    return said
+
+
+@pytest.mark.parametrize("kind", large.QUICK)
+def test_little_memory_is_taken_beside_the_arrays(kind: str, tmp_path: Path) -> None:
+    sizes = {}
+    for size in (MIB, 24 * MIB):
+        (folder := tmp_path / str(size)).mkdir()
+        sizes[size] = opened(large.KINDS[kind](folder, size))
+    small, whole = sizes.values()
+    assert whole["arrays"] > 20 * MIB
+    # What a process takes for itself does not count here, so that 24 MiB show the ratio.
+    assert whole["peak"] - small["peak"] <= 1.5 * whole["arrays"] + 8 * MIB
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("kind", large.KINDS)
+def test_at_most_half_of_the_arrays_and_256_mib_are_taken_beside_them(kind: str, tmp_path: Path) -> None:
+    said = opened(large.KINDS[kind](tmp_path, 256 * MIB))
+    assert said["arrays"] > 200 * MIB
+    assert said["peak"] <= 1.5 * said["arrays"] + 256 * MIB
+
+
+def test_every_format_of_another_maker_is_among_the_large_files() -> None:
+    assert set(formats.FORMATS) <= set(large.KINDS)
+
+
+# what is larger than may be read
+
+
+@pytest.mark.parametrize("kind", SMALL)
+def test_a_limit_refuses_what_is_larger_and_names_both_sizes(kind: str, tmp_path: Path) -> None:
+    path = SMALL[kind](tmp_path)
+
+    def read(limit: int) -> int:
+        return large.arrays_of(taxel.open(path, limit=limit))
+
+    with refused(r"\d{2,} bytes.* at most 10 .*: --limit BYTES \(limit=\) says how many may be", FormatError):
+        read(10)
+    assert read(1 << 40) > 10
+
+
+@pytest.mark.parametrize("limit", [0, -1, 1.5, "1 GB", True])
+def test_a_limit_is_a_number_of_bytes(limit: object, tmp_path: Path) -> None:
+    taxel.convert(some_events(), tmp_path / "a.npz")
+    with refused("limit is"):
+        taxel.open(tmp_path / "a.npz", limit=limit)
+
+
+def test_the_recordings_of_a_folder_count_together(tmp_path: Path) -> None:
+    size = 0
+    for k in range(4):
+        taxel.convert(some_events(), tmp_path / f"{k}.npz")
+        size = large.arrays_of(taxel.open(tmp_path / f"{k}.npz"))
+    with refused("--limit", FormatError):
+        taxel.open(tmp_path, limit=3 * size)
+    assert len(taxel.open(tmp_path, limit=100 * size)) == 4
+
+
+def gzip_bomb(folder: Path) -> Path:
+    """Write a table of 6 MB that unpacks to 1.7 GB."""
+    part = gzip.compress((b"0," * 49 + b"0\n") * 100_000)
+    with (folder / "a.csv.gz").open("wb") as file:
+        for _ in range(170):
+            file.write(part)
+    (folder / "layout.toml").write_text("rows = 1\ncolumns = 50\nrate_hz = 100\n")
+    return folder / "a.csv.gz"
+
+
+def npz_bomb(folder: Path, pieces: int = 600) -> Path:
+    """Write pictures of 600 MiB in .6 MB; of the 3 GiB of 3 times 1024 pieces the file holds the description alone."""
+    with zipfile.ZipFile(folder / "a.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        n = pieces << 8
+        for name, descr, shape in (("values", "<f4", (n, 32, 32)), ("t", "<i8", (n,))):
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array_header_1_0(file, {"descr": descr, "fortran_order": False, "shape": shape})
+                for _ in range(1 if name == "t" or pieces > 1000 else pieces):
+                    file.write(bytes(8 * n if name == "t" else 1 << 20))
+    return folder / "a.npz"
+
+
+@pytest.mark.parametrize("write", [gzip_bomb, npz_bomb])
+def test_a_small_file_that_unpacks_to_gigabytes_is_refused_before_it_takes_them(write: Any, tmp_path: Path) -> None:
+    path = write(tmp_path)
+    assert path.stat().st_size < 8_000_000
+    said = opened(path, limit=300_000_000)
+    assert "--limit BYTES" in said["refused"]
+    assert said["peak"] < 256 * MIB
+
+
+def test_a_recording_that_is_larger_than_what_is_available_is_refused_with_both_sizes(tmp_path: Path) -> None:
+    """A process that may address 2 GiB has less than 1.5 GiB for a recording."""
+    said = opened(npz_bomb(tmp_path, 3 << 10), at_most=2048 * MIB)
+    assert "claims 3221225472 bytes" in said["refused"]
+    assert "(3/4 of the memory that is available): --limit BYTES" in said["refused"]
+
+
+@pytest.mark.parametrize("ending", [".bag", ".mcap"])
+def test_a_chunk_of_a_bag_that_unpacks_to_too_much_is_refused(ending: str, tmp_path: Path) -> None:
+    """100 MB of zeros are some kilobytes of bz2 and of zstd."""
+    path = bags.write(tmp_path / f"a{ending}", [("/hand", bags.HAND, 1.0, 1.0, bags.hand([0.0] * 12_500_000, [1.0]))])
+    assert path.stat().st_size > 100_000_000
+    write_packed(path)
+    assert path.stat().st_size < 200_000
+    said = opened(path, topic="/hand", field="thumb")
+    assert re.search("a chunk .* more than 67108864 bytes|a chunk of 100.* at most 67108864", said["refused"])
+    assert said["peak"] < 256 * MIB
+
+
+def write_packed(path: Path) -> None:
+    """Write a bag anew with its chunks packed."""
+    to = path.with_name("packed")
+    if path.suffix == ".bag":
+        writer: Any = rosbag1.Writer(to)
+        writer.set_compression(rosbag1.Writer.CompressionFormat.BZ2)
+        reader: Any = rosbag1.Reader(path)
+        types = bags.store(bags.Stores.ROS1_NOETIC)
+    else:
+        writer = rosbag2.Writer(to, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP)
+        writer.set_compression(rosbag2.CompressionMode.STORAGE, rosbag2.CompressionFormat.ZSTD)
+        reader, types = rosbag2.Reader(path), bags.store()
+    with reader, writer:
+        for connection in reader.connections:
+            own = writer.add_connection(connection.topic, connection.msgtype, typestore=types)
+            for _, at, data in reader.messages([connection]):
+                writer.write(own, at, data)
+    path.unlink()
+    (to if path.suffix == ".bag" else next(to.glob("*.mcap"))).rename(path)
+
+
+def test_large_pictures_of_one_value_open_whatever_they_are_packed_to(tmp_path: Path) -> None:
+    """What taxel wrote always opens, though a bomb is packed as well."""
+    frames = taxel.Frames(np.zeros((300, 512, 512), np.float32), np.arange(300) * 1000)
+    path = tmp_path / "a.mcap"
+    taxel.convert(frames, path, compression="zstd")
+    assert 2 * frames.values.size > 1000 * path.stat().st_size
+    assert taxel.open(path).frames() == frames
+
+
+# what is available
+
+
+def machine(folder: Path, *, free_kib: int, groups: str = "") -> Path:
+    (folder / "proc/self").mkdir(parents=True)
+    (folder / "proc/meminfo").write_text(f"MemTotal: 99999999 kB\nMemAvailable:   {free_kib} kB\n")
+    (folder / "proc/self/statm").write_text("1 1 1 0 0 0 0\n")
+    (folder / "proc/self/cgroup").write_text(groups)
+    return folder
+
+
+def group(folder: Path, version: int, limit: object, used: int, files: int) -> None:
+    names = {1: ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")}
+    most, usage, inactive = names.get(version, ("memory.max", "memory.current", "inactive_file"))
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / most).write_text(f"{limit}\n")
+    (folder / usage).write_text(f"{used}\n")
+    (folder / "memory.stat").write_text(f"anon 5\n{inactive} {files}\n")
+
+
+def test_what_is_available_is_that_of_the_machine(tmp_path: Path) -> None:
+    assert limits.available(machine(tmp_path, free_kib=1000)) == 1_024_000
+
+
+@pytest.mark.parametrize("inner", ["a/b", ""])
+def test_the_limits_of_all_control_groups_above_count(inner: str, tmp_path: Path) -> None:
+    machine(tmp_path, free_kib=1000, groups=f"0::/{inner}\n")
+    top = tmp_path / "sys/fs/cgroup"
+    group(top / inner, 2, "max", 10, 0)
+    group(top / "a", 2, 900_000, 500_000, 100_000)
+    assert limits.available(tmp_path) == (500_000 if inner else 1_024_000)
+
+
+@pytest.mark.parametrize("place", ["docker/77", ""])
+def test_a_control_group_of_version_1_counts_also_from_within_a_container(place: str, tmp_path: Path) -> None:
+    machine(tmp_path, free_kib=1000, groups="4:cpu,cpuacct:/x\n3:memory:/docker/77\n")
+    group(tmp_path / "sys/fs/cgroup/memory" / place, 1, 800_000, 700_000, 50_000)
+    assert limits.available(tmp_path) == 150_000
+    group(tmp_path / "sys/fs/cgroup/memory" / place, 1, 600_000, 700_000, 50_000)
+    assert limits.available(tmp_path) == 0
+
+
+# columns that grow
+
+
+@pytest.mark.parametrize("pieces", [[0], [1] * 50, [7, 0, 300, 2], [10_000]])
+def test_columns_that_grow_are_what_was_added(pieces: list[int]) -> None:
+    rng = np.random.default_rng(3)
+    read = Growing("a", t=((), np.int64), values=((2, 3), np.float32))
+    parts = [(rng.integers(0, 9, n), rng.random((n, 2, 3)).astype(np.float32)) for n in pieces]
+    for t, values in parts:
+        read.add(t=t, values=values)
+    assert len(read) == sum(pieces)
+    np.testing.assert_array_equal(read.column("t"), np.concatenate([t for t, _ in parts]))
+    column = read.column("values")
+    np.testing.assert_array_equal(column, np.concatenate([values for _, values in parts]))
+    frames = taxel.Frames(column, np.arange(len(column)))
+    assert np.shares_memory(frames.values, column) or not len(column)
+
+
+def test_columns_that_grow_stop_at_the_limit() -> None:
+    with limits.opening(1000):
+        read = Growing("a.txt", t=((), np.int64))
+        read.add(t=np.zeros(125))
+        with refused("a.txt: claims 1008 bytes, unpacked; at most 1000", FormatError):
+            read.add(t=[1])
+    read.add(t=[1])
+    with pytest.raises(ProblemError, match="limit is 0"):
+        taxel.open("a.npz", limit=0)
