@@ -23,11 +23,11 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["GRACE_S", "ChildProcess", "safe_environment", "search_path"]
+__all__ = ["GRACE_S", "ChildProcess", "make_safe", "search_path"]
 
 #: How long a child may take to end by itself after its parent has ended, s.
 GRACE_S = 3.0
@@ -68,10 +68,12 @@ class ChildProcess(subprocess.Popen[Any]):
             "unfinished": [os.path.abspath(path) for path in unfinished],
             "is_file": isinstance(program, Path),
         }
+        variables = {**os.environ, **(env or {})}
+        make_safe(variables)
         try:
             super().__init__(
                 [sys.executable, "-P", __file__, json.dumps(order), str(program), *map(str, arguments)],
-                env=safe_environment({**os.environ, **(env or {})}),
+                env=variables,
                 pass_fds=[*pass_fds, watched],
                 start_new_session=True,
                 **options,
@@ -116,14 +118,15 @@ def _let_go_of_all() -> None:
 os.register_at_fork(after_in_child=_let_go_of_all)
 
 
-def safe_environment(variables: Mapping[str, str]) -> dict[str, str]:
-    """Return environment variables with which Python adds neither the current folder nor a script's to its path.
+def make_safe(variables: MutableMapping[str, str]) -> None:
+    """Change environment variables so that Python adds neither the current folder nor a script's to its path.
 
     An empty entry of PYTHONPATH, which Python takes for the current folder, is left out.
     """
-    safe = {**variables, "PYTHONSAFEPATH": "1"}
-    named = [entry for entry in safe.pop("PYTHONPATH", "").split(os.pathsep) if entry]
-    return safe | ({"PYTHONPATH": os.pathsep.join(named)} if named else {})
+    variables["PYTHONSAFEPATH"] = "1"
+    named = [entry for entry in variables.pop("PYTHONPATH", "").split(os.pathsep) if entry]
+    if named:
+        variables["PYTHONPATH"] = os.pathsep.join(named)
 
 
 def search_path() -> list[str]:

@@ -36,7 +36,6 @@ from taxel.cli._board import (
     RecordOption,
     SendOption,
     TareOption,
-    asked_to_end,
     counters_table,
     doubted,
     exit_code,
@@ -47,6 +46,7 @@ from taxel.cli._board import (
 )
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
+from taxel.cli._stopping import asked_to_end
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.detect import PlainRule, Readout, load
 from taxel.detections import Detection
