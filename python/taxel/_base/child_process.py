@@ -2,9 +2,10 @@
 
 The parent holds one end of a pipe, which the system closes however the parent ends. The child is this file, run by its
 path: before it runs its program, it starts a thread that waits for the end of the pipe. The thread removes the files
-that are unfinished and sends SIGTERM to its own process, which ends it; a program that has to clean up handles SIGTERM,
-as the command line does. A process that still runs after `GRACE_S` is killed. So a program needs no code for this. It
-may be a file that does not import taxel, such as ``h5_child.py``, because this one imports the standard library alone::
+that are unfinished and sends SIGTERM to its process group: the process and what it has started. A program that has to
+clean up handles SIGTERM, as the command line does. What still runs after `GRACE_S` is killed. So a program needs no
+code for this. It may be a file that does not import taxel, such as ``h5_child.py``, because this one imports the
+standard library alone::
 
     child = ChildProcess(Path("h5_child.py"), [path, memory], pass_fds=[memory], stdin=PIPE, stdout=PIPE)
 
@@ -25,6 +26,7 @@ import time
 import weakref
 from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 __all__ = ["GRACE_S", "ChildProcess", "make_safe", "search_path"]
@@ -105,6 +107,12 @@ class ChildProcess(subprocess.Popen[Any]):
             self.kill()
             return self.wait()
 
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.end()
+        super().__exit__(kind, error, trace)
+
 
 _running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
 
@@ -135,14 +143,14 @@ def search_path() -> list[str]:
 
 
 def _watch(watched: int, unfinished: Sequence[str]) -> None:
-    """Wait for the end of the parent, then end this process."""
+    """Wait for the end of the parent, then end this process and those that it has started."""
     # Nothing is ever written: to read returns when the parent's end is closed.
     os.read(watched, 1)
     _remove(unfinished)
-    os.kill(os.getpid(), signal.SIGTERM)
+    os.killpg(0, signal.SIGTERM)
     time.sleep(GRACE_S)
     _remove(unfinished)
-    os.kill(os.getpid(), signal.SIGKILL)
+    os.killpg(0, signal.SIGKILL)
 
 
 def _remove(files: Sequence[str]) -> None:
