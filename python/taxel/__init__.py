@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from taxel._base import matplotlib_settings
 from taxel._base.drawing import draw_by
 from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
 from taxel.array import Array, Places
@@ -87,6 +88,7 @@ _ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
 _ELSEWHERE |= {"open": ("taxel.recording", "open_any"), "Readout": ("taxel.detect", "Readout")}
 
 
+matplotlib_settings.ignore_current_folder()
 # A noun's `plot` loads the plots, and matplotlib with them, when it is first called.
 draw_by(lambda: import_module("taxel.plot"))
 

@@ -1,5 +1,5 @@
 """Run the command line with ``python -m taxel``."""
 
-from taxel.cli import main
+from taxel.cli import program
 
-main()
+program()

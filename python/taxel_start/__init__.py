@@ -1,9 +1,29 @@
 """The program `taxel` while the package `taxel` loads: that takes a while, in which Ctrl-C is to be quiet too."""
 
 import os
-import signal
 import sys
-from typing import NoReturn
+
+
+def _leave_out_current_folder() -> None:
+    """Leave out the current folder, where no more than an empty entry of PYTHONPATH put it on the path.
+
+    A folder of recordings may hold Python files of strangers. A checkout, where taxel itself lies, stays.
+    """
+    named = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    try:
+        here = os.getcwd()
+    except FileNotFoundError:
+        return
+    if "" in named and here not in map(os.path.abspath, filter(None, named)):
+        own = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+        sys.path[:] = [entry for entry in sys.path if entry not in ("", here) or here == own]
+
+
+# Before anything is imported that a file of the current folder could stand for.
+_leave_out_current_folder()
+
+import signal  # noqa: E402
+from typing import NoReturn  # noqa: E402
 
 __all__ = ["main"]
 
@@ -15,10 +35,13 @@ _WRONG_INPUT = 2
 
 def main() -> NoReturn:
     """Load the command line, then run it."""
-    # Nothing is open yet that would have to be closed.
-    signal.signal(signal.SIGINT, lambda *_: os._exit(_STOPPED))
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        # What was ignored when the program began, as by nohup, stays ignored.
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            # Nothing is open yet that would have to be closed.
+            signal.signal(number, lambda *_: os._exit(_STOPPED))
     try:
-        from taxel.cli import main as run  # noqa: PLC0415  this is what takes a while
+        from taxel.cli import program  # noqa: PLC0415  this is what takes a while
     except Exception as error:
         # The compiled part refuses to load where TAXEL_INSTRUCTIONS names no vector instructions of this machine.
         if type(error).__module__ != "taxel":
@@ -29,8 +52,4 @@ def main() -> NoReturn:
 
     # With its first array the compiled part asks NumPy for its interface: an interrupt there would be a panic.
     decode(b"")
-    try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        run()
-    except KeyboardInterrupt:
-        sys.exit(_STOPPED)
+    program()

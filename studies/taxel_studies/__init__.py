@@ -9,6 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+import taxel  # noqa: F401  before a study loads matplotlib, which then reads no settings of the current folder
+
 if TYPE_CHECKING:
     from taxel_studies.study import Study
 

@@ -9,6 +9,10 @@ from __future__ import annotations
 
 import json
 import logging
+import os
+import signal
+import threading
+import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,6 +32,11 @@ __all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "one_of", "run", "w
 
 #: Where realisations may run: in loky's processes on this machine, or on a cluster.
 BACKENDS = ("loky", "dask", "ray")
+
+#: The variable with which Python adds neither the current folder nor a script's to its path.
+_SAFE_PATH = "PYTHONSAFEPATH"
+#: Interval at which a worker looks whether its parent runs, s.
+_ASK_EVERY_S = 0.5
 
 
 def one_of(name: str, value: object, allowed: Collection[str]) -> str:
@@ -177,18 +186,46 @@ class Workers:
         """Give a `joblib.Parallel` that uses them, for the time of a ``with`` block."""
         import joblib  # noqa: PLC0415  what runs in one process does not need it
 
-        if self.backend == "dask":
-            with _dask(self.jobs, self.scheduler), joblib.parallel_config(backend="dask"):
-                yield joblib.Parallel(n_jobs=-1, return_as="generator_unordered", batch_size=1)
-        elif self.backend == "ray":
-            with _ray(self.jobs, self.scheduler) as jobs, joblib.parallel_config(backend="ray"):
-                yield joblib.Parallel(n_jobs=jobs, batch_size=1)
+        with _without_current_folder():
+            if self.backend == "dask":
+                with _dask(self.jobs, self.scheduler), joblib.parallel_config(backend="dask"):
+                    yield joblib.Parallel(n_jobs=-1, return_as="generator_unordered", batch_size=1)
+            elif self.backend == "ray":
+                with _ray(self.jobs, self.scheduler) as jobs, joblib.parallel_config(backend="ray"):
+                    yield joblib.Parallel(n_jobs=jobs, batch_size=1)
+            else:
+                # Workers of Dask and Ray end with their parent by themselves.
+                watch: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
+                try:
+                    yield joblib.Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1, **watch)
+                except KeyboardInterrupt:
+                    joblib.externals.loky.get_reusable_executor().shutdown(wait=False, kill_workers=True)
+                    raise
+
+
+@contextmanager
+def _without_current_folder() -> Iterator[None]:
+    """Let workers start without the current folder on their path: it may hold a stranger's files."""
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
         else:
-            try:
-                yield joblib.Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1)
-            except KeyboardInterrupt:
-                joblib.externals.loky.get_reusable_executor().shutdown(wait=False, kill_workers=True)
-                raise
+            os.environ[_SAFE_PATH] = before
+
+
+def _end_with_parent(parent: int) -> None:
+    """End this worker of loky when its parent has ended: loky passes no pipe whose end tells so."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_ASK_EVERY_S)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    threading.Thread(target=watch, name="taxel-parent", daemon=True).start()
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """The command line: one file a command.
 
-Exit codes, for scripts: 0 done, 2 the user's input is wrong, 3 board, socket or disk, 130 stopped by Ctrl-C.
+Exit codes, for scripts: 0 done, 2 the user's input is wrong, 3 board, socket or disk, 130 stopped by Ctrl-C, SIGTERM or
+SIGHUP.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from typing import Any, NoReturn
 
 import typer
 
+from taxel._base.child_process import make_safe
 from taxel._core import DeviceError, Error
 from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App, app
 from taxel.cli._recordings import SET_HELP, assignments
 from taxel.cli._say import say
+from taxel.cli._stopping import leave, stop_on_signals
 
-__all__ = ["SET_HELP", "App", "app", "assignments", "main", "say"]
+__all__ = ["SET_HELP", "App", "app", "assignments", "main", "program", "say"]
 
 #: typer's error for a command line that cannot be parsed; the class belongs to its own copy of click.
 _UsageError: Any = typer.BadParameter.__base__
@@ -31,6 +34,18 @@ def _root(version: bool = typer.Option(False, "--version", help="Print the versi
 
         say(f"taxel {__version__}")
         raise typer.Exit
+
+
+def program() -> NoReturn:
+    """Run the command line as the only work of this process: its environment and its signals are the command's."""
+    make_safe(os.environ)
+    try:
+        stop_on_signals()
+        main()
+    except KeyboardInterrupt:
+        leave(STOPPED)
+    except SystemExit as end:
+        leave(end.code)
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import signal
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
@@ -42,7 +40,6 @@ __all__ = [
     "SendOption",
     "SourceOption",
     "TareOption",
-    "asked_to_end",
     "counters_table",
     "exit_code",
     "outside",
@@ -182,22 +179,6 @@ def _bridged(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
         ahead, within = (clock[name] / 1e6 for name in ("ahead_ns", "within_ns"))
         compared = f"{ahead:+,.3f} ms, within {within:.3f} ms, {clock['drift_ppm']:+.1f} ppm"
     return [("other computer", state, ""), ("lost between", lost, ""), ("its clock", compared, "")]
-
-
-@contextlib.contextmanager
-def asked_to_end() -> Iterator[threading.Event]:
-    """Turn the first Ctrl-C into a flag, so that no detection is lost before it is printed; the next one raises."""
-    asked, before = threading.Event(), signal.getsignal(signal.SIGINT)
-
-    def note(*_: object) -> None:
-        asked.set()
-        signal.signal(signal.SIGINT, before)
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield asked
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:

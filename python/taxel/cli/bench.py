@@ -19,6 +19,7 @@ from typing import Annotated, Any, BinaryIO
 
 import typer
 
+from taxel._base.child_process import ChildProcess
 from taxel._base.files import write_whole
 from taxel._base.messages import counted
 from taxel._base.provenance import installed_sources
@@ -270,10 +271,13 @@ class _Others:
 def _run(file: Path, *, quick: bool) -> dict[str, Any]:
     """Run a benchmark in a process of its own."""
     program, size = file.resolve().with_name("_alone.py"), "quick" if quick else "whole"
-    done = subprocess.run([sys.executable, program, file.stem, size], stdout=subprocess.PIPE, text=True, check=False)
-    if done.returncode:
-        raise ProblemError(f"{file.stem}: ended with status {done.returncode}, without a result")
-    result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    # The benchmark and its own processes import modules of its folder.
+    path = os.pathsep.join([str(program.parent), os.environ.get("PYTHONPATH", "")])
+    with ChildProcess(program, [file.stem, size], env={"PYTHONPATH": path}, stdout=subprocess.PIPE, text=True) as child:
+        printed, _ = child.communicate()
+    if child.returncode:
+        raise ProblemError(f"{file.stem}: ended with status {child.returncode}, without a result")
+    result: dict[str, Any] = json.loads(printed.splitlines()[-1])
     return result
 
 

@@ -36,7 +36,6 @@ from taxel.cli._board import (
     RecordOption,
     SendOption,
     TareOption,
-    asked_to_end,
     counters_table,
     doubted,
     exit_code,
@@ -48,6 +47,7 @@ from taxel.cli._board import (
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
 from taxel.cli._say import say
+from taxel.cli._stopping import asked_to_end
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout, load

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import json
-import signal
 import time
 from contextlib import nullcontext, suppress
 from dataclasses import asdict
@@ -86,15 +85,15 @@ def record(
 ) -> None:
     """Record what a board sends by UDP, and report what was lost.
 
-    Ends with Ctrl-C or SIGTERM, after --seconds, or with the board's stop marker (--markers). With --length it records
-    one trial after another, with a number appended to the name and a countdown with beeps before each. The board is
-    received during countdowns too, so each trial begins with the values of all taxels; with --countdown 0 nothing is
-    lost between two trials. An empty trial is not saved, and its number is used again; with --trials, three empty
-    trials in a row end the command with exit code 3. While it records, a key on the terminal, or a line on any other
-    standard input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the input is
-    not for taxel). --source records other boards, and lines of numbers, into the same .mcap, each with its own clock.
-    Exit code 3: nothing was received, or something was lost after it had arrived; 2: the board has more taxels than
-    --array.
+    Ends with Ctrl-C, SIGTERM or SIGHUP, after --seconds, or with the board's stop marker (--markers). With --length it
+    records one trial after another, with a number appended to the name and a countdown with beeps before each. The
+    board is received during countdowns too, so each trial begins with the values of all taxels; with --countdown 0
+    nothing is lost between two trials. An empty trial is not saved, and its number is used again; with --trials, three
+    empty trials in a row end the command with exit code 3. While it records, a key on the terminal, or a line on any
+    other standard input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the
+    input is not for taxel). --source records other boards, and lines of numbers, into the same .mcap, each with its own
+    clock. Exit code 3: nothing was received, or something was lost after it had arrived; 2: the board has more taxels
+    than --array.
 
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
@@ -118,8 +117,6 @@ def record(
         "remote": address,
     }
     console = Console(stderr=True, quiet=as_json)
-    # A service that is stopped finishes its file.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     if length is None:
         summary, code = _one(file, live, seconds, markers, console)
         _print(summary, as_json)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import taxel
+from taxel._base.child_process import ChildProcess
 from taxel._base.messages import counted
 from taxel._core import DeviceError
 from taxel.demo.evaluation import Evaluation, evaluate_events
@@ -81,9 +81,8 @@ def play_live(
     detections: list[Detection] = []
     # The tare ends where the board marks its start, well before a second is over.
     with Live(0, host="127.0.0.1", readout=readout, tare=1.0, record=recording) as live:
-        command = [sys.executable, "-m", "taxel", "emulate", "--json", "--port", str(live.address[1])]
-        command += ["--scenes", str(scenes), "--seed", str(seed)]
-        board = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        words = ["emulate", "--json", "--port", live.address[1], "--scenes", scenes, "--seed", seed]
+        board = ChildProcess("taxel", words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
             ended = None
             drawn = 0.0
@@ -98,9 +97,7 @@ def play_live(
                     shown.draw(live.counters, live.picture, detections)
             printed, complaint = board.communicate()
         finally:
-            if board.poll() is None:
-                board.terminate()
-                board.wait()
+            board.end()
         if board.returncode != 0:
             raise DeviceError(f"the board's process ended with code {board.returncode}: {complaint.strip()[-300:]}")
         while (one := live.next(0.0)) is not None:

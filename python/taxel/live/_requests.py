@@ -10,7 +10,6 @@ import shlex
 import socket
 import struct
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.child_process import ChildProcess
 from taxel._base.documents import read_toml
 from taxel._base.files import whole_file
 from taxel._core import ProblemError
@@ -47,6 +47,9 @@ _ADDRESS_OF = 0x8915
 
 #: Code with which a command ends after Ctrl-C.
 _INTERRUPTED = 130
+
+#: The reason that a client sees of a training that was stopped.
+_STOPPED = "the training was stopped: nothing was written"
 
 #: A label that a person set may be late: the rest before it ends so much earlier, and lasts so long at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
@@ -133,16 +136,23 @@ class RequestHandler:
         opening: Opening,
     ) -> None:
         self._listen, self._delta_intensity, self._read_out, self._cable = listen, delta_intensity, read_out, cable
-        self._training: subprocess.Popen[str] | None = None
+        self._training: ChildProcess | None = None
+        self._closed = False
         #: What the training has said on stderr, line by line.
         self._training_lines: list[str] = []
         self._training_lock = threading.Lock()
         self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
         self._files, self._opening = ShownFiles(opening), opening
 
+    def end_work(self) -> None:
+        """End a training that runs, and begin no other: the server waits for no request that takes long."""
+        with self._training_lock:
+            self._closed = True
+        self.end_training()
+
     def close(self) -> None:
         """Close the serial line, end a training that runs, and remove temporary files."""
-        self.end_training()
+        self.end_work()
         self._files.close()
         self._disconnect()
 
@@ -264,28 +274,28 @@ class RequestHandler:
 
     def train(self, recording: Path, out: Path) -> str:
         """Train on the labels of a recording as ``taxel train`` does; return what it prints, then its warnings."""
-        command = [sys.executable, "-m", "taxel", *self._training_words(recording, out)]
+        words = [*self._training_words(recording, out), "--overwrite"]
         with self._training_lock:
+            if self._closed:
+                raise ProblemError(_STOPPED)
             if self._training is not None:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
             # A process of its own, so that it takes no time from what arrives.
-            self._training = subprocess.Popen(
-                [*command, "--overwrite"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-            )
+            self._training = ChildProcess("taxel", words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
             printed, errors = self._heard(self._training)
             code = self._training.returncode
         finally:
             self._training = None
         if code < 0 or code == _INTERRUPTED:
-            raise ProblemError("the training was stopped: nothing was written")
+            raise ProblemError(_STOPPED)
         if code:
             lines = [line for line in errors.splitlines() if line.strip()]
             raise ProblemError(lines[-1].removeprefix("taxel: ") if lines else f"the training ended with code {code}")
         warned = [line.removeprefix("taxel: ") for line in errors.splitlines() if line.startswith("taxel: warning: ")]
         return "\n".join([printed.strip(), *warned])
 
-    def _heard(self, training: subprocess.Popen[str]) -> tuple[str, str]:
+    def _heard(self, training: ChildProcess) -> tuple[str, str]:
         """Wait until a training has ended; return what it printed, and what it said on stderr."""
         assert training.stdout is not None
         assert training.stderr is not None
@@ -318,7 +328,7 @@ class RequestHandler:
         """End the training that runs, if one does."""
         training = self._training
         if training is not None:
-            training.terminate()
+            training.end()
 
     def detect(self, recording: Path, trial: str | None, readout: Path) -> tuple[list[str], list[tuple[str, int, int]]]:
         """Return a readout's labels, and its detections in a recording or its trial: label, time, when known."""

@@ -1,14 +1,15 @@
 """The process between a panel's server and an external viewer: whatever the viewer does, capture goes on.
 
 It holds a `PanelClient`, a bounded queue, and a thread that passes the items to the viewer. One line of JSON on the
-standard input holds its options; the end of the input ends the process. It reports its state by lines of JSON on the
-standard output.
+standard input holds its options. SIGTERM, which it gets when its parent ends (`taxel._base.child_process`), ends it. It
+reports its state by lines of JSON on the standard output.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import threading
 import time
@@ -187,7 +188,7 @@ def _counted(items: list[tuple[Subject, Item]]) -> Counter[str]:
 
 
 def main() -> None:
-    """Run until the standard input ends."""
+    """Run until SIGTERM."""
     options = json.loads(sys.stdin.readline())
     encoder = None if options["encoder"] is None else Encoder.from_json(options["encoder"])
     try:
@@ -197,22 +198,17 @@ def main() -> None:
     except (OSError, Error) as error:
         _report({"error": str(error)})
         return
+    ends = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: ends.set())
     _report({"place": viewer.place})
     relay = Relay(client, viewer, options["speed"])
     relay.begin()
-    ends = threading.Event()
-    threading.Thread(target=_wait_for_end_of_input, args=(ends,), name="taxel-end", daemon=True).start()
     while not ends.wait(_REPORT_EVERY_S):
         _report(relay.state())
     relay.finish()
     _report(relay.state(last=True))
     # A thread may wait for a viewer that does not read, and so may the clean-up of its library.
     os._exit(0)
-
-
-def _wait_for_end_of_input(ends: threading.Event) -> None:
-    sys.stdin.read()
-    ends.set()
 
 
 def _report(state: dict[str, Any]) -> None:

@@ -256,6 +256,7 @@ class Panel:
         """End the server, and the `Live` that `listen` or `delta_intensity` began; clients are notified."""
         if not self._stopped:
             self._stopped = True
+            self._requests.end_work()
             self._core.stop()
             self._requests.close()
             if self._live is not None and self._live is not self._first:

@@ -8,13 +8,13 @@ import json
 import os
 import re
 import subprocess
-import sys
 import threading
 from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any
 
 from taxel._base.arguments import instance, number, shown, text
+from taxel._base.child_process import ChildProcess
 from taxel._base.messages import escaped, installing
 from taxel._core import ProblemError
 from taxel.encode import Encoder
@@ -25,9 +25,6 @@ from taxel.live.panel import Panel
 __all__ = ["Viewer", "Viewing"]
 
 _MOST_PORT = 65_535
-
-#: How long the process may take to end, s.
-_END_WITHIN_S = 4.0
 
 
 @dataclass(frozen=True)
@@ -127,15 +124,13 @@ class Viewer:
         self._state, self._changed = Viewing(), threading.Condition()
         self._ended = self._stopping = False
         self._listener: threading.Thread | None = None
-        # A session of its own, because Ctrl-C is handled here; -P, so that no file of the current folder is imported as
-        # a library; RUST_LOG, because the libraries' own messages are not for the user.
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "taxel.live._viewer_process"],
+        self._process = ChildProcess(
+            "taxel.live._viewer_process",
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env={**os.environ, "RUST_LOG": "off"},
-            start_new_session=True,
+            # The libraries' own messages are not for the user.
+            env={"RUST_LOG": "off"},
         )
         try:
             self._place = self._begun(options)
@@ -151,7 +146,7 @@ class Viewer:
         assert self._process.stdout is not None
         with contextlib.suppress(BrokenPipeError):
             self._process.stdin.write(json.dumps(options) + "\n")
-            self._process.stdin.flush()
+            self._process.stdin.close()
         line = self._process.stdout.readline()
         if not line:
             raise OSError(f"{options['to']['what']}: its process ended while it started")
@@ -198,14 +193,7 @@ class Viewer:
     def stop(self) -> Viewing:
         """End, after at most 2 s for pending items, and return the last state; a second call returns the same."""
         self._stopping = True
-        assert self._process.stdin is not None  # asked for
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.close()
-        try:
-            self._process.wait(_END_WITHIN_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        self._process.end()
         if self._listener is not None:
             self._listener.join()
         if self._process.stdout is not None:

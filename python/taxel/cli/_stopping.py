@@ -1,0 +1,93 @@
+"""How a command is stopped: by Ctrl-C, by SIGTERM (a service that ends) and by SIGHUP (a terminal that closes)."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import NoReturn
+
+__all__ = ["asked_to_end", "leave", "stop_on_signals"]
+
+#: A terminal that closes sends SIGHUP twice, and a service that ends SIGTERM and SIGHUP: signals that follow another
+#: within this time are not taken for a second request, s.
+_ONE_REQUEST_S = 1.0
+
+_Handler = Callable[[int, FrameType | None], None]
+
+
+class _Requests:
+    """Tells a new request to stop from one that repeats the last."""
+
+    def __init__(self) -> None:
+        self._last = float("-inf")
+
+    def is_new(self, number: int) -> bool:
+        """Return whether a signal is a new request; Ctrl-C always is, because a person types it."""
+        before, self._last = self._last, time.monotonic()
+        return number == signal.SIGINT or self._last - before > _ONE_REQUEST_S
+
+
+_requests = _Requests()
+
+
+def _stop(number: int, _frame: FrameType | None) -> None:
+    if _requests.is_new(number):
+        raise KeyboardInterrupt
+
+
+def _handle(handler: _Handler) -> dict[int, object]:
+    """Install a handler of the signals that stop a command; return those before.
+
+    A signal that was ignored when the program began, as by nohup, stays ignored.
+    """
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    handled = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    return {number: signal.signal(number, handler) for number in handled}
+
+
+def stop_on_signals() -> None:
+    """Raise KeyboardInterrupt on SIGTERM and SIGHUP as on Ctrl-C, so that recordings are closed and files removed."""
+    _handle(_stop)
+
+
+@contextlib.contextmanager
+def asked_to_end() -> Iterator[threading.Event]:
+    """Turn the first request into a flag, so that no detection is lost before it is printed; the next raises."""
+    asked = threading.Event()
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if asked.is_set():
+            _stop(number, frame)
+        elif _requests.is_new(number):
+            asked.set()
+
+    before = _handle(note)
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]  # what signal.signal returned
+
+
+def leave(code: int | str | None) -> NoReturn:
+    """End the process with an exit code.
+
+    Where a thread that Python does not wait for runs Python code yet, the interpreter must not end as usual: it would
+    end the thread inside compiled code that called Python, which aborts the process. A request of the panel's page may
+    be such a thread.
+    """
+    awaited = {thread.ident for thread in threading.enumerate() if not thread.daemon}
+    if not isinstance(code, int) or set(sys._current_frames()) <= awaited:
+        sys.exit(code)
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)

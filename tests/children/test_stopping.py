@@ -1,0 +1,198 @@
+"""Commands that are stopped: however that happens, recordings are closed, and no child is left or writes anything."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import socket
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from loopback import free_port, until
+
+import taxel
+from taxel import Array, Frames
+
+from .marked import ENDS, TAXEL, WITHIN_S, Marked
+
+
+def files(folder: Path) -> dict[str, int]:
+    """Return the files of a folder and when they were written, without what the test itself keeps there."""
+    return {str(one): one.stat().st_mtime_ns for one in folder.rglob("*") if one.name not in ("out", "err")}
+
+
+def check_end(one: Marked, end: str, code: int | None = 0) -> None:
+    """End a command, and check its exit code and that nothing of it runs or writes any more."""
+    ENDS[end](one)
+    left = one.ended_within(WITHIN_S)
+    assert not left, (end, left)
+    written = files(one.folder)
+    if end == "kill":
+        assert one.code() == -signal.SIGKILL
+    elif end != "closed terminal" and code is not None:
+        assert one.code() == code, (end, one.said())
+    elif end == "closed terminal":
+        # What it would print has no reader.
+        assert one.code() >= 0
+    time.sleep(0.2)
+    assert files(one.folder) == written
+
+
+def datagrams(count: int = 20) -> list[bytes]:
+    events = taxel.Events(np.arange(count) * 1000, np.full(count, 2), np.full(count, 1), np.arange(count) % 2 == 0,
+                          array=Array(4, 4))  # fmt: skip
+    return [taxel.wire.encode(events[k : k + 1]) for k in range(count)]
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_a_recording_is_closed_however_the_command_is_stopped(tmp_path: Path, end: str) -> None:
+    port = free_port()
+    command = [TAXEL, "record", "walk.mcap", "--host", "127.0.0.1", "--port", port, "--array", "4x4"]
+    with Marked(tmp_path / "here", *command, on_terminal=end == "closed terminal") as one:
+        file = one.folder / "walk.mcap"
+        one.until(lambda _: any(one.folder.glob("*.mcap*")) or any(one.folder.glob(".walk*")))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            # The port may be open a little after the file.
+            for datagram in datagrams():
+                link.sendto(datagram, ("127.0.0.1", port))
+                time.sleep(0.02)
+        time.sleep(0.3)
+        check_end(one, end)
+        recording = taxel.open(file)
+        assert len(recording.events) >= 15
+        assert recording.truncated == (end == "kill")
+
+
+@pytest.mark.parametrize("end", ["kill", "SIGTERM", "SIGHUP", "closed terminal"])
+@pytest.mark.parametrize("command", ["view", "live", "emulate", "demo"])
+def test_a_command_ends_with_its_children_however_it_is_stopped(tmp_path: Path, command: str, end: str) -> None:
+    file = tmp_path / "mat.h5"
+    taxel.convert(Frames(np.ones((50, 4, 4)), np.arange(50) * 10_000, unit="kPa", array=Array(4, 4)), file)
+    words = {
+        "view": ["view", file, "--no-open"],
+        "live": ["live", "--panel", "--host", "127.0.0.1", "--port", 0],
+        "emulate": ["emulate", "--port", free_port(), "--seed", 1],
+        "demo": ["demo", "--scenes", 50, "--seed", 1, "--noise", 1, "--folder", "report"],
+    }[command]
+    ready = {"view": "Ctrl-C ends", "live": "Ctrl-C ends", "emulate": "playing", "demo": ""}[command]
+    # `demo` is stopped before it is done; `live` has received nothing.
+    code = {"view": 0, "emulate": 0, "live": 3, "demo": 130}[command]
+    with Marked(tmp_path / "here", TAXEL, *words, on_terminal=True) as one:
+        one.until(lambda it: ready in it.said() and (command != "demo" or it.children()))
+        time.sleep(0.5)
+        check_end(one, end, code)
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_workers_of_a_study_end_with_it(tmp_path: Path, end: str) -> None:
+    words = ["study", "fig6.9", "--jobs", 2, "--report", "report"]
+    with Marked(tmp_path / "here", TAXEL, *words, on_terminal=end == "closed terminal") as one:
+        # Two workers, and two processes that clean up behind them.
+        one.until(lambda it: it.children() >= 4)
+        check_end(one, end, 130)
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording with labels whose training takes long."""
+    folder = tmp_path_factory.mktemp("pressed")
+    draw, count = np.random.default_rng(1), 40_000
+    values = draw.random((count, 8, 8)).astype(np.float32) * 0.5
+    labels = ["label,t_us"]
+    for k in range(200, count - 100, 295):
+        values[k : k + 60, 2:5, 2:5] += 50
+        labels += [f"contact,{10_000 * k}", f"lift,{10_000 * (k + 60)}"]
+    taxel.convert(Frames(values, np.arange(count) * 10_000, unit="kPa", array=Array(8, 8)), folder / "mat.npz")
+    (folder / "mat.notes.csv").write_text("\n".join(labels))
+    return folder
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_a_training_ends_with_the_server_that_began_it(pressed: Path, tmp_path: Path, end: str) -> None:
+    client = pytest.importorskip("websockets.sync.client")
+    from panel.protocol import Client
+
+    assert client
+    folder = tmp_path / "here"
+    folder.mkdir()
+    for name in ("mat.npz", "mat.notes.csv"):
+        (folder / name).hardlink_to(pressed / name)
+    with Marked(folder, TAXEL, "view", "mat.npz", "--no-open", "--json") as one:
+        one.until(lambda it: (it.folder / "out").read_text().endswith("\n"))
+        shown = json.loads((folder / "out").read_text())
+        url = urlsplit(shown["url"])
+        with Client(SimpleNamespace(address=(url.hostname, url.port), token=shown["token"])) as page:
+            assert page.ask("open", name="mat.npz")["type"] == "done"
+            page.send(type="train", id=99)
+            one.until(lambda it: it.children())
+            # It trains by then.
+            time.sleep(2.0)
+            check_end(one, end)
+            with contextlib.suppress(Exception):
+                page.__exit__()
+    assert {path.name for path in folder.iterdir()} == {"mat.npz", "mat.notes.csv", "out", "err"}
+
+
+def test_a_request_that_takes_long_does_not_abort_a_server_that_ends(tmp_path: Path) -> None:
+    """The thread of the request runs Python code while the process ends."""
+    script = tmp_path / "script.py"
+    (tmp_path / "a.csv").write_text("t_us,a,b\n" + "".join(f"{1000 * k},1,2\n" for k in range(100)))
+    script.write_text(
+        "import sys, time\n"
+        "from taxel.live import _requests\n"
+        "def reads(self, *_, **__):\n"
+        "    open('reads', 'w')\n"
+        "    time.sleep(8)\n"
+        "_requests.RequestHandler.read = reads\n"
+        "sys.argv = ['taxel', 'view', 'a.csv', '--no-open', '--json']\n"
+        "from taxel.cli import program\n"
+        "program()\n"
+    )
+    pytest.importorskip("websockets")
+    from panel.protocol import Client
+
+    with Marked(tmp_path, sys.executable, "-P", script) as one:
+        one.until(lambda it: (it.folder / "out").read_text().endswith("\n"))
+        shown = json.loads((tmp_path / "out").read_text())
+        url = urlsplit(shown["url"])
+        with Client(SimpleNamespace(address=(url.hostname, url.port), token=shown["token"])) as page:
+            page.send(type="open", id=1, name="a.csv")
+            until((tmp_path / "reads").exists)
+            check_end(one, "SIGINT")
+
+
+@pytest.mark.parametrize("ignored", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
+def test_a_signal_that_was_ignored_at_the_start_stays_ignored(tmp_path: Path, ignored: signal.Signals) -> None:
+    """As by nohup, or in the background of a shell."""
+    begin = (
+        f"import os, signal, sys; signal.signal({int(ignored)}, signal.SIG_IGN); os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    words = ["record", "walk.mcap", "--host", "127.0.0.1", "--port", 0]
+    with Marked(tmp_path, sys.executable, "-c", begin, TAXEL, *words) as one:
+        time.sleep(0.3)
+        one._process.send_signal(ignored)
+        one.until(lambda it: "listening" in it.said())
+        one._process.send_signal(ignored)
+        time.sleep(0.5)
+        assert one._process.poll() is None
+        check_end(one, "SIGTERM" if ignored != signal.SIGTERM else "SIGINT", 3)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_command_is_stopped_quietly_while_it_loads(tmp_path: Path, number: signal.Signals) -> None:
+    """At any moment: it has ended by the default of the system, or says so by its exit code."""
+    codes = set()
+    for after_s in (0.02, 0.1, 0.2, 0.3, 0.5):
+        with Marked(tmp_path / f"{after_s}", TAXEL, "live", "--panel", "--host", "127.0.0.1", "--port", 0) as one:
+            time.sleep(after_s)
+            one._process.send_signal(number)
+            codes.add(one.code())
+            assert "Traceback" not in one.said() or codes <= {-number}
+            assert not one.ended_within(WITHIN_S)
+    assert codes <= {-number, 130, 3}
