@@ -1,5 +1,6 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
+import { LabelConflict } from "./conflict.js";
 import { make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
 import { counted, readTime, seconds, timeUnit, writtenTime } from "./words.js";
@@ -44,6 +45,7 @@ export class Labels {
     this.failed = failed;
     this.shown = shown;
     this.counted = counted;
+    this.conflict = new LabelConflict(server, failed, shown);
     /** @type {Map<string, LabelsMessage>} by recording */
     this.files = new Map();
     /** The recording whose labels are shown. @type {string | null} */
@@ -205,6 +207,7 @@ export class Labels {
     const { labels } = this;
     this.offerName();
     const table = this.file ? this.files.get(this.file) : undefined;
+    this.conflict.show(table);
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
     this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";
     const place = table ? `${table.labels.length ? "Saved" : "To be saved"} in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
