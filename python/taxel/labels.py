@@ -24,7 +24,18 @@ from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
 
-__all__ = ["TURN_US", "Labels", "Note", "ahead_us", "beside", "rows_of", "source_of", "text_with", "trial_of", "write_labels"]
+__all__ = [
+    "TURN_US",
+    "Labels",
+    "Note",
+    "ahead_us",
+    "beside",
+    "rows_of",
+    "source_of",
+    "text_with",
+    "trial_of",
+    "write_labels",
+]
 
 #: The period after which the board's 16-bit clock of 100 us wraps, us.
 TURN_US = 6_553_600
@@ -278,7 +289,7 @@ def rows_of(place: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...], 
 
     Examples
     --------
-    >>> rows, others = rows_of("a.csv", ["label,t_us,comment\n", "heel,400,late\n"])
+    >>> rows, others = rows_of("a.csv", ["label,t_us,comment", "heel,400,late"])
     >>> rows[0].t, others
     (400, ('comment',))
     """

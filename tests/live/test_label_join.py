@@ -1,4 +1,4 @@
-"""The join of a table of labels with what was acknowledged: nothing acknowledged is lost, in any order, as often as asked."""
+"""The join of a table of labels with what was acknowledged: nothing is lost, in any order, as often as asked."""
 
 from __future__ import annotations
 

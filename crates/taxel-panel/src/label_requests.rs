@@ -30,7 +30,12 @@ pub(super) fn is_label_request(what: &str) -> bool {
 /// ([`Indexed::us`](super::indexed::Indexed::us)).
 pub(super) async fn read(hub: &Hub, recording: &str, us: i64) -> Answer {
     let stamp = stamp(hub, recording).await;
-    reread(hub, recording, stamp, us).await.map(drop)
+    let known = hub.labels.count(recording).is_some();
+    if reread(hub, recording, stamp, us).await? && known {
+        // The other clients that show it have an older list.
+        hub.clients.send(Broadcast::Labels(recording.to_owned()));
+    }
+    Ok(())
 }
 
 /// What changes with the table; the reason where that cannot be determined.
@@ -182,6 +187,7 @@ async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdi
         });
     }
     hub.labels.replace(name, Some(read.in_view(us)));
+    hub.labels.follows(name, us);
     hub.clients.send(Broadcast::Labels(name.to_owned()));
     Ok(answers)
 }

@@ -203,6 +203,11 @@ impl LabelTables {
         self.with(recording, |table| (table.stamp, table.us) = (stamp, us));
     }
 
+    /// Notes that a table that was written is followed from now on, as of a recording that runs.
+    pub(super) fn follows(&self, recording: &str, us: i64) {
+        self.with(recording, |table| table.us = us);
+    }
+
     /// Adds changes to those that are written next.
     pub(super) fn wait(&self, recording: &str, waiting: WaitingChanges) {
         self.with(recording, |table| table.waiting.push(waiting));

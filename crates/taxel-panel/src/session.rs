@@ -36,8 +36,9 @@ const REFUSALS_WITHIN: Duration = Duration::from_secs(10);
 /// How often a session without other work checks whether its client is alive.
 const IDLE: Duration = Duration::from_secs(1);
 
-/// What a client sent before it left is read for so long.
+/// What a client sent before it left is read until nothing arrives for this time, and at most for that one.
 const ARRIVED_WITHIN: Duration = Duration::from_millis(100);
+const MOST_ARRIVING: Duration = Duration::from_secs(5);
 
 struct Session {
     hub: Arc<Hub>,
@@ -78,14 +79,20 @@ impl Session {
 
     /// Begins the changes of labels that arrived before the client left.
     async fn begin_arrived(&mut self) {
-        while let Ok(Ok(incoming)) = tokio::time::timeout(ARRIVED_WITHIN, self.connection.receive()).await {
+        let begun = Instant::now();
+        while begun.elapsed() < MOST_ARRIVING
+            && let Ok(Ok(incoming)) = tokio::time::timeout(ARRIVED_WITHIN, self.connection.receive()).await
+        {
             let Incoming::Text(text) = incoming else { continue };
             let message: Map<String, Value> = serde_json::from_str(&text).unwrap_or_default();
             let what = message.get("type").and_then(Value::as_str).unwrap_or_default().to_owned();
             while !self.pending.has_room() {
                 tokio::time::sleep(FRAME).await;
             }
-            if is_label_request(&what) {
+            if matches!(&*what, "open" | "live") {
+                // The labels after it are of what it shows.
+                let _ = self.handle_own(&what, &Request(&message)).await;
+            } else if is_label_request(&what) {
                 self.pending.begin(&self.hub, Value::Null, what, message, self.viewport.shown());
             }
         }

@@ -1,16 +1,19 @@
-// A table of labels that another program has saved without what was set here: both versions, and the choice between them.
+// A table of labels that another program has saved without what was set on the page: both versions, and the choice between them.
 
 import { make, part, write } from "./dom.js";
 import { notify } from "./notice.js";
-import { counted, seconds } from "./words.js";
+import { counted, listedTime, seconds, timeUnit } from "./words.js";
 
 /** @typedef {import("./protocol.js").ConflictRow} ConflictRow */
 /** @typedef {import("./protocol.js").Labels} LabelsMessage */
 /** @typedef {import("./server.js").Server} Server */
 
+/** @param {number} t_us @returns {string} */
+const at = (t_us) => (timeUnit() === "seconds" ? `${listedTime(t_us)} s` : seconds(t_us));
+
 /** @param {ConflictRow} row @returns {string} */
 function described({ label, t_us, source, trial, replaces_us }) {
-  const what = label ? `${label}, ${seconds(t_us)}` : `no label for the note at ${seconds(replaces_us ?? t_us)}`;
+  const what = label ? `${label}, ${at(t_us)}` : `no label for the note at ${at(replaces_us ?? t_us)}`;
   return [what, source, trial].filter(Boolean).join(", ");
 }
 
@@ -46,15 +49,16 @@ export class LabelConflict {
     }
     this.id = conflict.conflict_id;
     const { missing, returned, new: added } = conflict;
-    const lacks = missing.length ? `lacks ${counted(missing.length, "label")} set here` : "";
-    const again = returned.length ? `has ${counted(returned.length, "label")} again that ${returned.length === 1 ? "was" : "were"} deleted, moved or renamed here` : "";
-    const what = `Another program saved ${message.path}: it ${[lacks, again].filter(Boolean).join(" and ")}.`;
-    write(part("conflict-text", HTMLElement), `${what} Choose the version that counts.${added.length ? " New labels of the file stay in both." : ""}`);
+    const were = (/** @type {number} */ count) => (count === 1 ? "was" : "were");
+    const lacks = missing.length ? `lacks ${counted(missing.length, "label")} that ${were(missing.length)} set on the page` : "";
+    const again = returned.length ? `has ${counted(returned.length, "label")} again that ${were(returned.length)} deleted or changed on the page` : "";
+    const what = `Another program saved ${message.path}: it ${[lacks, again].filter(Boolean).join(", and ")}.`;
+    write(part("conflict-text", HTMLElement), `${what} Choose which version counts.${added.length ? " New labels of the file stay in both." : ""}`);
     const line = (/** @type {string} */ here, /** @type {string} */ there, /** @type {string} */ kind) =>
       make("tr", { class: kind }, make("td", {}, here), make("td", {}, there));
     part("conflict-rows", HTMLElement).replaceChildren(
-      ...missing.map((row) => line(described(row), "not in it", "missing")),
-      ...returned.map((row) => line("not any more", described(row), "returned")),
+      ...missing.map((row) => line(described(row), "missing", "missing")),
+      ...returned.map((row) => line("deleted or changed", described(row), "returned")),
       ...added.map((row) => line("–", `${described(row)} (new)`, "new")),
     );
     notify(what, true, { text: "Look", action: () => this.look() });

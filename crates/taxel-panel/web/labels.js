@@ -3,7 +3,7 @@
 import { LabelConflict } from "./conflict.js";
 import { make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
-import { counted, readTime, seconds, timeUnit, writtenTime } from "./words.js";
+import { counted, listedTime, readTime, seconds, timeUnit } from "./words.js";
 
 /** @typedef {import("./protocol.js").Label} Label */
 /** @typedef {import("./protocol.js").Labels} LabelsMessage */
@@ -22,9 +22,6 @@ const LEVELS = 3;
 const HANDLE = { mouse: 11, touch: 16 };
 /** Width of a letter of a flag's name, CSS pixels, about. */
 const LETTER = 7;
-
-/** @param {number} t_us @returns {string} as the list has it: to the microsecond, without zeros behind the millisecond */
-const listedTime = (t_us) => writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0{1,3}$/, "$1");
 
 /** The lane of flags above the raster, and the tab with all of them. */
 export class Labels {

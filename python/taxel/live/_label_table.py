@@ -1,7 +1,8 @@
 """Tables of labels that several windows and any other program write: nothing that was acknowledged is lost.
 
-A write takes a lock on a file beside the table, reads the table again, joins (`_label_join`), and exchanges the new file
-for the old one in one step. Where the file that comes out is not the one that was read, it is put back and joined anew.
+A write takes a lock on a file beside the table, reads the table again, joins (`_label_join`), and exchanges the new
+file for the old one in one step. Where the file that comes out is not the one that was read, it is put back, and the
+join is made anew.
 
 What was acknowledged is saved beside the table, in ``.NAME.acknowledged``: its state before and after a write, with
 digests of both texts, before the table is exchanged, and the state after it alone, afterwards. A process that is killed
@@ -77,7 +78,7 @@ class TableRead:
     conflict: Conflict
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _File:
     """Hold an open file of a table; without a descriptor there is none."""
 
@@ -190,7 +191,7 @@ def _locked(folder: Path) -> Iterator[None]:
                         return
         finally:
             os.close(lock)
-        time.sleep(random.uniform(0.001, 0.004))  # noqa: S311  no secret
+        time.sleep(random.uniform(0.001, 0.004))
 
 
 def _sync_folder(folder: Path) -> None:
@@ -226,7 +227,9 @@ def _to_json(known: Acknowledged) -> dict[str, Any]:
     def rows(notes: Sequence[Note] | None) -> list[Any] | None:
         if notes is None:
             return None
-        return [[n.text, n.t, n.source, n.recording, n.replaces, n.at_ns, [list(one) for one in n.others]] for n in notes]
+        return [
+            [n.text, n.t, n.source, n.recording, n.replaces, n.at_ns, [list(one) for one in n.others]] for n in notes
+        ]
 
     return {"labels": rows(known.labels), "deleted": rows(known.deleted), "table": rows(known.table)}
 
@@ -300,7 +303,7 @@ def _save(place: Path, saved: dict[str, Any]) -> None:
 _Action = Callable[[Acknowledged, tuple[Note, ...]], Joined]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Watched:
     """Hold a table that was replaced, to which a program may still write."""
 
@@ -326,8 +329,8 @@ class LabelTables:
 
     def stamp(self, table: Path) -> str:
         """Return a text that changes when a table, or what was acknowledged of it, may have changed."""
-        self._take_in()
         place = Path(os.path.realpath(table))
+        self._take_in(place)
         parts = []
         for one in (place, _state_place(place)):
             try:
@@ -354,8 +357,8 @@ class LabelTables:
         place = Path(os.path.realpath(table))
         for final in _attempts():
             with contextlib.ExitStack() as held:
-                # A folder that cannot be written is not written by other windows.
-                if os.access(place.parent, os.W_OK):
+                # Where there can be no lock, no window writes.
+                with contextlib.suppress(OSError):
                     held.enter_context(_locked(place.parent))
                 try:
                     file = _File.read(place, own, final=final)
@@ -450,14 +453,16 @@ class LabelTables:
         with self._watched_lock:
             self._watched.append(one)
 
-    def _take_in(self) -> None:
-        """Take in what other programs have written to tables that were replaced, since they opened them before."""
+    def _take_in(self, place: Path | None = None) -> None:
+        """Take in what programs wrote to a table that they had opened before it was replaced; `None`: to any table."""
         with self._watched_lock:
-            watched, self._watched = self._watched, []
+            mine = [one for one in self._watched if place in (None, one.file.place)]
+            too_many = len(self._watched) - _MOST_WATCHED
+            self._watched = [one for one in self._watched if one not in mine]
         left = []
-        for k, one in enumerate(watched):
+        for k, one in enumerate(mine):
             now = self._taken_in(one)
-            if time.monotonic() > now.until or k < len(watched) - _MOST_WATCHED:
+            if time.monotonic() > now.until or k < too_many:
                 now.file.close()
             else:
                 left.append(now)

@@ -395,11 +395,16 @@ class RequestHandler:
             As `read_labels` returns it.
         """
         unit_us = self._opening.unit_us(table)
-        edits = [[Edit(*(row and _to_note(row, unit_us) for row in edit)) for edit in request] for request in requests]
+
+        def note(row: _LabelRow | None) -> Note | None:
+            return None if row is None else _to_note(row, unit_us)
+
+        edits = [[Edit(note(old), note(new)) for old, new in request] for request in requests]
         with _reasons():
             outcomes, read = self._labels.change(table, _own_names(recording), edits)
         written: list[str | list[_LabelRow | None]] = [
-            one if isinstance(one, str) else [note and _to_row(note, unit_us) for note in one] for one in outcomes
+            one if isinstance(one, str) else [None if note is None else _to_row(note, unit_us) for note in one]
+            for one in outcomes
         ]
         return written, self._shown(table, read)
 
