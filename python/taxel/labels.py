@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,7 +25,18 @@ from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
 
-__all__ = ["TURN_US", "Labels", "Note", "ahead_us", "beside", "source_of", "trial_of", "write_labels"]
+__all__ = [
+    "TURN_US",
+    "Labels",
+    "Note",
+    "ahead_us",
+    "beside",
+    "rows_of",
+    "source_of",
+    "text_with",
+    "trial_of",
+    "write_labels",
+]
 
 #: The period after which the board's 16-bit clock of 100 us wraps, us.
 TURN_US = 6_553_600
@@ -130,9 +142,7 @@ class Labels:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         place = Path(checked_path("path", path))
-        table = HeaderTable.read(place, text_of(place))
-        table.has(_WANTED)
-        rows = [_row(f"{place}, line {line}", cells) for line, cells in table]
+        rows, _ = rows_of(place, text_of(place))
         self.path, self.rows = place, tuple(row for row in rows if row.text)
         self.removed = tuple(row for row in rows if not row.text)
 
@@ -264,6 +274,59 @@ def beside(recording: str | os.PathLike[str]) -> Path:
     return beside_file(place, f"{named(place).stem}.notes.csv")
 
 
+def rows_of(place: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...], tuple[str, ...]]:
+    """Return the rows of a table of labels, those without a label too, and the columns that taxel does not know.
+
+    Parameters
+    ----------
+    place : str or Path
+        The name of the table in errors.
+    lines : iterable of str
+        With their ends.
+
+    Raises
+    ------
+    FormatError : a column is missing, or an invalid value (names the line)
+
+    Examples
+    --------
+    >>> rows, others = rows_of("a.csv", ["label,t_us,comment", "heel,400,late"])
+    >>> rows[0].t, others
+    (400, ('comment',))
+    """
+    table = HeaderTable.read(place, lines)
+    table.has(_WANTED)
+    rows = tuple(_row(f"{place}, line {line}", cells) for line, cells in table)
+    return rows, tuple(name for name in table.header if name and name not in (*_WANTED, *_KNOWN))
+
+
+def text_with(rows: Iterable[Note], others: Iterable[str] = ()) -> str:
+    r"""Return the text of a table with these rows, in the order of time.
+
+    Parameters
+    ----------
+    rows : iterable of Note
+    others : iterable of str
+        Columns that taxel does not know, also where no row has them.
+
+    Examples
+    --------
+    >>> text_with([Note("lift", 900), Note("contact", 400, source="left")])
+    'label,t_us,source\ncontact,400,left\nlift,900,\n'
+    """
+    ordered = sorted(rows, key=lambda row: row.t or 0)
+    cells = [(row.source, row.recording, row.replaces, row.at_ns or None) for row in ordered]
+    kept = [k for k, _ in enumerate(_KNOWN) if any(row[k] not in ("", None) for row in cells)]
+    more = list(dict.fromkeys([*others, *(name for row in ordered for name, _ in row.others)]))
+    text = io.StringIO(newline="")
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow([*_WANTED, *(_KNOWN[k] for k in kept), *more])
+    for row, known in zip(ordered, cells, strict=True):
+        own = dict(row.others)
+        table.writerow([row.text, row.t, *(known[k] for k in kept), *(own.get(name, "") for name in more)])
+    return text.getvalue()
+
+
 def write_labels(
     path: str | os.PathLike[str],
     labels: Iterable[tuple[Any, ...]],
@@ -296,16 +359,12 @@ def write_labels(
     """
     rows: list[tuple[Any, ...]] = sorted(labels, key=lambda row: row[1])
     full = [(*row, *("", "", None, None)[len(row) - 2 :]) for row in rows]
-    kept = [k for k, _ in enumerate(_KNOWN, 2) if any(row[k] not in ("", None) for row in full)]
-    others = _others(path, full)
-    more = list(dict.fromkeys(name for one in others for name in one))
+    notes = [
+        Note(text, t, host_ns or 0, trial, source, replaces, tuple(others.items()))
+        for (text, t, source, trial, replaces, host_ns), others in zip(full, _others(path, full), strict=True)
+    ]
     with whole_file(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow([*_WANTED, *(_KNOWN[k - 2] for k in kept), *more])
-        table.writerows(
-            [*row[:2], *(row[k] for k in kept), *(one.get(name, "") for name in more)]
-            for row, one in zip(full, others, strict=True)
-        )
+        file.write(text_with(notes))
 
 
 def _others(path: str | os.PathLike[str], rows: Sequence[tuple[Any, ...]]) -> list[dict[str, str]]:

@@ -6,9 +6,12 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.formats.making import write_gaitpdb
 from tests.panel.pages import clock, press, recording, replay, shown, shows, still, until
+
+import taxel
 
 __all__ = ["recording", "replay"]
 
@@ -31,8 +34,14 @@ def rows(table: Path) -> list[dict[str, str]]:
 @pytest.fixture
 def table(recording: Path, replay: Any) -> Path:
     """The labels of the recording that is shown: none yet."""
-    path = recording.with_suffix("").with_suffix(".notes.csv")
+    return unlabelled(recording)
+
+
+def unlabelled(recording: Path) -> Path:
+    """Return the table of a recording, without it and without what was acknowledged of it."""
+    path = recording.with_suffix(".notes.csv")
     path.unlink(missing_ok=True)
+    path.with_name(f".{path.name}.acknowledged").unlink(missing_ok=True)
     return path
 
 
@@ -187,3 +196,80 @@ def test_on_a_phone_detections_are_not_below_a_long_list_of_labels(chromium: Any
         list_, found = (page.locator(name).bounding_box() for name in ("#label-list", ".detections-block"))
         assert list_["height"] < 844 / 2
         assert found["y"] < list_["y"] + 844, "within a screen, notes between them"
+
+
+@pytest.mark.parametrize(("width", "height"), [(1400, 900), (390, 844)])
+@pytest.mark.parametrize("restore", [True, False])
+def test_both_versions_of_labels_are_shown_until_one_is_chosen(
+    width: int, height: int, restore: bool, chromium: Any, recording: Path
+) -> None:
+    table = unlabelled(recording)
+    with shown(chromium, recording, width=width, height=height) as page:
+        still(page)
+        page.locator("#label-name").fill("heel")
+        press(page, "m")
+        shows(page, "label-count", "^1 label$")
+        older = table.read_text()
+        moved = page.locator("#label-list li input").nth(1)
+        moved.fill("3")
+        moved.press("Enter")
+        until(lambda: rows(table) == [{"label": "heel", "t_us": "3000000"}], "it is moved")
+        assert page.locator("#label-conflict").is_hidden()
+        table.write_text(older + "toe,4000000\n")
+        shows(page, "label-conflict", "lacks 1 label that was set on the page")
+        shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: it lacks 1 label")
+        page.locator("#notice-offer").click()
+        versions = page.locator("#conflict-rows tr").all_inner_texts()
+        assert [version.split("\t") for version in versions] == [
+            ["heel, 3.000 s", "missing"],
+            ["deleted or changed", f"heel, {page.locator('#label-list li input').nth(1).input_value()} s"],
+            ["–", "toe, 4.000 s (new)"],
+        ]
+        block = page.locator("#label-conflict").bounding_box()
+        for name in ("#conflict-restore", "#conflict-accept"):
+            button = page.locator(name).bounding_box()
+            assert block["x"] <= button["x"]
+            assert button["x"] + button["width"] <= block["x"] + block["width"] <= width
+            assert page.locator(name).evaluate("e => e.scrollWidth <= e.clientWidth")
+        # It lasts over a reload, and a label that is set in the meantime.
+        page.reload()
+        shows(page, "label-conflict", "Two versions of the labels")
+        page.locator("#conflict-restore" if restore else "#conflict-accept").click()
+        until(lambda: page.locator("#label-conflict").is_hidden(), "it is settled")
+        kept = [3_000_000, 4_000_000] if restore else [int(older.split(",")[-1]), 4_000_000]
+        assert [int(row["t_us"]) for row in rows(table)] == kept
+
+
+def test_the_page_asks_before_it_closes_while_a_label_is_being_saved(replay: Any, table: Path) -> None:
+    labelled(replay, table, "label,t_us\nold,4000000\n")
+    replay.locator("#label-name").fill("new")
+    asks = "() => !dispatchEvent(new Event('beforeunload', { cancelable: true }))"
+    assert not replay.evaluate(asks)
+    replay.evaluate(SLOW, ["mark"])
+    press(replay, "m")
+    until(lambda: replay.evaluate(asks), "it asks")
+    shows(replay, "label-count", "^2 labels$")
+    until(lambda: not replay.evaluate(asks), "it asks no more")
+
+
+def test_notes_are_used_as_labels_by_one_request(chromium: Any, tmp_path: Path) -> None:
+    frames = taxel.Frames(np.zeros((100, 4, 4)), np.arange(100) * 10_000, unit="N", array=taxel.Array(4, 4))
+    (tmp_path / "own").mkdir()
+    taxel.convert(frames, tmp_path / "own" / "mat.npz")
+    noted = [f"{('heel', 'toe')[k % 2]},{20_000 * k}" for k in range(34)]
+    (tmp_path / "own" / "mat.notes.csv").write_text("\n".join(["label,t_us", *noted]) + "\n")
+    taxel.convert(taxel.open(tmp_path / "own" / "mat.npz"), tmp_path / "mat.mcap")
+    with shown(chromium, tmp_path / "mat.mcap") as page:
+        page.evaluate("""() => {
+            window.sent = [];
+            const send = WebSocket.prototype.send;
+            WebSocket.prototype.send = function (text) {
+                if (typeof text === "string" && JSON.parse(text).type.startsWith("mark")) window.sent.push(text);
+                send.call(this, text);
+            };
+        }""")
+        shows(page, "notes-as-labels", r"^Use as labels \(34\)$")
+        page.locator("#notes-as-labels").click()
+        shows(page, "label-count", "^34 labels$")
+        assert len(page.evaluate("window.sent")) == 1
+        assert page.locator("#notes-as-labels").is_hidden()

@@ -64,6 +64,47 @@ pub struct LabelRow {
     pub host_ns: Option<i64>,
 }
 
+/// A change of a table of labels: `new` in the place of `old`. Without `old` it marks a label, unless the table has it
+/// already; without `new` it deletes one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabelEdit {
+    /// The label as it is known.
+    pub old: Option<LabelRow>,
+    /// The label as it is to be.
+    pub new: Option<LabelRow>,
+}
+
+/// Where a table lacks what was acknowledged, because another program has written it since.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LabelConflict {
+    /// Acknowledged, and not in the table.
+    pub missing: Vec<LabelRow>,
+    /// Deleted, moved or renamed, which was acknowledged, and in the table again.
+    pub returned: Vec<LabelRow>,
+    /// The other rows that the table has since, which are in no conflict.
+    pub new: Vec<LabelRow>,
+}
+
+impl LabelConflict {
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.missing.is_empty() && self.returned.is_empty()
+    }
+}
+
+/// A table of labels as it was read.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LabelTable {
+    /// The labels of the recording, and the rows without a label that remove a note.
+    pub rows: Vec<LabelRow>,
+    /// Where it lacks what was acknowledged.
+    pub conflict: LabelConflict,
+}
+
+/// What became of a request of label edits: the rows as they were written, one an edit, or why none of them was carried out.
+pub type EditOutcome = Result<Vec<Option<LabelRow>>, String>;
+
 /// Taxels (column, row) that do not work as they should.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct UnhealthyTaxels {
@@ -182,11 +223,29 @@ pub trait RequestHandler: Send + Sync {
     /// Reads the live source out with this readout from now on.
     fn read_out(&self, readout: &Path) -> Reply<()>;
 
-    /// Reads the labels of a recording from a table.
-    fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>>;
+    /// Returns a text that changes when a table of labels may have changed, or what was acknowledged of it.
+    fn label_stamp(&self, table: &Path) -> Reply<String>;
 
-    /// Writes a table of labels.
-    fn write_labels(&self, table: &Path, labels: &[LabelRow]) -> Reply<()>;
+    /// Reads the labels of a recording from a table, which need not exist.
+    fn read_labels(&self, table: &Path, recording: &str) -> Reply<LabelTable>;
+
+    /// Carries out requests in one write of the table as it is now, each of them whole or not at all. Returns when the table
+    /// is on the disk.
+    fn change_labels(
+        &self,
+        table: &Path,
+        recording: &str,
+        requests: &[Vec<LabelEdit>],
+    ) -> Reply<(Vec<EditOutcome>, LabelTable)>;
+
+    /// Ends a conflict: restores what was acknowledged, or accepts the table as it is.
+    fn settle_labels(
+        &self,
+        table: &Path,
+        recording: &str,
+        conflict: &LabelConflict,
+        restore: bool,
+    ) -> Reply<LabelTable>;
 
     /// Reads the presets of the user.
     fn read_presets(&self) -> Reply<UserPresets>;

@@ -92,7 +92,7 @@ impl Hub {
         Ok(hub)
     }
 
-    /// Waits until no other request changes labels or presets and writes their file. Requests run at the same time, so without
+    /// Waits until no other request changes presets and writes their file. Requests run at the same time, so without
     /// this a file could end with the older of two changes.
     pub(super) async fn file_turn(&self) -> OwnedMutexGuard<()> {
         Arc::clone(&self.files).lock_owned().await

@@ -1,12 +1,14 @@
 //! The labels of recordings, as the clients see them: each with a number that holds while the server runs.
 
 use std::collections::HashMap;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
 use taxel_live::locked::lock;
+use tokio::sync::{OwnedMutexGuard, oneshot};
 
-use super::handler::LabelRow;
+use super::handler::{LabelConflict, LabelEdit, LabelRow, LabelTable};
+use super::request::Answer;
 
 /// A label of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,20 +32,49 @@ impl LabelRow {
         self.label.is_empty()
     }
 
-    /// Whether it replaces the same note as another.
-    fn replaces_note_of(&self, other: &Self) -> bool {
-        let of = |row: &Self| (row.replaces_us, row.source.clone(), row.trial.clone());
-        self.replaces_us.is_some() && of(self) == of(other)
-    }
-
     /// With its times as a client sees them: one us of the file is `us` of the view.
     pub(super) fn in_view(self, us: i64) -> Self {
         Self { t_us: self.t_us * us, replaces_us: self.replaces_us.map(|t| t * us), ..self }
     }
 
     /// With its times as in the file.
-    pub(super) fn in_file(self, us: i64) -> Self {
+    fn in_file(self, us: i64) -> Self {
         Self { t_us: self.t_us / us, replaces_us: self.replaces_us.map(|t| t / us), ..self }
+    }
+
+    /// As the messages of the protocol have it.
+    fn json(&self) -> Value {
+        json!({
+            "label": self.label, "t_us": self.t_us, "source": self.source, "trial": self.trial,
+            "replaces_us": self.replaces_us,
+        })
+    }
+}
+
+impl LabelEdit {
+    /// With its times as in the file.
+    pub(super) fn in_file(self, us: i64) -> Self {
+        Self { old: self.old.map(|row| row.in_file(us)), new: self.new.map(|row| row.in_file(us)) }
+    }
+}
+
+impl LabelConflict {
+    fn each(self, change: impl Fn(LabelRow) -> LabelRow) -> Self {
+        let all = |rows: Vec<LabelRow>| rows.into_iter().map(&change).collect();
+        Self { missing: all(self.missing), returned: all(self.returned), new: all(self.new) }
+    }
+
+    /// With its times as in the file.
+    pub(super) fn in_file(self, us: i64) -> Self {
+        self.each(|row| row.in_file(us))
+    }
+}
+
+impl LabelTable {
+    /// With its times as a client sees them.
+    pub(super) fn in_view(self, us: i64) -> Self {
+        let rows = self.rows.into_iter().map(|row| row.in_view(us)).collect();
+        Self { rows, conflict: self.conflict.each(|row| row.in_view(us)) }
     }
 }
 
@@ -67,60 +98,71 @@ impl LabelChange {
         }
     }
 
-    /// Applies it to the labels; a new one gets the number `next_id`.
-    fn apply(self, labels: &mut Vec<Label>, next_id: u64) -> Result<(), String> {
-        match self {
-            Self::Mark(row) => {
-                labels.retain(|label| !(label.row.is_removal() && label.row.replaces_note_of(&row)));
-                // A label that is there already is not made again.
-                if !labels.iter().any(|label| LabelRow { host_ns: None, ..label.row.clone() } == row) {
-                    labels.push(Label { id: next_id, row });
-                }
-            }
-            Self::Rename { id, label } => {
-                let place = place_of(labels, id)?;
-                labels[place].row.label = label;
-            }
-            Self::Move { id, t_us } => {
-                let place = place_of(labels, id)?;
-                labels[place].row.t_us = t_us;
-                labels[place].row.host_ns = None;
-            }
-            Self::Delete { id } => {
-                let place = place_of(labels, id)?;
-                match labels[place].row.replaces_us {
-                    // Else its note would count again.
-                    Some(_) => labels[place].row.label.clear(),
-                    None => drop(labels.remove(place)),
-                }
-            }
-        }
-        Ok(())
+    /// The change of the table's rows. `labels` are those as this and the changes before it leave them.
+    fn edit(self, labels: &mut Vec<Label>) -> Result<NumberedEdit, String> {
+        let (id, place) = match self {
+            Self::Mark(row) => return Ok((None, LabelEdit { old: None, new: Some(row) })),
+            Self::Rename { id, .. } | Self::Move { id, .. } | Self::Delete { id } => (id, place_of(labels, id)?),
+        };
+        let old = labels[place].row.clone();
+        let new = match self {
+            Self::Rename { label, .. } => Some(LabelRow { label, ..old.clone() }),
+            Self::Move { t_us, .. } => Some(LabelRow { t_us, host_ns: None, ..old.clone() }),
+            // Without the row that replaces it, its note would count again.
+            _ => old.replaces_us.map(|_| LabelRow { label: String::new(), ..old.clone() }),
+        };
+        set(labels, id, new.clone());
+        Ok((Some(id), LabelEdit { old: Some(old), new }))
     }
 }
 
+/// An edit, and the number of the label that it changes.
+pub(super) type NumberedEdit = (Option<u64>, LabelEdit);
+
 fn place_of(labels: &[Label], id: u64) -> Result<usize, String> {
-    labels
-        .iter()
-        .position(|label| label.id == id && !label.row.is_removal())
-        .ok_or_else(|| format!("label_id: there is no label {id}; it was deleted, perhaps by another client"))
+    labels.iter().position(|label| label.id == id && !label.row.is_removal()).ok_or_else(|| {
+        format!("label_id: there is no label {id}; it was deleted or changed, perhaps by another client or program")
+    })
+}
+
+/// Gives a label another row, or removes it.
+fn set(labels: &mut Vec<Label>, id: u64, row: Option<LabelRow>) {
+    match row {
+        Some(row) => labels.iter_mut().filter(|label| label.id == id).for_each(|label| label.row = row.clone()),
+        None => labels.retain(|label| label.id != id),
+    }
+}
+
+/// A request that waits to be written with others.
+pub(super) struct WaitingChanges {
+    pub(super) changes: Vec<LabelChange>,
+    pub(super) answer: oneshot::Sender<Answer>,
 }
 
 /// The labels of the recordings that clients have opened, by the recordings' names.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct LabelTables(Mutex<Tables>);
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Tables {
-    labels: HashMap<String, Vec<Label>>,
+    of: HashMap<String, KnownTable>,
     last_id: u64,
+    last_conflict: u64,
 }
 
-impl Tables {
-    fn next_id(&mut self) -> u64 {
-        self.last_id += 1;
-        self.last_id
-    }
+/// A table as it was read last.
+#[derive(Default)]
+struct KnownTable {
+    /// `None` where there is no table, or none was read.
+    labels: Option<Vec<Label>>,
+    conflict: LabelConflict,
+    conflict_id: u64,
+    /// What [`RequestHandler::label_stamp`](super::RequestHandler::label_stamp) returned, or its reason, before it was read.
+    stamp: String,
+    /// One us of the file in the view.
+    us: i64,
+    waiting: Vec<WaitingChanges>,
+    turn: Arc<tokio::sync::Mutex<()>>,
 }
 
 /// Name of the file that holds the labels of a recording.
@@ -130,66 +172,128 @@ pub(super) fn file_of(recording: &str) -> String {
 }
 
 impl LabelTables {
+    fn with<T>(&self, recording: &str, action: impl FnOnce(&mut KnownTable) -> T) -> T {
+        action(lock(&self.0).of.entry(recording.to_owned()).or_default())
+    }
+
     /// Number of labels of a recording, once they have been read.
     pub(super) fn count(&self, recording: &str) -> Option<usize> {
         let counted = |labels: &Vec<Label>| labels.iter().filter(|label| !label.row.is_removal()).count();
-        lock(&self.0).labels.get(recording).map(counted)
+        lock(&self.0).of.get(recording)?.labels.as_ref().map(counted)
     }
 
-    pub(super) fn get(&self, recording: &str) -> Vec<Label> {
-        lock(&self.0).labels.get(recording).cloned().unwrap_or_default()
+    /// The recordings whose tables were opened, with one us of their files in the view.
+    pub(super) fn opened(&self) -> Vec<(String, i64)> {
+        let tables = lock(&self.0);
+        tables.of.iter().filter(|(_, table)| table.us > 0).map(|(name, table)| (name.clone(), table.us)).collect()
     }
 
-    /// Replaces the labels of a recording by those of its file; unchanged ones keep their numbers.
-    pub(super) fn replace(&self, recording: &str, rows: Vec<LabelRow>) {
+    /// Waits until no other request reads or writes the table of a recording.
+    pub(super) async fn turn(&self, recording: &str) -> OwnedMutexGuard<()> {
+        let turn = self.with(recording, |table| Arc::clone(&table.turn));
+        turn.lock_owned().await
+    }
+
+    pub(super) fn stamp(&self, recording: &str) -> String {
+        self.with(recording, |table| table.stamp.clone())
+    }
+
+    /// Notes that a table is read now, with its stamp.
+    pub(super) fn opens(&self, recording: &str, stamp: String, us: i64) {
+        self.with(recording, |table| (table.stamp, table.us) = (stamp, us));
+    }
+
+    /// Notes that a table that was written is followed from now on, as of a recording that runs.
+    pub(super) fn follows(&self, recording: &str, us: i64) {
+        self.with(recording, |table| table.us = us);
+    }
+
+    /// Adds changes to those that are written next.
+    pub(super) fn wait(&self, recording: &str, waiting: WaitingChanges) {
+        self.with(recording, |table| table.waiting.push(waiting));
+    }
+
+    pub(super) fn take_waiting(&self, recording: &str) -> Vec<WaitingChanges> {
+        self.with(recording, |table| std::mem::take(&mut table.waiting))
+    }
+
+    /// The edits of requests, each made on what those before it leave.
+    pub(super) fn edits(&self, recording: &str, waiting: &[WaitingChanges]) -> Vec<Result<Vec<NumberedEdit>, String>> {
+        let mut labels = self.with(recording, |table| table.labels.clone().unwrap_or_default());
+        let mut edits = |one: &WaitingChanges| {
+            let before = labels.clone();
+            let made = one.changes.iter().map(|change| change.clone().edit(&mut labels)).collect();
+            if Result::<Vec<NumberedEdit>, _>::is_err(&made) {
+                labels = before;
+            }
+            made
+        };
+        waiting.iter().map(&mut edits).collect()
+    }
+
+    /// Notes the rows that labels have now, before [`LabelTables::replace`], so that they keep their numbers.
+    pub(super) fn renumber(&self, recording: &str, rows: impl IntoIterator<Item = (u64, Option<LabelRow>)>) {
+        self.with(recording, |table| {
+            let Some(labels) = &mut table.labels else { return };
+            rows.into_iter().for_each(|(id, row)| set(labels, id, row));
+        });
+    }
+
+    /// Replaces the labels of a recording by those of its table, `None` where there is none; unchanged ones keep their numbers.
+    /// Returns whether anything has changed.
+    pub(super) fn replace(&self, recording: &str, read: Option<LabelTable>) -> bool {
         let mut tables = lock(&self.0);
-        let mut before = tables.labels.remove(recording).unwrap_or_default();
-        let mut labels = vec![];
-        for row in rows {
+        let Tables { of, last_id, last_conflict } = &mut *tables;
+        let table = of.entry(recording.to_owned()).or_default();
+        let (rows, conflict) = read.map(|read| (Some(read.rows), read.conflict)).unwrap_or_default();
+        let mut before = table.labels.clone().unwrap_or_default();
+        let mut number = |row: LabelRow| {
             let same = before.iter().position(|label| label.row == row);
-            let id = same.map_or_else(|| tables.next_id(), |place| before.swap_remove(place).id);
-            labels.push(Label { id, row });
+            let id = same.map(|place| before.remove(place).id).unwrap_or_else(|| {
+                *last_id += 1;
+                *last_id
+            });
+            Label { id, row }
+        };
+        let labels: Option<Vec<Label>> = rows.map(|rows| rows.into_iter().map(&mut number).collect());
+        let same = table.labels == labels && table.conflict == conflict;
+        if table.conflict != conflict {
+            *last_conflict += 1;
+            table.conflict_id = *last_conflict;
         }
-        tables.labels.insert(recording.to_owned(), labels);
+        (table.labels, table.conflict) = (labels, conflict);
+        !same
     }
 
-    /// Removes the labels of a recording.
-    pub(super) fn remove(&self, recording: &str) {
-        lock(&self.0).labels.remove(recording);
-    }
-
-    /// Changes the labels of a recording. Returns them as they were, for [`LabelTables::restore`], and as they are now.
-    ///
-    /// # Errors
-    ///
-    /// Where there is no label of that number; then nothing is changed.
-    pub(super) fn change(&self, recording: &str, change: LabelChange) -> Result<(Vec<Label>, Vec<LabelRow>), String> {
-        let mut tables = lock(&self.0);
-        let before = tables.labels.get(recording).cloned().unwrap_or_default();
-        let mut labels = before.clone();
-        let id = tables.next_id();
-        change.apply(&mut labels, id)?;
-        labels.sort_by_key(|label| label.row.t_us);
-        let rows = labels.iter().map(|label| label.row.clone()).collect();
-        tables.labels.insert(recording.to_owned(), labels);
-        Ok((before, rows))
-    }
-
-    /// Sets the labels of a recording back to what they were.
-    pub(super) fn restore(&self, recording: &str, before: Vec<Label>) {
-        lock(&self.0).labels.insert(recording.to_owned(), before);
+    /// The conflict of this number; `None` if it is over or is another by now.
+    pub(super) fn conflict(&self, recording: &str, conflict_id: u64) -> Option<LabelConflict> {
+        self.with(recording, |table| {
+            let holds = table.conflict_id == conflict_id && !table.conflict.is_empty();
+            holds.then(|| table.conflict.clone())
+        })
     }
 
     /// The `labels` message.
     pub(super) fn message(&self, recording: &str) -> Value {
-        let one = |Label { id, row }: Label| {
+        self.with(recording, |table| {
+            let shown = table.labels.iter().flatten().filter(|label| !label.row.is_removal());
+            let labels: Vec<_> = shown
+                .map(|label| {
+                    let mut one = label.row.json();
+                    one["label_id"] = json!(label.id);
+                    one
+                })
+                .collect();
+            let all = |rows: &[LabelRow]| rows.iter().map(LabelRow::json).collect::<Vec<_>>();
+            let LabelConflict { missing, returned, new } = &table.conflict;
+            let conflict = (!table.conflict.is_empty()).then(|| {
+                json!({
+                    "conflict_id": table.conflict_id, "missing": all(missing), "returned": all(returned), "new": all(new),
+                })
+            });
             json!({
-                "label_id": id, "label": row.label, "t_us": row.t_us, "source": row.source, "trial": row.trial,
-                "replaces_us": row.replaces_us,
+                "type": "labels", "name": recording, "path": file_of(recording), "labels": labels, "conflict": conflict,
             })
-        };
-        let shown = self.get(recording).into_iter().filter(|label| !label.row.is_removal());
-        let labels: Vec<_> = shown.map(one).collect();
-        json!({ "type": "labels", "name": recording, "path": file_of(recording), "labels": labels })
+        })
     }
 }

@@ -16,6 +16,7 @@ mod handler;
 mod hub;
 mod indexed;
 mod keyframe_index;
+mod label_requests;
 mod labels;
 mod limits;
 mod live_source;
@@ -39,8 +40,8 @@ mod weights;
 
 pub use array_state::RestSource;
 pub use handler::{
-    BoardLines, Cut, Detected, LabelRow, Opening, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler,
-    UnhealthyTaxels, UserPreset, UserPresets,
+    BoardLines, Cut, Detected, EditOutcome, LabelConflict, LabelEdit, LabelRow, LabelTable, Opening, PicturesRead,
+    PresetValue, ReadFile, Reply, RequestHandler, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
 pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource};

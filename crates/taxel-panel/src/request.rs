@@ -72,6 +72,14 @@ impl<'a> Request<'a> {
         self.whole(key, -(1 << 52), 1 << 52)
     }
 
+    /// One time or more.
+    pub(super) fn times(&self, key: &str) -> Answer<Vec<i64>> {
+        let all = self.get(key).and_then(Value::as_array).filter(|all| !all.is_empty());
+        let time = |value: &Value| value.as_i64().filter(|t| (-(1 << 52)..=1 << 52).contains(t));
+        let times = all.and_then(|all| all.iter().map(time).collect());
+        times.ok_or_else(|| Refusal::of(key, "must be a list of whole numbers within 2^52, one or more"))
+    }
+
     pub(super) fn flag(&self, key: &str) -> Answer<bool> {
         self.get(key).and_then(Value::as_bool).ok_or_else(|| Refusal::of(key, "must be true or false"))
     }

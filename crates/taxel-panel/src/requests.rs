@@ -10,14 +10,13 @@ use taxel_live::locked::lock;
 use taxel_live::ports::ports;
 
 use super::clients::Broadcast;
-use super::handler::{Cut, Detected, LabelRow, UnhealthyTaxels};
+use super::handler::{Cut, Detected, UnhealthyTaxels};
 use super::hub::Hub;
 use super::indexed::Indexed;
-use super::labels::{LabelChange, file_of};
 use super::live_source::LiveSource;
 use super::recorder::{RecordingFormat, RecordingPlan};
 use super::request::{Answer, Refusal, Request};
-use super::{recording_session, registers};
+use super::{label_requests, recording_session, registers};
 
 /// The recording that a client shows.
 #[derive(Debug, Clone)]
@@ -49,23 +48,11 @@ pub(super) async fn carry_out(
         "record" => record(&hub, &request)?,
         "stop" => hub.recorder.end()?,
         "note" => board(&hub)?.handle.note(request.text("text", 200)?)?,
-        "mark" => {
-            let source = request.optional_text("source", 64)?.unwrap_or_default().to_owned();
-            let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
-            let replaces_us = request.has("replaces_us").then(|| request.time("replaces_us")).transpose()?;
-            let (label, t_us) = (label_text(&request)?, request.time("t_us")?);
-            let row = LabelRow { label, t_us, source, trial, replaces_us, host_ns: None };
-            change_label(&hub, shown, LabelChange::Mark(row)).await?;
+        "mark" | "marks" | "rename" | "move" | "delete" => {
+            let changes = label_requests::changes(what, shown, &request)?;
+            label_requests::change(&hub, shown, changes).await?;
         }
-        "rename" => {
-            let change = LabelChange::Rename { id: label_id(&request)?, label: label_text(&request)? };
-            change_label(&hub, shown, change).await?;
-        }
-        "move" => {
-            let change = LabelChange::Move { id: label_id(&request)?, t_us: request.time("t_us")? };
-            change_label(&hub, shown, change).await?;
-        }
-        "delete" => change_label(&hub, shown, LabelChange::Delete { id: label_id(&request)? }).await?,
+        "settle" => label_requests::settle(&hub, shown, &request).await?,
         "health" => return health(&hub, shown).await.map(Some),
         "cut" => return cut(&hub, shown, &request).await.map(Some),
         "train" => return train(&hub, shown).await.map(Some),
@@ -189,59 +176,6 @@ fn record(hub: &Arc<Hub>, request: &Request<'_>) -> Answer {
         label: request.optional_text("label", 200)?.map(str::to_owned),
     };
     recording_session::start(hub, plan).map_err(|reason| Refusal { reason, field: Some("name".to_owned()) })
-}
-
-// ---------------------------------------------------------------------------------------------- labels
-
-/// Reads the labels of a recording from their file; one us of the file is `us` in the view ([`Indexed::us`]).
-pub(super) async fn read_labels(hub: &Hub, recording: &str, us: i64) -> Answer {
-    let _turn = hub.file_turn().await;
-    let table = hub.folder.file(&file_of(recording))?;
-    if !table.exists() {
-        hub.labels.remove(recording);
-        return Ok(());
-    }
-    let name = recording.to_owned();
-    let rows = hub.ask(move |handler| handler.read_labels(&table, &name)).await?;
-    hub.labels.replace(recording, rows.into_iter().map(|row| row.in_view(us)).collect());
-    Ok(())
-}
-
-fn label_id(request: &Request<'_>) -> Answer<u64> {
-    Ok(request.whole("label_id", 1, i64::MAX)?.unsigned_abs())
-}
-
-fn label_text(request: &Request<'_>) -> Answer<String> {
-    Ok(request.text("label", 200)?.to_owned())
-}
-
-/// Changes a label of the recording that is shown or being recorded, and writes the table.
-async fn change_label(hub: &Hub, shown: Option<&Shown>, change: LabelChange) -> Answer {
-    let recorded = hub.recorder.file();
-    let name = shown.map(|shown| shown.name.as_str()).or(recorded.as_deref());
-    let name = name.ok_or("a label belongs to a recording: open one, or record")?;
-    let us = shown.map_or(1, |shown| shown.indexed.us());
-    let change = change.at_whole(us);
-    if let Some((shown, t_us)) = shown.zip(change.t_us()) {
-        let outside = |reason| Refusal { reason, field: Some("t_us".to_owned()) };
-        shown.indexed.check_label(name, t_us).map_err(outside)?;
-    }
-    let table = hub.folder.file(&file_of(name))?;
-    let turn = hub.file_turn().await;
-    let (before, rows) = hub.labels.change(name, change)?;
-    // The lock is held until the file is written, also if the client disconnects.
-    let (written, _turn) = hub
-        .ask(move |handler| {
-            let rows: Vec<LabelRow> = rows.into_iter().map(|row| row.in_file(us)).collect();
-            Ok((handler.write_labels(&table, &rows), turn))
-        })
-        .await?;
-    if let Err(reason) = written {
-        hub.labels.restore(name, before);
-        return Err(reason.into());
-    }
-    hub.clients.send(Broadcast::Labels(name.to_owned()));
-    Ok(())
 }
 
 // ---------------------------------------------------------------------------------------------- training

@@ -16,6 +16,7 @@ use super::assets::ASSETS;
 use super::connections::LimitedListener;
 use super::handler::RequestHandler;
 use super::hub::Hub;
+use super::label_requests;
 use super::limits::MOST_BYTES;
 use super::opening;
 use super::options::PanelOptions;
@@ -177,6 +178,7 @@ async fn serve(listener: std::net::TcpListener, gate: Arc<Gate>) {
             prepare(&hub).await;
         }
     });
+    let followed = tokio::spawn(label_requests::follow(Arc::clone(&gate.hub)));
     // The recording to show first is read while the browser starts; the client that opens it gets the error, if any.
     let hub = Arc::clone(&gate.hub);
     let first = tokio::spawn(async move {
@@ -197,6 +199,7 @@ async fn serve(listener: std::net::TcpListener, gate: Arc<Gate>) {
     }
     live.abort();
     reads.abort();
+    followed.abort();
     first.abort();
 }
 

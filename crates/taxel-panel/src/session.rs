@@ -18,6 +18,7 @@ use tokio::sync::{broadcast, mpsc, watch};
 
 use super::clients::{Broadcast, ClientSlot};
 use super::hub::Hub;
+use super::label_requests::is_label_request;
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::messages::warning;
 use super::picture::RECORDS;
@@ -34,6 +35,10 @@ const REFUSALS_WITHIN: Duration = Duration::from_secs(10);
 
 /// How often a session without other work checks whether its client is alive.
 const IDLE: Duration = Duration::from_secs(1);
+
+/// What a client sent before it left is read until nothing arrives for this time, and at most for that one.
+const ARRIVED_WITHIN: Duration = Duration::from_millis(100);
+const MOST_ARRIVING: Duration = Duration::from_secs(5);
 
 struct Session {
     hub: Arc<Hub>,
@@ -65,7 +70,31 @@ pub(super) async fn run(socket: WebSocket, hub: Arc<Hub>, end: watch::Receiver<b
 impl Session {
     async fn serve(mut self, end: watch::Receiver<bool>, answers: mpsc::Receiver<Value>) {
         if let Err(closing) = self.run(end, answers).await {
+            if matches!(closing, Closing::Silently) {
+                self.begin_arrived().await;
+            }
             self.connection.close(closing).await;
+        }
+    }
+
+    /// Begins the changes of labels that arrived before the client left.
+    async fn begin_arrived(&mut self) {
+        let begun = Instant::now();
+        while begun.elapsed() < MOST_ARRIVING
+            && let Ok(Ok(incoming)) = tokio::time::timeout(ARRIVED_WITHIN, self.connection.receive()).await
+        {
+            let Incoming::Text(text) = incoming else { continue };
+            let message: Map<String, Value> = serde_json::from_str(&text).unwrap_or_default();
+            let what = message.get("type").and_then(Value::as_str).unwrap_or_default().to_owned();
+            while !self.pending.has_room() {
+                tokio::time::sleep(FRAME).await;
+            }
+            if matches!(&*what, "open" | "live") {
+                // The labels after it are of what it shows.
+                let _ = self.handle_own(&what, &Request(&message)).await;
+            } else if is_label_request(&what) {
+                self.pending.begin(&self.hub, Value::Null, what, message, self.viewport.shown());
+            }
         }
     }
 
@@ -92,7 +121,7 @@ impl Session {
                 () = async { drop(end.wait_for(|ended| *ended).await) } => {
                     return Err(Closing::With(GOING_AWAY, "the server ends"));
                 }
-                incoming = self.connection.receive() => match incoming? {
+                incoming = self.connection.receive(), if self.pending.has_room() => match incoming? {
                     Incoming::Text(text) if text.len() > MOST_BYTES => {
                         return Err(Closing::With(TOO_BIG, "a message of more than 65536 bytes"));
                     }

@@ -1,8 +1,9 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
+import { LabelConflict } from "./conflict.js";
 import { entitle, make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
-import { counted, readTime, seconds, timeUnit, writtenTime } from "./words.js";
+import { counted, listedTime, readTime, seconds, timeUnit } from "./words.js";
 
 /** @typedef {import("./protocol.js").Label} Label */
 /** @typedef {import("./protocol.js").Labels} LabelsMessage */
@@ -21,9 +22,6 @@ const LEVELS = 3;
 const HANDLE = { mouse: 11, touch: 16 };
 /** Width of a letter of a flag's name, CSS pixels, about. */
 const LETTER = 7;
-
-/** @param {number} t_us @returns {string} as the list has it: to the microsecond, without zeros behind the millisecond */
-const listedTime = (t_us) => writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0{1,3}$/, "$1");
 
 /** The lane of flags above the raster, and the tab with all of them. */
 export class Labels {
@@ -44,6 +42,7 @@ export class Labels {
     this.failed = failed;
     this.shown = shown;
     this.counted = counted;
+    this.conflict = new LabelConflict(server, failed, shown);
     /** @type {Map<string, LabelsMessage>} by recording */
     this.files = new Map();
     /** The recording whose labels are shown. @type {string | null} */
@@ -205,6 +204,7 @@ export class Labels {
     const { labels } = this;
     this.offerName();
     const table = this.file ? this.files.get(this.file) : undefined;
+    this.conflict.show(table);
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
     this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";
     const place = table ? `${table.labels.length ? "Saved" : "To be saved"} in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";

@@ -610,6 +610,9 @@ view.showCut();
 showLanes();
 applyTheme();
 requestAnimationFrame(frame);
+addEventListener("beforeunload", (event) => {
+  if (server.saves) event.preventDefault();
+});
 if (fragment.get("token")) server.open();
 else {
   connection.why = "the address lacks its token: copy the whole line that taxel printed";

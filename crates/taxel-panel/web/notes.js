@@ -62,18 +62,19 @@ export class Notes {
     write(this.button, `Use as labels (${length})`);
   }
 
-  /** Makes labels of them, one after the other, as long as their recording is shown. */
+  /** Makes labels of all of them, or of none. */
   async use() {
-    const { notes } = this;
     this.button.disabled = true;
-    try {
-      for (const { t_us, text, source } of this.unused) {
-        if (this.notes !== notes) break;
-        await this.server.request({ type: "mark", label: text, t_us, ...(source ? { source } : {}), replaces_us: t_us });
-      }
-    } catch (error) {
-      failed(error);
+    /** @type {Map<string, { label: string, source?: string, t_us: number[], replaces_us: number[] }>} */
+    const groups = new Map();
+    for (const { t_us, text, source } of this.unused) {
+      const key = JSON.stringify([text, source]);
+      const group = groups.get(key) ?? { label: text, ...(source ? { source } : {}), t_us: [], replaces_us: [] };
+      groups.set(key, group);
+      group.t_us.push(t_us);
+      group.replaces_us.push(t_us);
     }
+    await this.server.request({ type: "marks", labels: [...groups.values()] }).catch(failed);
     this.button.disabled = false;
     this.show();
   }

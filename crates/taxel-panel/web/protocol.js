@@ -11,7 +11,7 @@ export const MISSING = 0xffffffff;
  * @typedef {{ x: number[], y: number[], area?: number[], unit: "mm" | null }} TaxelPlaces
  * @typedef {{ rows: number, columns: number, pitch_mm: number | [number, number] | null, name: string, exists: string | null, places?: TaxelPlaces, names?: string[] }} ArrayInfo
  * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayInfo | null, udp: string | null, control: string | null,
- *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, columns_us: [number, number], time_columns: number,
+ *   folder: string, open: string | null, readout: string[] | null, encoders: string[], most_message_bytes: number, column_us: number, columns_us: [number, number], time_columns: number,
  *   delta_intensity: boolean | null }} Hello
  * @typedef {{ type: "registers", known: boolean, stated: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
  *   warnings: string[] }} RegistersMessage
@@ -44,7 +44,9 @@ export const MISSING = 0xffffffff;
  *   force: number[] }} Overview
  * @typedef {{ type: "transport", source: string | null, state: "following" | "playing" | "paused", speed: number, t_us: number | null }} Transport
  * @typedef {{ label_id: number, label: string, t_us: number, source: string, trial: string, replaces_us: number | null }} Label
- * @typedef {{ type: "labels", name: string, path: string, labels: Label[] }} Labels
+ * @typedef {{ label: string, t_us: number, source: string, trial: string, replaces_us: number | null }} ConflictRow without a name: a note that counts no more
+ * @typedef {{ conflict_id: number, missing: ConflictRow[], returned: ConflictRow[], new: ConflictRow[] }} Conflict
+ * @typedef {{ type: "labels", name: string, path: string, labels: Label[], conflict: Conflict | null }} Labels
  * @typedef {[number, number]} Taxel column and row
  * @typedef {{ type: "health", source: string | null, taxels: number, heard: number, dead: Taxel[], stuck: Taxel[], noisy: Taxel[], untold: number }} Health
  * @typedef {{ taxel: Taxel, t_us: number, rest: number, before: number | null }} Zeroing

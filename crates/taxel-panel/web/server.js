@@ -1,12 +1,16 @@
 // The connection to the server: requests with their answers, credits for pictures, and reconnecting after a break.
 
 import { VERSION } from "./protocol.js";
+import { size } from "./words.js";
 
 /** @typedef {import("./protocol.js").Message} Message */
 /** @typedef {import("./protocol.js").Refused} Refused */
 
 /** Time until the next attempt to connect, ms. */
 const RECONNECT_MS = 2000;
+
+/** Requests that save labels. */
+const SAVES = new Set(["mark", "marks", "rename", "move", "delete", "settle"]);
 
 /** The reason why a request was refused. */
 export class RefusedError extends Error {
@@ -33,8 +37,10 @@ export class Server {
     /** @type {WebSocket | null} */
     this.socket = null;
     this.next = 0;
-    /** @type {Map<number, { done: () => void, refused: (error: Error) => void }>} */
+    /** @type {Map<number, { type: string, done: () => void, refused: (error: Error) => void }>} */
     this.pending = new Map();
+    /** Maximum size of a message to the server, bytes. */
+    this.mostBytes = Infinity;
   }
 
   /** Connects, and again whenever the connection has closed. */
@@ -64,8 +70,14 @@ export class Server {
     };
   }
 
+  /** Whether labels are being saved. */
+  get saves() {
+    return [...this.pending.values()].some(({ type }) => SAVES.has(type));
+  }
+
   /** @param {Message} message */
   receive(message) {
+    if (message.type === "hello") this.mostBytes = message.most_message_bytes;
     const request = (message.type === "done" || message.type === "refused") && message.id !== undefined ? this.pending.get(message.id) : undefined;
     if (!request) return this.onMessage(message);
     const { id } = /** @type {{ id: number }} */ (message);
@@ -90,8 +102,10 @@ export class Server {
   request(message) {
     if (this.socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Error("no connection to the server"));
     const id = this.next++;
+    const bytes = new Blob([JSON.stringify({ ...message, id })]).size;
+    if (bytes > this.mostBytes) return Promise.reject(new Error(`this is too much for one request: ${size(bytes)}, at most ${size(this.mostBytes)}`));
     return new Promise((done, refused) => {
-      this.pending.set(id, { done, refused });
+      this.pending.set(id, { type: message.type, done, refused });
       this.send({ ...message, id });
     });
   }

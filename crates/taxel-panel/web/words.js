@@ -18,6 +18,9 @@ export const begun = () => (numbering.begin_us ? `${new Date(numbering.begin_us 
 export const writtenTime = (us, places = 3) =>
   numbering.picture_us ? String(Math.floor(us / numbering.picture_us)) : ((us - numbering.begin_us) / 1e6).toFixed(places);
 
+/** @param {number} t_us @returns {string} to the microsecond, without zeros behind the millisecond */
+export const listedTime = (t_us) => writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0{1,3}$/, "$1");
+
 /** @param {string} written @returns {number} us; not a number for other text */
 export const readTime = (written) => {
   const number = written.trim() ? Number(written.replace(",", ".")) : NaN;

@@ -15,9 +15,9 @@ use taxel_live::address::of_host;
 use taxel_live::recording::{Note, Remarks};
 use taxel_panel::assets::asset;
 use taxel_panel::{
-    Activity, BoardLines, Cut, Detected, LabelRow, Opening, Panel as Server, PanelOptions, PictureFile, PictureIndex,
-    PicturePlace, PictureRest, PictureSource, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler, RestSource,
-    UnhealthyTaxels, UserPreset, UserPresets,
+    Activity, BoardLines, Cut, Detected, EditOutcome, LabelConflict, LabelEdit, LabelRow, LabelTable, Opening,
+    Panel as Server, PanelOptions, PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource, PicturesRead,
+    PresetValue, ReadFile, Reply, RequestHandler, RestSource, UnhealthyTaxels, UserPreset, UserPresets,
 };
 
 use crate::convert::{ArrayParts, array, from_array, slice, to_array};
@@ -147,27 +147,43 @@ impl RequestHandler for PythonHandler {
         self.call(|handler| handler.call_method1("read_out", (readout,)).map(drop))
     }
 
-    fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>> {
-        let rows: Vec<LabelParts> =
-            self.call(|handler| handler.call_method1("read_labels", (table, recording))?.extract())?;
-        let row = |(label, t_us, source, trial, replaces_us, host_ns)| LabelRow {
-            label,
-            t_us,
-            source,
-            trial,
-            replaces_us,
-            host_ns,
-        };
-        Ok(rows.into_iter().map(row).collect())
+    fn label_stamp(&self, table: &Path) -> Reply<String> {
+        self.call(|handler| handler.call_method1("label_stamp", (table,))?.extract())
     }
 
-    fn write_labels(&self, table: &Path, labels: &[LabelRow]) -> Reply<()> {
-        let row = |row: &LabelRow| {
-            let LabelRow { label, t_us, source, trial, replaces_us, host_ns } = row.clone();
-            (label, t_us, source, trial, replaces_us, host_ns)
+    fn read_labels(&self, table: &Path, recording: &str) -> Reply<LabelTable> {
+        self.call(|handler| handler.call_method1("read_labels", (table, recording))?.extract()).map(to_table)
+    }
+
+    fn change_labels(
+        &self,
+        table: &Path,
+        recording: &str,
+        requests: &[Vec<LabelEdit>],
+    ) -> Reply<(Vec<EditOutcome>, LabelTable)> {
+        let edit = |edit: &LabelEdit| (edit.old.clone().map(from_row), edit.new.clone().map(from_row));
+        let requests: Vec<Vec<_>> = requests.iter().map(|request| request.iter().map(edit).collect()).collect();
+        let (outcomes, read): (Vec<OutcomeIn>, TableParts) =
+            self.call(|handler| handler.call_method1("change_labels", (table, recording, requests))?.extract())?;
+        let outcome = |outcome| match outcome {
+            OutcomeIn::Refused(reason) => Err(reason),
+            OutcomeIn::Written(rows) => Ok(rows.into_iter().map(|row| row.map(to_row)).collect()),
         };
-        let rows: Vec<LabelParts> = labels.iter().map(row).collect();
-        self.call(|handler| handler.call_method1("write_labels", (table, rows)).map(drop))
+        Ok((outcomes.into_iter().map(outcome).collect(), to_table(read)))
+    }
+
+    fn settle_labels(
+        &self,
+        table: &Path,
+        recording: &str,
+        conflict: &LabelConflict,
+        restore: bool,
+    ) -> Reply<LabelTable> {
+        let rows = |rows: &[LabelRow]| rows.iter().cloned().map(from_row).collect::<Vec<_>>();
+        let LabelConflict { missing, returned, new } = conflict;
+        let conflict: ConflictParts = (rows(missing), rows(returned), rows(new));
+        let given = (table, recording, conflict, restore);
+        self.call(|handler| handler.call_method1("settle_labels", given)?.extract()).map(to_table)
     }
 
     fn read_presets(&self) -> Reply<UserPresets> {
@@ -205,6 +221,35 @@ impl RequestHandler for PythonHandler {
 
 /// A label as Python has it: text, time (us), source, trial, time of the note that it replaces (us), and by the host (ns).
 type LabelParts = (String, i64, String, String, Option<i64>, Option<i64>);
+
+/// A conflict as Python has it: labels that are missing, that returned, and that are new.
+type ConflictParts = (Vec<LabelParts>, Vec<LabelParts>, Vec<LabelParts>);
+
+/// A table of labels as Python has it: its rows and its conflict.
+type TableParts = (Vec<LabelParts>, ConflictParts);
+
+/// What became of a request, as Python has it.
+#[derive(FromPyObject)]
+enum OutcomeIn {
+    Refused(String),
+    Written(Vec<Option<LabelParts>>),
+}
+
+fn to_row((label, t_us, source, trial, replaces_us, host_ns): LabelParts) -> LabelRow {
+    LabelRow { label, t_us, source, trial, replaces_us, host_ns }
+}
+
+fn from_row(LabelRow { label, t_us, source, trial, replaces_us, host_ns }: LabelRow) -> LabelParts {
+    (label, t_us, source, trial, replaces_us, host_ns)
+}
+
+fn to_table((rows, (missing, returned, new)): TableParts) -> LabelTable {
+    let all = |rows: Vec<LabelParts>| rows.into_iter().map(to_row).collect();
+    LabelTable {
+        rows: all(rows),
+        conflict: LabelConflict { missing: all(missing), returned: all(returned), new: all(new) },
+    }
+}
 
 /// A source of pictures: name, first column, rows, columns, times (us), values, rest.
 type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>, RestIn<'py>);

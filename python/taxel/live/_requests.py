@@ -27,7 +27,9 @@ from taxel.detect import load, run
 from taxel.detections import Detection
 from taxel.device import Cable
 from taxel.frames import Frames
-from taxel.labels import Labels, write_labels
+from taxel.labels import Note
+from taxel.live._label_join import Conflict, Edit
+from taxel.live._label_table import LabelTables, TableRead
 from taxel.live._shown_files import Opening, ReadPictures, ShownFiles
 from taxel.recorded import recorded
 from taxel.recording import Recording
@@ -63,6 +65,12 @@ _Taxels = list[tuple[int, int]]
 #: A label, its time (us), source and trial ("": all), the time of the note that it replaces, and that by the host (ns);
 #: "" removes that note.
 _LabelRow = tuple[str, int, str, str, int | None, int | None]
+
+#: Labels that were acknowledged and are missing in a table, that were deleted and returned, and other new ones.
+_LabelConflict = tuple[list[_LabelRow], list[_LabelRow], list[_LabelRow]]
+
+#: The labels of a table, and its conflict.
+_LabelTable = tuple[list[_LabelRow], _LabelConflict]
 
 
 def presets_path() -> Path:
@@ -108,6 +116,23 @@ def _rest(recording: Recording) -> Tare:
     return Tare.take(source, stop_us=stop, note=str(recording.path)) if tare is None else tare
 
 
+def _own_names(recording: str) -> frozenset[str]:
+    """Return the names that a table beside a recording may have for it: none, its file name, and its stem."""
+    return frozenset({"", recording, Path(recording).stem})
+
+
+def _to_note(row: _LabelRow, unit_us: float) -> Note:
+    label, t, source, trial, replaces, host_ns = row
+    replaced = None if replaces is None else round(replaces / unit_us)
+    return Note(label, round(t / unit_us), host_ns or 0, trial, source, replaced)
+
+
+def _to_row(note: Note, unit_us: float) -> _LabelRow:
+    replaced = None if note.replaces is None else round(note.replaces * unit_us)
+    t = round((note.t or 0) * unit_us)
+    return note.text, t, note.source, note.recording, replaced, note.at_ns or None
+
+
 class RequestHandler:
     """Handle the requests of a panel's server, which calls from several threads at a time.
 
@@ -143,6 +168,7 @@ class RequestHandler:
         self._training_lock = threading.Lock()
         self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
         self._files, self._opening = ShownFiles(opening), opening
+        self._labels = LabelTables()
 
     def end_work(self) -> None:
         """End a training that runs, and begin no other: the server waits for no request that takes long."""
@@ -153,6 +179,7 @@ class RequestHandler:
     def close(self) -> None:
         """Close the serial line, end a training that runs, and remove temporary files."""
         self.end_work()
+        self._labels.close()
         self._files.close()
         self._disconnect()
 
@@ -347,38 +374,65 @@ class RequestHandler:
         with _reasons():
             self._read_out(readout)
 
-    def read_labels(self, table: Path, recording: str) -> list[_LabelRow]:
-        """Return the labels of a recording, and those removed that replaced a note of it, from a table."""
+    def label_stamp(self, table: Path) -> str:
+        """Return a text that changes when a table of labels, or what was acknowledged of it, may have changed."""
         with _reasons():
-            labels = Labels(table)
-        name, unit_us = labels.named(recording), self._opening.unit_us(table)
-        return [
-            (
-                row.text,
-                round((row.t or 0) * unit_us),
-                row.source,
-                "" if row.recording == name else row.recording,
-                None if row.replaces is None else round(row.replaces * unit_us),
-                row.at_ns or None,
-            )
-            for row in (*labels.rows, *labels.removed)
+            return self._labels.stamp(table)
+
+    def read_labels(self, table: Path, recording: str) -> _LabelTable:
+        """Return the labels of a recording from a table, and where the table lacks what was acknowledged."""
+        with _reasons():
+            return self._shown(table, self._labels.read(table, _own_names(recording)))
+
+    def change_labels(
+        self, table: Path, recording: str, requests: Sequence[Sequence[tuple[_LabelRow | None, _LabelRow | None]]]
+    ) -> tuple[list[str | list[_LabelRow | None]], _LabelTable]:
+        """Carry out requests in one write of a table as it is now, and return when it is on the disk.
+
+        Parameters
+        ----------
+        table : Path
+        recording : str
+            Its file name.
+        requests : sequence of sequence of (row or None, row or None)
+            The edits of each request, the old row and the new one. A request is carried out whole or not at all.
+
+        Returns
+        -------
+        list
+            For each request the new rows as they were written, or why it was not carried out.
+        table
+            As `read_labels` returns it.
+        """
+        unit_us = self._opening.unit_us(table)
+
+        def note(row: _LabelRow | None) -> Note | None:
+            return None if row is None else _to_note(row, unit_us)
+
+        edits = [[Edit(note(old), note(new)) for old, new in request] for request in requests]
+        with _reasons():
+            outcomes, read = self._labels.change(table, _own_names(recording), edits)
+        written: list[str | list[_LabelRow | None]] = [
+            one if isinstance(one, str) else [None if note is None else _to_row(note, unit_us) for note in one]
+            for one in outcomes
         ]
+        return written, self._shown(table, read)
 
-    def write_labels(self, table: Path, rows: Sequence[_LabelRow]) -> None:
-        """Write a table of labels."""
-        with _reasons(), self._file_lock:
-            unit_us = self._opening.unit_us(table)
+    def settle_labels(self, table: Path, recording: str, conflict: _LabelConflict, restore: bool) -> _LabelTable:
+        """End a conflict: restore what was acknowledged, or accept the table as it is."""
+        unit_us = self._opening.unit_us(table)
+        seen = Conflict(*(tuple(_to_note(row, unit_us) for row in rows) for rows in conflict))
+        with _reasons():
+            return self._shown(table, self._labels.settle(table, _own_names(recording), seen, restore=restore))
 
-            def in_file(t: int) -> int:
-                return round(t / unit_us)
-
-            write_labels(
-                table,
-                [
-                    (label, in_file(t), *names, None if replaces is None else in_file(replaces), host_ns)
-                    for label, t, *names, replaces, host_ns in rows
-                ],
-            )
+    def _shown(self, table: Path, read: TableRead) -> _LabelTable:
+        unit_us = self._opening.unit_us(table)
+        conflict = read.conflict
+        rows, *others = (
+            [_to_row(note, unit_us) for note in notes]
+            for notes in (read.rows, conflict.missing, conflict.returned, conflict.new)
+        )
+        return sorted(rows, key=lambda row: row[1]), (others[0], others[1], others[2])
 
     def read_presets(self) -> tuple[Path, dict[str, dict[str, object]]]:
         """Return the file of the user's presets, and the presets: value by register name."""

@@ -6,11 +6,15 @@ use serde_json::{Map, Value, json};
 use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
+use crate::label_requests::is_label_request;
 use crate::request::{Refusal, Request};
 use crate::requests::{Shown, carry_out};
 
-/// Maximum number of pending requests.
+/// Maximum number of pending requests, but for those that change labels: a person's work is not refused.
 const MOST_PENDING: usize = 8;
+
+/// Maximum number of pending requests that change labels. A client with so many is not read until some are answered.
+const MOST_LABEL_REQUESTS: usize = 1000;
 
 /// Answers that may wait to be sent.
 const MOST_ANSWERS: usize = 64;
@@ -19,13 +23,20 @@ const MOST_ANSWERS: usize = 64;
 pub(super) struct PendingRequests {
     answers: mpsc::Sender<Value>,
     permits: Arc<Semaphore>,
+    label_permits: Arc<Semaphore>,
 }
 
 impl PendingRequests {
     /// Also returns where the answers arrive.
     pub(super) fn new() -> (Self, mpsc::Receiver<Value>) {
         let (answers, receiver) = mpsc::channel(MOST_ANSWERS);
-        (Self { answers, permits: Arc::new(Semaphore::new(MOST_PENDING)) }, receiver)
+        let permits = |most| Arc::new(Semaphore::new(most));
+        (Self { answers, permits: permits(MOST_PENDING), label_permits: permits(MOST_LABEL_REQUESTS) }, receiver)
+    }
+
+    /// Whether the client's next message may be read.
+    pub(super) fn has_room(&self) -> bool {
+        self.label_permits.available_permits() > 0
     }
 
     /// Begins to carry out a request; `shown` is the recording that the client shows. Where too many are pending it is refused, with
@@ -38,7 +49,8 @@ impl PendingRequests {
         message: Map<String, Value>,
         shown: Option<Shown>,
     ) -> Option<Value> {
-        let Ok(permit) = Arc::clone(&self.permits).try_acquire_owned() else {
+        let permits = if is_label_request(&what) { &self.label_permits } else { &self.permits };
+        let Ok(permit) = Arc::clone(permits).try_acquire_owned() else {
             let refusal = Refusal::from("too many requests at a time: wait for their answers");
             return Some(refusal.message(&id, &what));
         };

@@ -14,14 +14,15 @@ use crate::encoded_spikes::EncodedSpikes;
 use crate::folder::size;
 use crate::hub::Hub;
 use crate::keyframe_index::KeyframeIndex;
+use crate::label_requests;
 use crate::live_source::LiveSource;
 use crate::messages;
 use crate::opening;
 use crate::picture::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::player::{Player, ViewOptions};
 use crate::request::{Answer, Refusal, Request, taxel};
+use crate::requests::Shown;
 use crate::requests::readout_of;
-use crate::requests::{Shown, read_labels};
 use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
 
 /// Maximum number of time stamps in a `step`.
@@ -505,7 +506,7 @@ impl Viewport {
         // The reason names the file.
         let refused = |error: taxel_live::Error| Refusal { reason: error.to_string(), field: Some("name".to_owned()) };
         let indexed = opening::index(hub, &name, trial.as_deref()).await.map_err(refused)?;
-        let labels = read_labels(hub, &name, indexed.us()).await;
+        let labels = label_requests::read(hub, &name, indexed.us()).await;
         let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;
         let (file, out) =
             (hub.folder.file(&name).map_err(refused)?, hub.folder.file(&readout_of(&name)).map_err(refused)?);

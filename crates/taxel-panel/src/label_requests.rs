@@ -1,0 +1,214 @@
+//! Requests that change labels. Those that wait for the same table are written together, each whole or not at all; a table
+//! that another window or program has changed is read again.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::Value;
+use tokio::sync::oneshot;
+
+use super::clients::Broadcast;
+use super::handler::{EditOutcome, LabelRow, LabelTable};
+use super::hub::Hub;
+use super::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
+use super::limits::MOST_MARKS;
+use super::messages::warning;
+use super::request::{Answer, Refusal, Request};
+use super::requests::Shown;
+
+/// How often the tables that were opened are checked for changes of other programs.
+const FOLLOW_EVERY: Duration = Duration::from_millis(300);
+
+/// Whether a request changes labels.
+pub(super) fn is_label_request(what: &str) -> bool {
+    matches!(what, "mark" | "marks" | "rename" | "move" | "delete" | "settle")
+}
+
+// ---------------------------------------------------------------------------------------------- reading
+
+/// Reads the labels of a recording from their file; one us of the file is `us` in the view
+/// ([`Indexed::us`](super::indexed::Indexed::us)).
+pub(super) async fn read(hub: &Hub, recording: &str, us: i64) -> Answer {
+    let stamp = stamp(hub, recording).await;
+    let known = hub.labels.count(recording).is_some();
+    if reread(hub, recording, stamp, us).await? && known {
+        // The other clients that show it have an older list.
+        hub.clients.send(Broadcast::Labels(recording.to_owned()));
+    }
+    Ok(())
+}
+
+/// What changes with the table; the reason where that cannot be determined.
+async fn stamp(hub: &Hub, recording: &str) -> String {
+    match hub.folder.file(&file_of(recording)) {
+        Ok(table) => hub.ask(move |handler| handler.label_stamp(&table)).await.unwrap_or_else(|reason| reason),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// Returns whether the labels or their conflict have changed.
+async fn reread(hub: &Hub, recording: &str, stamp: String, us: i64) -> Answer<bool> {
+    let _turn = hub.labels.turn(recording).await;
+    // Also where it cannot be read now: it is read again when it has changed.
+    hub.labels.opens(recording, stamp, us);
+    let table = hub.folder.file(&file_of(recording))?;
+    let name = recording.to_owned();
+    let (read, exists) = hub.ask(move |handler| Ok((handler.read_labels(&table, &name)?, table.exists()))).await?;
+    let there = exists || !read.conflict.is_empty();
+    Ok(hub.labels.replace(recording, there.then(|| read.in_view(us))))
+}
+
+/// Reads tables again that have changed; never returns.
+pub(super) async fn follow(hub: Arc<Hub>) {
+    loop {
+        tokio::time::sleep(FOLLOW_EVERY).await;
+        for (recording, us) in hub.labels.opened() {
+            let stamp = stamp(&hub, &recording).await;
+            if hub.labels.stamp(&recording) == stamp {
+                continue;
+            }
+            match reread(&hub, &recording, stamp, us).await {
+                Ok(true) => hub.clients.send(Broadcast::Labels(recording)),
+                Ok(false) => {}
+                Err(refusal) => hub.clients.send_json(&warning(refusal.reason)),
+            }
+        }
+    }
+}
+
+// ---------------------------------------------------------------------------------------------- changing
+
+/// The changes that a request asks for.
+pub(super) fn changes(what: &str, shown: Option<&Shown>, request: &Request<'_>) -> Answer<Vec<LabelChange>> {
+    let id = || request.whole("label_id", 1, i64::MAX).map(i64::unsigned_abs);
+    match what {
+        "mark" => {
+            let replaces_us = request.has("replaces_us").then(|| request.time("replaces_us")).transpose()?;
+            Ok(vec![LabelChange::Mark(row(shown, request, request.time("t_us")?, replaces_us)?)])
+        }
+        "marks" => marks(shown, request),
+        "rename" => Ok(vec![LabelChange::Rename { id: id()?, label: request.text("label", 200)?.to_owned() }]),
+        "move" => Ok(vec![LabelChange::Move { id: id()?, t_us: request.time("t_us")? }]),
+        _ => Ok(vec![LabelChange::Delete { id: id()? }]),
+    }
+}
+
+fn row(shown: Option<&Shown>, request: &Request<'_>, t_us: i64, replaces_us: Option<i64>) -> Answer<LabelRow> {
+    let source = request.optional_text("source", 64)?.unwrap_or_default().to_owned();
+    let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
+    Ok(LabelRow { label: request.text("label", 200)?.to_owned(), t_us, source, trial, replaces_us, host_ns: None })
+}
+
+/// Several labels, each at one time or more.
+fn marks(shown: Option<&Shown>, request: &Request<'_>) -> Answer<Vec<LabelChange>> {
+    let groups = request.get("labels").and_then(Value::as_array).filter(|groups| !groups.is_empty());
+    let groups = groups.ok_or_else(|| Refusal::of("labels", "must be one label or more, each an object"))?;
+    let mut changes = vec![];
+    for group in groups {
+        let group = group.as_object().ok_or_else(|| Refusal::of("labels", "each must be an object"))?;
+        let group = Request(group);
+        let times = group.times("t_us")?;
+        let replaced = if group.has("replaces_us") { Some(group.times("replaces_us")?) } else { None };
+        if replaced.as_ref().is_some_and(|replaced| replaced.len() != times.len()) {
+            return Err(Refusal::of("replaces_us", "must have one time for each of t_us"));
+        }
+        if changes.len() + times.len() > MOST_MARKS {
+            return Err(Refusal::of("labels", format!("must be at most {MOST_MARKS} labels at a time")));
+        }
+        for (k, &t_us) in times.iter().enumerate() {
+            let replaces_us = replaced.as_ref().map(|replaced| replaced[k]);
+            changes.push(LabelChange::Mark(row(shown, &group, t_us, replaces_us)?));
+        }
+    }
+    Ok(changes)
+}
+
+/// The recording that is shown or being recorded, and one us of its file in the view.
+fn recording_of(hub: &Hub, shown: Option<&Shown>) -> Answer<(String, i64)> {
+    let name = shown.map(|shown| shown.name.clone()).or_else(|| hub.recorder.file());
+    let name = name.ok_or("a label belongs to a recording: open one, or record")?;
+    Ok((name, shown.map_or(1, |shown| shown.indexed.us())))
+}
+
+/// Changes labels of the recording that is shown or being recorded; returns when the table with all of the changes is on the disk.
+pub(super) async fn change(hub: &Hub, shown: Option<&Shown>, changes: Vec<LabelChange>) -> Answer {
+    let (name, us) = recording_of(hub, shown)?;
+    let changes: Vec<_> = changes.into_iter().map(|change| change.at_whole(us)).collect();
+    for (shown, t_us) in changes.iter().filter_map(|change| shown.zip(change.t_us())) {
+        let outside = |reason| Refusal { reason, field: Some("t_us".to_owned()) };
+        shown.indexed.check_label(&name, t_us).map_err(outside)?;
+    }
+    let (answer, written) = oneshot::channel();
+    hub.labels.wait(&name, WaitingChanges { changes, answer });
+    {
+        let _turn = hub.labels.turn(&name).await;
+        write_waiting(hub, &name, us).await;
+    }
+    written.await.unwrap_or_else(|_| Err(Refusal::bug("labels:")))
+}
+
+/// Writes all changes that wait for a table, and answers them.
+async fn write_waiting(hub: &Hub, name: &str, us: i64) {
+    let waiting = hub.labels.take_waiting(name);
+    // Another request may have written them with its own.
+    if waiting.is_empty() {
+        return;
+    }
+    let edits = hub.labels.edits(name, &waiting);
+    let answers = match write(hub, name, us, edits).await {
+        Ok(answers) => answers,
+        Err(refusal) => vec![Err(refusal); waiting.len()],
+    };
+    for (one, answer) in waiting.into_iter().zip(answers) {
+        // The client may have left in the meantime.
+        let _ = one.answer.send(answer);
+    }
+}
+
+async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdit>, String>>) -> Answer<Vec<Answer>> {
+    let table = hub.folder.file(&file_of(name))?;
+    let in_file = |edits: &Vec<NumberedEdit>| edits.iter().map(|(_, edit)| edit.clone().in_file(us)).collect();
+    let requests: Vec<Vec<_>> = edits.iter().flatten().map(in_file).collect();
+    let recording = name.to_owned();
+    let (outcomes, read): (Vec<EditOutcome>, LabelTable) =
+        hub.ask(move |handler| handler.change_labels(&table, &recording, &requests)).await?;
+    let mut outcomes = outcomes.into_iter();
+    let mut answers = vec![];
+    for request in edits {
+        let outcome = request.map(|numbered| (numbered, outcomes.next().unwrap_or_else(|| Err("failed".to_owned()))));
+        answers.push(match outcome {
+            Ok((numbered, Ok(rows))) => {
+                let numbers = numbered.into_iter().map(|(id, _)| id);
+                let rows = rows.into_iter().map(|row| row.map(|row| row.in_view(us)));
+                hub.labels.renumber(name, numbers.zip(rows).filter_map(|(id, row)| Some((id?, row))));
+                Ok(())
+            }
+            Ok((_, Err(reason))) | Err(reason) => Err(reason.into()),
+        });
+    }
+    hub.labels.replace(name, Some(read.in_view(us)));
+    hub.labels.follows(name, us);
+    hub.clients.send(Broadcast::Labels(name.to_owned()));
+    Ok(answers)
+}
+
+/// Ends a conflict as the client chose.
+pub(super) async fn settle(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> Answer {
+    let (name, us) = recording_of(hub, shown)?;
+    let restore = match request.get("keep").and_then(Value::as_str) {
+        Some("acknowledged") => true,
+        Some("file") => false,
+        _ => return Err(Refusal::of("keep", "must be acknowledged or file")),
+    };
+    let id = request.whole("conflict_id", 1, i64::MAX)?.unsigned_abs();
+    let table = hub.folder.file(&file_of(&name))?;
+    let _turn = hub.labels.turn(&name).await;
+    let conflict = hub.labels.conflict(&name, id).ok_or_else(|| {
+        Refusal::of("conflict_id", "this conflict is settled, or the file has changed since: look at it again")
+    })?;
+    let (recording, conflict) = (name.clone(), conflict.in_file(us));
+    let read = hub.ask(move |handler| handler.settle_labels(&table, &recording, &conflict, restore)).await?;
+    hub.labels.replace(&name, Some(read.in_view(us)));
+    hub.clients.send(Broadcast::Labels(name));
+    Ok(())
+}

@@ -1,0 +1,284 @@
+"""The join of a table of labels: what taxel acknowledged of it, the table as it is, and what changes.
+
+A row is its label, time, source, recording and what it replaces, with its count. Any program may write the table. What
+taxel acknowledged and another program's text lacks is a conflict, until a person settles it. Deletions by taxel are in
+the acknowledged state too, so that the windows of several servers tell them from an older text.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from taxel.labels import Note
+
+__all__ = ["Acknowledged", "Conflict", "Edit", "Joined", "conflict_of", "fold", "join", "minus", "settled"]
+
+#: Deletions that are remembered, the newest: a label moved by keys leaves one at every step.
+_MOST_DELETED = 1000
+
+#: Label, time, source, recording, and the time of the note that it replaces.
+_Key = tuple[str, int | None, str, str, int | None]
+
+
+@dataclass(frozen=True)
+class Edit:
+    """Put `new` in the place of `old`; without `old` mark it, without `new` delete `old`."""
+
+    old: Note | None
+    new: Note | None
+
+
+@dataclass(frozen=True)
+class Acknowledged:
+    """Hold what taxel's windows have acknowledged of a table.
+
+    Parameters
+    ----------
+    labels : tuple of Note
+        The rows that they set.
+    deleted : tuple of Note
+        Those that they deleted, moved or renamed, oldest first.
+    table : tuple of Note or None
+        The rows that taxel wrote last, or read before its first write.
+    """
+
+    labels: tuple[Note, ...] = ()
+    deleted: tuple[Note, ...] = ()
+    table: tuple[Note, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Hold where a table lacks what was acknowledged.
+
+    Parameters
+    ----------
+    missing : tuple of Note
+        Acknowledged, and not in the table.
+    returned : tuple of Note
+        Deleted, moved or renamed by taxel, and in the table again.
+    new : tuple of Note
+        Other rows that another program has added since; they are in no conflict themselves.
+    """
+
+    missing: tuple[Note, ...] = ()
+    returned: tuple[Note, ...] = ()
+    new: tuple[Note, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.missing or self.returned)
+
+
+@dataclass(frozen=True)
+class Joined:
+    """Hold the result of `join`.
+
+    Parameters
+    ----------
+    rows : tuple of Note
+        The rows of the table.
+    acknowledged : Acknowledged
+    outcomes : tuple of (tuple of Note or None) or str
+        For each request its rows as they are in the table, one an edit, or why nothing of it was carried out.
+    """
+
+    rows: tuple[Note, ...]
+    acknowledged: Acknowledged
+    outcomes: tuple[tuple[Note | None, ...] | str, ...] = ()
+
+
+def _key(note: Note) -> _Key:
+    return note.text, note.t, note.source, note.recording, note.replaces
+
+
+def minus(rows: Iterable[Note], others: Iterable[Note]) -> tuple[Note, ...]:
+    """Return the rows that are left when each of `others` takes one away."""
+    count = Counter(map(_key, others))
+    left = []
+    for row in rows:
+        key = _key(row)
+        if count[key]:
+            count[key] -= 1
+        else:
+            left.append(row)
+    return tuple(left)
+
+
+def _common(rows: Sequence[Note], others: Iterable[Note]) -> tuple[Note, ...]:
+    """Return the rows that `others` has too, as often."""
+    return minus(rows, minus(rows, others))
+
+
+def conflict_of(known: Acknowledged, theirs: Sequence[Note]) -> Conflict:
+    """Return where a table lacks what was acknowledged."""
+    missing = minus(known.labels, theirs)
+    added = () if known.table is None else minus(theirs, known.table)
+    deleted = set(map(_key, known.deleted))
+    returned = tuple(row for row in added if _key(row) in deleted)
+    return Conflict(missing, returned, minus(added, returned) if missing or returned else ())
+
+
+class _Rows:
+    """Hold rows by what they are, with their count."""
+
+    def __init__(self, rows: Iterable[Note]) -> None:
+        self._of: dict[_Key, list[Note]] = {}
+        #: The rows without a label, by source, recording and the time of the note that they remove.
+        self._removals: dict[tuple[str, str, int | None], list[Note]] = {}
+        for row in rows:
+            self.add(row)
+
+    def __iter__(self) -> Iterator[Note]:
+        for rows in self._of.values():
+            yield from rows
+
+    def count(self, row: Note) -> int:
+        return len(self._of.get(_key(row), ()))
+
+    def add(self, row: Note) -> None:
+        self._of.setdefault(_key(row), []).append(row)
+        if not row.text:
+            self._removals.setdefault((row.source, row.recording, row.replaces), []).append(row)
+
+    def take(self, row: Note) -> Note | None:
+        """Take one away: that with the same time by the host, if there is one."""
+        rows = self._of.get(_key(row))
+        if not rows:
+            return None
+        taken = rows.pop(next((k for k, one in enumerate(rows) if one.at_ns == row.at_ns), 0))
+        if not taken.text:
+            self._removals[taken.source, taken.recording, taken.replaces].remove(taken)
+        return taken
+
+    def removals_beside(self, row: Note) -> list[Note]:
+        """Return the rows that remove the note which a label replaces."""
+        if row.replaces is None:
+            return []
+        return list(self._removals.get((row.source, row.recording, row.replaces), ()))
+
+
+class _State:
+    """The table and what is acknowledged of it, while requests are carried out."""
+
+    def __init__(self, rows: Iterable[Note], labels: Iterable[Note], deleted: Iterable[Note], table: Iterable[Note]):
+        self.rows, self.labels, self.table = _Rows(rows), _Rows(labels), _Rows(table)
+        self.deleted = {_key(row): row for row in deleted}
+
+    def copy(self) -> _State:
+        return _State(self.rows, self.labels, self.deleted.values(), self.table)
+
+    def carry_out(self, edit: Edit) -> Note | None:
+        """Carry out an edit; return the row as it is in the table."""
+        old, new = edit.old, edit.new
+        if old is None:
+            assert new is not None
+            for removal in self.rows.removals_beside(new):
+                self._delete(removal)
+            if not self.rows.count(new):
+                self._add(new)
+            if not self.labels.count(new):
+                self.labels.add(new)
+            return new
+        if not self.rows.count(old):
+            if new is not None and self.rows.count(new):
+                # The same request has been carried out before.
+                if not self.labels.count(new):
+                    self.labels.add(new)
+                return new
+            raise LookupError(f"{old.text} at {old.t} is no longer in the table: another window or program changed it")
+        taken = self._delete(old)
+        if new is None:
+            return None
+        new = replace(new, others=taken.others)
+        self._add(new)
+        self.labels.add(new)
+        return new
+
+    def _delete(self, row: Note) -> Note:
+        missing = max(0, self.labels.count(row) - self.rows.count(row))
+        taken = self.rows.take(row)
+        assert taken is not None
+        # A row that is not acknowledged goes first.
+        while self.labels.count(row) > self.rows.count(row) + missing:
+            self.labels.take(row)
+        self.table.take(row)
+        self.deleted.pop(_key(row), None)
+        self.deleted[_key(row)] = row
+        return taken
+
+    def _add(self, row: Note) -> None:
+        self.rows.add(row)
+        self.table.add(row)
+        self.deleted.pop(_key(row), None)
+
+
+def join(base: Acknowledged, theirs: Sequence[Note], change: Sequence[Sequence[Edit]]) -> Joined:
+    """Carry out requests on a table as it is.
+
+    Parameters
+    ----------
+    base : Acknowledged
+        What was acknowledged before.
+    theirs : sequence of Note
+        The rows of the table now.
+    change : sequence of sequence of Edit
+        Requests, each carried out whole or not at all.
+
+    Returns
+    -------
+    Joined
+        Each row of `base` that was not deleted by `change` is in `rows` or in the conflict of the result.
+    """
+    state = _State(theirs, base.labels, base.deleted, theirs if base.table is None else base.table)
+    outcomes: list[tuple[Note | None, ...] | str] = []
+    for request in change:
+        # Only an edit of a row that must be there can fail.
+        before = state.copy() if len(request) > 1 and any(edit.old for edit in request) else None
+        try:
+            outcomes.append(tuple([state.carry_out(edit) for edit in request]))
+        except LookupError as error:
+            outcomes.append(str(error))
+            state = state if before is None else before
+    rows = tuple(state.rows)
+    deleted = tuple(state.deleted.values())[-_MOST_DELETED:]
+    known = Acknowledged(tuple(state.labels), deleted, tuple(state.table))
+    return Joined(rows, _known_after(known, rows), tuple(outcomes))
+
+
+def _known_after(known: Acknowledged, rows: tuple[Note, ...]) -> Acknowledged:
+    """Return what is known with the table as it is written; a conflict stays one until it is settled."""
+    return known if conflict_of(known, rows) else replace(known, table=rows)
+
+
+def fold(base: Acknowledged, theirs: Sequence[Note], before: Sequence[Note], after: Sequence[Note]) -> Joined:
+    """Make the changes of another program, from `before` to `after`, on a table as it is.
+
+    Another program may still write to a table that taxel has replaced.
+    """
+    rows = (*minus(theirs, minus(before, after)), *minus(after, before))
+    return Joined(rows, _known_after(base, rows))
+
+
+def settled(base: Acknowledged, theirs: Sequence[Note], conflict: Conflict, *, restore: bool) -> Joined:
+    """End a conflict that a person has seen, in the table as it is; other rows stay in conflict.
+
+    Parameters
+    ----------
+    base : Acknowledged
+    theirs : sequence of Note
+    conflict : Conflict
+    restore : bool
+        Whether the table gets what was acknowledged; otherwise what it lacks is acknowledged no more.
+    """
+    now = conflict_of(base, theirs)
+    missing, returned = _common(now.missing, conflict.missing), _common(now.returned, conflict.returned)
+    rows, known = tuple(theirs), base
+    if restore:
+        rows = (*minus(rows, returned), *missing)
+    else:
+        kept = set(map(_key, returned))
+        deleted = tuple(row for row in base.deleted if _key(row) not in kept)
+        known = replace(base, labels=minus(base.labels, missing), deleted=deleted)
+    return Joined(rows, _known_after(known, rows))

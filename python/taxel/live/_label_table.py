@@ -1,0 +1,548 @@
+"""Tables of labels that several windows and any other program write: nothing that was acknowledged is lost.
+
+A write takes a lock on a file beside the table, reads the table again, joins (`_label_join`), and exchanges the new
+file for the old one in one step. Where the file that comes out is not the one that was read, it is put back, and the
+join is made anew.
+
+What was acknowledged is saved beside the table, in ``.NAME.acknowledged``: its state before and after a write, with
+digests of both texts, before the table is exchanged, and the state after it alone, afterwards. A process that is killed
+in between leaves a state that the text of the table decides.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import errno
+import fcntl
+import hashlib
+import json
+import os
+import random
+import secrets
+import stat
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from taxel._base.files import try_whole, write_whole
+from taxel._core import FormatError, ProblemError
+from taxel.labels import Note, rows_of, text_with
+from taxel.live._label_join import Acknowledged, Conflict, Edit, Joined, conflict_of, fold, join, minus, settled
+
+__all__ = ["LabelTables", "TableRead"]
+
+#: The lock of all tables of a folder.
+_LOCK = ".taxel-labels.lock"
+
+#: How long another process may hold the lock, s.
+_LOCK_WITHIN_S = 20.0
+
+#: A table that does not end, or cannot be read, and was written within this time is being written, s.
+_WRITTEN_S = 2.0
+
+#: How long a table that is being written is waited for, s.
+_WHOLE_WITHIN_S = 6.0
+
+#: How long, and how many, replaced tables are watched for programs that still write to them, s.
+_WATCHED_S, _MOST_WATCHED = 60.0, 256
+
+#: RENAME_EXCHANGE of Linux (renameat2(2)), AT_FDCWD, and the answers of file systems that cannot exchange.
+_EXCHANGE, _HERE = 2, -100
+_NO_EXCHANGE = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
+
+
+class _BeingWritten(Exception):  # noqa: N818  no error
+    """Another program writes the table now, as far as its text tells."""
+
+    def __init__(self, reason: FormatError | None) -> None:
+        super().__init__()
+        self.reason = reason
+
+
+@dataclass(frozen=True)
+class TableRead:
+    """Hold a table as it was read.
+
+    Parameters
+    ----------
+    rows : tuple of Note
+        Those of the recording itself have no name of a recording.
+    conflict : Conflict
+    """
+
+    rows: tuple[Note, ...]
+    conflict: Conflict
+
+
+@dataclass(frozen=True, eq=False)
+class _File:
+    """Hold an open file of a table; without a descriptor there is none."""
+
+    place: Path
+    own: frozenset[str]
+    descriptor: int | None
+    text: bytes | None
+    rows: tuple[Note, ...]
+    others: tuple[str, ...]
+
+    @classmethod
+    def read(cls, place: Path, own: frozenset[str], *, final: bool) -> _File:
+        """Read a table; `final` if it is not waited for any longer."""
+        try:
+            descriptor = os.open(place, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        except FileNotFoundError:
+            return cls(place, own, None, None, (), ())
+        try:
+            return cls._of(place, own, descriptor, final=final)
+        except BaseException:
+            os.close(descriptor)
+            raise
+
+    @classmethod
+    def _of(cls, place: Path, own: frozenset[str], descriptor: int, *, final: bool) -> _File:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise FormatError(f"{place}: is no regular file")
+        text = _bytes_of(descriptor)
+        age_s = time.time() - os.fstat(descriptor).st_mtime
+        try:
+            rows, others = _parsed(place, own, text)
+        except FormatError as error:
+            if final or age_s > _WRITTEN_S:
+                raise
+            raise _BeingWritten(error) from None
+        if not text.endswith((b"\n", b"\r")) and not final and age_s <= _WRITTEN_S:
+            raise _BeingWritten(None)
+        return cls(place, own, descriptor, text, rows, others)
+
+    def again(self, *, final: bool) -> _File:
+        """Read the same file again, which may have been replaced by another."""
+        assert self.descriptor is not None
+        return self._of(self.place, self.own, self.descriptor, final=final)
+
+    def is_current(self) -> bool:
+        """Return whether the table is still the file that was read, with the same text."""
+        try:
+            there = os.stat(self.place)
+        except FileNotFoundError:
+            return self.descriptor is None
+        if self.descriptor is None:
+            return False
+        here = os.fstat(self.descriptor)
+        same = (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
+        return same and _bytes_of(self.descriptor) == self.text
+
+    def close(self) -> None:
+        if self.descriptor is not None:
+            os.close(self.descriptor)
+
+
+def _bytes_of(descriptor: int) -> bytes:
+    parts, at = [], 0
+    while part := os.pread(descriptor, 1 << 20, at):
+        parts.append(part)
+        at += len(part)
+    return b"".join(parts)
+
+
+def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
+    try:
+        lines = text.decode("utf-8-sig").splitlines(keepends=True)
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{place}: not a table of text: {error}") from None
+    rows, others = rows_of(place, lines)
+    return tuple(replace(row, recording="") if row.recording in own else row for row in rows), others
+
+
+def _digest(text: bytes | None) -> str:
+    return "" if text is None else hashlib.sha256(text).hexdigest()
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder's tables.
+
+    Raises
+    ------
+    ProblemError : another process holds it for too long
+    OSError : the folder cannot be written, or its file system has no locks
+    """
+    place, until = folder / _LOCK, time.monotonic() + _LOCK_WITHIN_S
+    while True:
+        try:
+            lock = os.open(place, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        except PermissionError:
+            # That of another user.
+            lock = os.open(place, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+        try:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                if time.monotonic() > until:
+                    raise ProblemError(f"{place}: another program holds this lock; nothing was saved") from None
+            else:
+                # A lock file that was deleted in between locks nothing.
+                with contextlib.suppress(FileNotFoundError):
+                    if os.path.samestat(os.fstat(lock), os.stat(place)):
+                        yield
+                        return
+        finally:
+            os.close(lock)
+        time.sleep(random.uniform(0.001, 0.004))
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _exchange(one: str, other: Path) -> bool:
+    """Exchange two files in one step; return False where the file system cannot."""
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except AttributeError:
+        return False
+    if not rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), ctypes.c_uint(_EXCHANGE)):
+        return True
+    code = ctypes.get_errno()
+    if code in _NO_EXCHANGE:
+        return False
+    raise OSError(code, os.strerror(code), str(other))
+
+
+# ---------------------------------------------------------------------------------------------- what was acknowledged
+
+
+def _state_place(place: Path) -> Path:
+    return place.with_name(f".{place.name}.acknowledged")
+
+
+def _to_json(known: Acknowledged) -> dict[str, Any]:
+    def rows(notes: Sequence[Note] | None) -> list[Any] | None:
+        if notes is None:
+            return None
+        return [
+            [n.text, n.t, n.source, n.recording, n.replaces, n.at_ns, [list(one) for one in n.others]] for n in notes
+        ]
+
+    return {"labels": rows(known.labels), "deleted": rows(known.deleted), "table": rows(known.table)}
+
+
+def _time(t: object) -> int:
+    if not isinstance(t, int) or abs(t) > 2**52:
+        raise ValueError(f"{t!r} is no time")
+    return t
+
+
+def _from_json(saved: dict[str, Any]) -> Acknowledged:
+    def rows(name: str) -> tuple[Note, ...]:
+        return tuple(
+            Note(
+                str(text),
+                _time(t),
+                int(at_ns),
+                str(recording),
+                str(source),
+                None if replaces is None else _time(replaces),
+                tuple((str(name), str(cell)) for name, cell in others),
+            )
+            for text, t, source, recording, replaces, at_ns, others in saved[name] or ()
+        )
+
+    return Acknowledged(rows("labels"), rows("deleted"), None if saved["table"] is None else rows("table"))
+
+
+def _acknowledged(place: Path, file: _File) -> Acknowledged:
+    """Return what was acknowledged of a table, as it was saved beside it.
+
+    Raises
+    ------
+    FormatError : what was saved cannot be read
+    """
+    beside = _state_place(place)
+    try:
+        descriptor = os.open(beside, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except FileNotFoundError:
+        return Acknowledged()
+    try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise FormatError(f"{beside}: is no regular file")
+        saved = json.loads(_bytes_of(descriptor))
+        known = _from_json(saved["acknowledged"])
+        if saved["next"] is None or _digest(file.text) == saved["before"]:
+            return known
+        after = _from_json(saved["next"])
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise FormatError(
+            f"{beside}: not what taxel saved of the labels that it acknowledged ({error}); delete it to go on without"
+        ) from None
+    finally:
+        os.close(descriptor)
+    if _digest(file.text) == saved["after"]:
+        return after
+    # The writer was killed, and another program has written the table since: what either text may lack is in conflict,
+    # but for rows that were to be deleted and are gone.
+    gone = minus(known.labels, after.labels)
+    return replace(after, labels=(*after.labels, *minus(gone, minus(gone, file.rows))), deleted=known.deleted)
+
+
+def _save(place: Path, saved: dict[str, Any]) -> None:
+    text = json.dumps({"about": "labels that taxel has acknowledged (docs/files.md)", **saved}, ensure_ascii=False)
+    write_whole(_state_place(place), lambda file: file.write(text.encode()), overwrite=True)
+
+
+# ---------------------------------------------------------------------------------------------- reading and writing
+
+#: What is made of what was acknowledged and a table's rows.
+_Action = Callable[[Acknowledged, tuple[Note, ...]], Joined]
+
+
+@dataclass(frozen=True, eq=False)
+class _Watched:
+    """Hold a table that was replaced, to which a program may still write."""
+
+    file: _File
+    until: float
+    seen: tuple[int, int]
+
+
+class LabelTables:
+    """Read and write tables of labels; methods may be called from several threads at a time."""
+
+    def __init__(self) -> None:
+        self._watched: list[_Watched] = []
+        self._watched_lock = threading.Lock()
+
+    def close(self) -> None:
+        """Take in what other programs wrote to replaced tables, and close them."""
+        self._take_in()
+        with self._watched_lock:
+            watched, self._watched = self._watched, []
+        for one in watched:
+            one.file.close()
+
+    def stamp(self, table: Path) -> str:
+        """Return a text that changes when a table, or what was acknowledged of it, may have changed."""
+        place = Path(os.path.realpath(table))
+        self._take_in(place)
+        parts = []
+        for one in (place, _state_place(place)):
+            try:
+                about = os.stat(one)
+                parts.append(f"{about.st_ino}.{about.st_size}.{about.st_mtime_ns}.{about.st_ctime_ns}")
+            except FileNotFoundError:
+                parts.append("-")
+        return " ".join(parts)
+
+    def read(self, table: Path, own: frozenset[str]) -> TableRead:
+        """Read a table, which need not exist.
+
+        Parameters
+        ----------
+        table : Path
+        own : set of str
+            Names of the recording in the table.
+
+        Raises
+        ------
+        FormatError : no table of labels (names the line)
+        OSError : it cannot be read
+        """
+        place = Path(os.path.realpath(table))
+        for final in _attempts():
+            with contextlib.ExitStack() as held:
+                # Where there can be no lock, no window writes.
+                with contextlib.suppress(OSError):
+                    held.enter_context(_locked(place.parent))
+                try:
+                    file = _File.read(place, own, final=final)
+                except _BeingWritten:
+                    continue
+                try:
+                    return TableRead(file.rows, conflict_of(_acknowledged(place, file), file.rows))
+                finally:
+                    file.close()
+        raise AssertionError
+
+    def change(
+        self, table: Path, own: frozenset[str], requests: Sequence[Sequence[Edit]]
+    ) -> tuple[tuple[tuple[Note | None, ...] | str, ...], TableRead]:
+        """Carry out requests in one write; return what became of each, and the table.
+
+        The table and its folder are on the disk then.
+
+        Raises
+        ------
+        ProblemError : the table is no table of labels, or another program holds the lock; nothing is written
+        OSError : it cannot be written
+        """
+        joined = self._write(table, own, lambda known, theirs: join(known, theirs, requests))
+        return joined.outcomes, TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
+
+    def settle(self, table: Path, own: frozenset[str], conflict: Conflict, *, restore: bool) -> TableRead:
+        """End a conflict: restore what was acknowledged, or accept the table as it is.
+
+        Raises
+        ------
+        As `change`.
+        """
+        joined = self._write(table, own, lambda known, theirs: settled(known, theirs, conflict, restore=restore))
+        return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
+
+    def _write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
+        place = Path(os.path.realpath(table))
+        for final in _attempts():
+            with _locked(place.parent):
+                try:
+                    file = _File.read(place, own, final=final)
+                except _BeingWritten:
+                    continue
+                except FormatError as error:
+                    raise ProblemError(f"{error}; nothing was saved: mend the table, then try again") from None
+                kept = False
+                try:
+                    known = _acknowledged(place, file)
+                    joined = action(known, file.rows)
+                    if minus(joined.rows, file.rows) or minus(file.rows, joined.rows):
+                        kept = self._replace(file, known, joined)
+                        if not kept:
+                            continue
+                    elif file.descriptor is not None:
+                        os.fsync(file.descriptor)
+                    if joined.acknowledged != known or kept:
+                        _save(place, {"acknowledged": _to_json(joined.acknowledged), "next": None})
+                    _sync_folder(place.parent)
+                    return joined
+                finally:
+                    if not kept:
+                        file.close()
+        raise AssertionError
+
+    def _replace(self, file: _File, known: Acknowledged, joined: Joined) -> bool:
+        """Replace a table; return False if another program has written it since it was read."""
+        place = file.place
+        try_whole(place, overwrite=True)
+        text = text_with(joined.rows, file.others).encode()
+        states = {"acknowledged": _to_json(known), "next": _to_json(joined.acknowledged)}
+        _save(place, {**states, "before": _digest(file.text), "after": _digest(text)})
+        replaced = False
+        try:
+            with _new_file(file, text) as (descriptor, name):
+                replaced = file.is_current() and _put(name, file)
+                if replaced and not _is_old(name, file):
+                    # Another program was quicker: its file comes back. It may have written to ours in the meantime.
+                    _exchange(name, place)
+                    self._watch(replace(file, descriptor=os.dup(descriptor), text=text, rows=joined.rows))
+                    replaced = False
+        finally:
+            if not replaced:
+                with contextlib.suppress(OSError):
+                    _save(place, {**states, "next": None})
+        if replaced and file.descriptor is not None:
+            self._watch(file)
+        return replaced
+
+    def _watch(self, file: _File) -> None:
+        one = _Watched(file, time.monotonic() + _WATCHED_S, (-1, 0))
+        with self._watched_lock:
+            self._watched.append(one)
+
+    def _take_in(self, place: Path | None = None) -> None:
+        """Take in what programs wrote to a table that they had opened before it was replaced; `None`: to any table."""
+        with self._watched_lock:
+            mine = [one for one in self._watched if place in (None, one.file.place)]
+            too_many = len(self._watched) - _MOST_WATCHED
+            self._watched = [one for one in self._watched if one not in mine]
+        left = []
+        for k, one in enumerate(mine):
+            now = self._taken_in(one)
+            if time.monotonic() > now.until or k < too_many:
+                now.file.close()
+            else:
+                left.append(now)
+        with self._watched_lock:
+            self._watched = [*left, *self._watched]
+
+    def _taken_in(self, one: _Watched) -> _Watched:
+        file = one.file
+        assert file.descriptor is not None
+        about = os.fstat(file.descriptor)
+        seen = about.st_size, about.st_mtime_ns
+        if seen == one.seen:
+            return one
+        until = time.monotonic() + _WATCHED_S
+        try:
+            now = file if _bytes_of(file.descriptor) == file.text else file.again(final=False)
+        except _BeingWritten:
+            return replace(one, until=until)
+        except FormatError:
+            # A text that is being written becomes one that can be read.
+            return replace(one, seen=seen)
+        if now is file:
+            return replace(one, seen=seen)
+        try:
+            self._write(file.place, file.own, lambda known, theirs: fold(known, theirs, file.rows, now.rows))
+        except (ProblemError, OSError):
+            return one
+        return _Watched(now, until, seen)
+
+
+def _attempts() -> Iterator[bool]:
+    """Yield for each attempt whether it is the last, at which a table is not waited for any longer."""
+    until = time.monotonic() + _WHOLE_WITHIN_S
+    while time.monotonic() < until:
+        yield False
+        time.sleep(0.01)
+    while True:
+        yield True
+
+
+def _is_old(name: str, file: _File) -> bool:
+    """Return whether what came out for a new table is the file that was read, with the same text."""
+    if file.descriptor is None:
+        return True
+    try:
+        there = os.stat(name)
+    except FileNotFoundError:
+        # The file system could not exchange the two.
+        return True
+    return os.path.samestat(there, os.fstat(file.descriptor)) and _bytes_of(file.descriptor) == file.text
+
+
+@contextlib.contextmanager
+def _new_file(file: _File, text: bytes) -> Iterator[tuple[int, str]]:
+    """Write the new text of a table to a file beside it, on the disk; remove what is there afterwards."""
+    name = str(file.place.with_name(f".{file.place.name}.{secrets.token_hex(4)}"))
+    try:
+        descriptor = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        try:
+            with open(descriptor, "wb", closefd=False) as part:
+                part.write(text)
+            if file.descriptor is not None:
+                os.fchmod(descriptor, stat.S_IMODE(os.fstat(file.descriptor).st_mode))
+            os.fsync(descriptor)
+            yield descriptor, name
+        finally:
+            os.close(descriptor)
+            Path(name).unlink(missing_ok=True)
+    except OSError as error:
+        error.filename, error.filename2 = str(file.place), None
+        raise
+
+
+def _put(name: str, file: _File) -> bool:
+    """Put a new file in the place of a table, the old one in its own; return False if there is a table by now."""
+    if file.descriptor is None:
+        try:
+            os.link(name, file.place)
+        except FileExistsError:
+            return False
+    elif not _exchange(name, file.place):
+        os.replace(name, file.place)
+    return True

@@ -1,0 +1,306 @@
+"""Tables of labels that several windows and other programs write at once, and programs that end in between."""
+
+from __future__ import annotations
+
+import os
+import random
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import taxel
+from taxel import FormatError, ProblemError
+from taxel.labels import Note
+from taxel.live import _label_table
+from taxel.live._label_join import Edit
+from taxel.live._label_table import LabelTables
+
+OWN = frozenset({"", "walk.mcap", "walk"})
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    return tmp_path / "walk.notes.csv"
+
+
+@pytest.fixture
+def tables():
+    one = LabelTables()
+    yield one
+    one.close()
+
+
+def mark(tables: LabelTables, table: Path, label: str, t: int):
+    (outcome,), read = tables.change(table, OWN, [[Edit(None, Note(label, t))]])
+    assert not isinstance(outcome, str)
+    return read
+
+
+def held(table: Path) -> Counter:
+    return Counter((row.text, row.t) for row in taxel.Labels(table).rows)
+
+
+def texts(rows) -> list[tuple[str, int]]:
+    return sorted((row.text, row.t) for row in rows)
+
+
+class Window(threading.Thread):
+    """Somebody who marks, moves and deletes labels of their own at random."""
+
+    def __init__(self, table: Path, seed: int, number: int, ends: float) -> None:
+        super().__init__()
+        self.table, self.name, self.ends = table, f"window {number}", ends
+        self.tables, self.choose = LabelTables(), random.Random(seed + number)
+        self.own: set[int] = set()
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            while time.monotonic() < self.ends:
+                self.change()
+                self.tables.stamp(self.table)
+        except BaseException as error:
+            self.error = error
+            raise
+
+    def change(self) -> None:
+        t, kind = self.choose.randrange(10**9), self.choose.random()
+        edit = Edit(None, Note(self.name, t))
+        if kind > 0.6 and self.own:
+            old = self.choose.choice(list(self.own))
+            edit = Edit(Note(self.name, old), None if kind > 0.8 else edit.new)
+        (outcome,), read = self.tables.change(self.table, OWN, [[edit]])
+        assert not isinstance(outcome, str), outcome
+        assert not read.conflict
+        self.own -= {edit.old.t if edit.old else None}
+        self.own |= {t} if edit.new else set()
+
+
+def test_windows_and_a_hand_that_appends_lose_nothing(table: Path) -> None:
+    seed = random.randrange(10**6)
+    print("seed", seed)
+    ends = time.monotonic() + 3.0
+    windows = [Window(table, seed, number, ends) for number in range(3)]
+    windows[0].change()
+    for window in windows:
+        window.start()
+    hand = Counter()
+    for k in range(10**6):
+        if time.monotonic() > ends:
+            break
+        # Another program's line, at once or in two parts.
+        with table.open("a") as file:
+            file.write(f"hand,{k}")
+            if k % 7 == 0:
+                file.flush()
+                time.sleep(0.01)
+            file.write("\n")
+        hand["hand", k] += 1
+        time.sleep(0.003)
+    for window in windows:
+        window.join()
+        assert window.error is None
+        window.tables.close()
+    assert held(table) == hand + Counter((window.name, t) for window in windows for t in window.own)
+    assert not windows[0].tables.read(table, OWN).conflict
+
+
+def test_a_program_that_is_quicker_than_the_exchange_keeps_its_text(table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 1)
+    exchange, times = _label_table._exchange, []
+
+    def late(one: str, other: Path) -> bool:
+        if len(times) < 3 and not times.append(0) and len(times) % 2:
+            new = table.with_name("editor")
+            new.write_text(table.read_text() + f"hand,{len(times)}\n")
+            os.replace(new, table)
+        return exchange(one, other)
+
+    monkeypatch.setattr(_label_table, "_exchange", late)
+    read = mark(tables, table, "toe", 2)
+    assert texts(read.rows) == [("hand", 1), ("hand", 3), ("heel", 1), ("toe", 2)] == sorted(held(table))
+    assert not read.conflict
+
+
+def test_what_is_written_to_a_table_that_was_replaced_meanwhile_is_taken_in(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    with table.open("a") as hand:
+        hand.write("hand,2\n")
+        mark(tables, table, "toe", 3)
+        hand.flush()
+        tables.stamp(table)
+        assert sorted(held(table)) == [("hand", 2), ("heel", 1), ("toe", 3)]
+        hand.write("hand,4\n")
+    tables.close()
+    assert sorted(held(table)) == [("hand", 2), ("hand", 4), ("heel", 1), ("toe", 3)]
+
+
+def test_a_line_that_is_being_written_is_waited_for(table: Path, tables) -> None:
+    table.write_text("label,t_us\n")
+    with table.open("a") as hand:
+        hand.write("heel,50")
+        hand.flush()
+        window = threading.Thread(target=mark, args=(tables, table, "toe", 3))
+        window.start()
+        time.sleep(0.3)
+        hand.write("0000\n")
+    window.join()
+    assert sorted(held(table)) == [("heel", 500_000), ("toe", 3)]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (b"label,t_us\nheel,soon\n", "line 2: t_us is 'soon'"),
+        (b"# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
+        (b'label,t_us\n"heel,1\n', "a quote opens"),
+        (b"\xff\xfe", "not a table of text"),
+        (b"", "it is empty"),
+    ],
+)
+def test_a_table_that_cannot_be_read_is_not_written(text: bytes, said: str, table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    table.write_bytes(text)
+    os.utime(table, (1, 1))
+    with pytest.raises(ProblemError, match=f"{said}.*nothing was saved: mend the table"):
+        mark(tables, table, "toe", 2)
+    assert table.read_bytes() == text
+    with pytest.raises(FormatError, match=said):
+        tables.read(table, OWN)
+    table.write_text("label,t_us\n")
+    read = mark(tables, table, "ball", 3)
+    assert texts(read.rows) == [("ball", 3)]
+    assert texts(read.conflict.missing) == [("heel", 1)]
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        (b"\xef\xbb\xbflabel,t_us\r\nheel,1\r\n", [("heel", 1)]),
+        (b"label,t_us\nheel,1", [("heel", 1)]),
+        (b"t_us,label,comment\n1,heel,late\n1,heel,early\n", [("heel", 1), ("heel", 1)]),
+        (b"recording,label,t_us\nwalk,heel,1\nrun,heel,1\n,heel,1\n", [("heel", 1), ("heel", 1), ("heel", 1)]),
+        (b"label,t_us,comment\n", []),
+    ],
+)
+def test_any_table_that_can_be_read_keeps_its_rows(text: bytes, kept, table: Path, tables) -> None:
+    table.write_bytes(text)
+    os.utime(table, (1, 1))
+    read = mark(tables, table, "toe", 2)
+    assert texts(read.rows) == [*kept, ("toe", 2)] == sorted(held(table).elements())
+    assert (b"comment" in text) == (b"comment" in table.read_bytes())
+    assert not tables.read(table, OWN).conflict
+
+
+def test_a_deleted_table_and_an_older_text_are_conflicts_that_last(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    older = table.read_text()
+    mark(tables, table, "toe", 2)
+    tables.change(table, OWN, [[Edit(Note("heel", 1), Note("heel", 5))]])
+    table.write_text(older + "hand,9\n")
+    for again in (tables, LabelTables()):
+        conflict = again.read(table, OWN).conflict
+        assert texts(conflict.missing) == [("heel", 5), ("toe", 2)]
+        assert texts(conflict.returned) == [("heel", 1)]
+        assert texts(conflict.new) == [("hand", 9)]
+        # Another label changes nothing in it.
+        assert mark(again, table, "ball", 7).conflict == conflict
+    read = tables.settle(table, OWN, conflict, restore=True)
+    assert texts(read.rows) == [("ball", 7), ("hand", 9), ("heel", 5), ("toe", 2)]
+    assert not read.conflict
+    table.unlink()
+    conflict = tables.read(table, OWN).conflict
+    assert texts(conflict.missing) == [("ball", 7), ("heel", 5), ("toe", 2)]
+    read = tables.settle(table, OWN, conflict, restore=False)
+    assert not read.conflict
+    assert not read.rows
+    assert texts(mark(tables, table, "toe", 2).rows) == [("toe", 2)]
+
+
+def test_only_what_was_seen_is_settled(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    mark(tables, table, "toe", 2)
+    table.write_text("label,t_us\ntoe,2\n")
+    seen = tables.read(table, OWN).conflict
+    table.write_text("label,t_us\n")
+    read = tables.settle(table, OWN, seen, restore=False)
+    assert texts(read.conflict.missing) == [("toe", 2)]
+
+
+@pytest.mark.parametrize("request_", ["mark", "move", "delete"])
+@pytest.mark.parametrize("step", range(6))
+@pytest.mark.parametrize("older", [False, True])
+def test_a_window_killed_at_any_step_leaves_its_change_whole_or_none(
+    request_: str, step: int, older: bool, table: Path, tables
+) -> None:
+    """The steps are the calls that change the disk; another program may write before the next window reads."""
+    mark(tables, table, "heel", 1)
+    mark(tables, table, "toe", 2)
+    edit = {"mark": Edit(None, Note("ball", 3)), "move": Edit(Note("toe", 2), Note("toe", 5))}.get(
+        request_, Edit(Note("toe", 2), None)
+    )
+    child = os.fork()
+    if not child:
+        left = iter([*[None] * step, "dies"])
+
+        def dies(function):
+            def wrapped(*args, **how):
+                if next(left, None) == "dies":
+                    os._exit(9)
+                return function(*args, **how)
+
+            return wrapped
+
+        for name in ("_save", "_exchange", "_sync_folder"):
+            setattr(_label_table, name, dies(getattr(_label_table, name)))
+        os.unlink = dies(os.unlink)
+        Path.unlink = dies(Path.unlink)
+        LabelTables().change(table, OWN, [[edit]])
+        os._exit(0)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    assert code in (0, 9)
+    if older:
+        table.write_text("label,t_us\nheel,1\nhand,8\n")
+    read = tables.read(table, OWN)
+    before = {("heel", 1), ("toe", 2)}
+    after = {"mark": before | {("ball", 3)}, "move": {("heel", 1), ("toe", 5)}}.get(request_, {("heel", 1)})
+    found = set(texts(read.rows))
+    if not older:
+        assert found in (before, after)
+        assert code or found == after
+        assert not read.conflict
+    else:
+        known = set(texts(read.conflict.missing)) | {("heel", 1)}
+        assert known & before | known & after == known
+        assert ("toe", 2) in known or request_ != "mark"
+        assert code or known == after
+    read = tables.settle(table, OWN, read.conflict, restore=True)
+    assert not read.conflict
+
+
+def test_what_was_acknowledged_is_damaged(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    (table.parent / ".walk.notes.csv.acknowledged").write_text("[]")
+    with pytest.raises(FormatError, match=r"not what taxel saved of the labels.*delete it to go on"):
+        mark(tables, table, "toe", 2)
+    assert sorted(held(table)) == [("heel", 1)]
+
+
+def test_a_link_to_a_table_stays_one_and_its_permissions_stay(tmp_path: Path, table: Path, tables) -> None:
+    real = tmp_path / "real.csv"
+    real.write_text("label,t_us\nheel,1\n")
+    real.chmod(0o640)
+    table.symlink_to(real)
+    mark(tables, table, "toe", 2)
+    assert table.is_symlink()
+    assert real.stat().st_mode & 0o777 == 0o640
+    assert sorted(held(real)) == [("heel", 1), ("toe", 2)]
+
+
+def test_what_is_no_regular_file_is_refused_at_once(table: Path, tables) -> None:
+    os.mkfifo(table)
+    with pytest.raises(ProblemError, match="is no regular file"):
+        mark(tables, table, "toe", 2)
