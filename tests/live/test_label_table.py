@@ -281,6 +281,40 @@ def test_a_window_killed_at_any_step_leaves_its_change_whole_or_none(
     assert not read.conflict
 
 
+def test_a_label_whose_deletion_was_not_done_is_acknowledged_as_before(table: Path, tables, monkeypatch) -> None:
+    """The window is killed before it exchanges the table; another program writes it, with the label and without."""
+    mark(tables, table, "heel", 1)
+    mark(tables, table, "toe", 2)
+    child = os.fork()
+    if not child:
+        monkeypatch.setattr(_label_table, "_exchange", lambda *_: os._exit(9))
+        tables.change(table, OWN, [[Edit(Note("toe", 2), None)]])
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
+    table.write_text("label,t_us\nheel,1\ntoe,2\nhand,8\n")
+    mark(tables, table, "ball", 3)
+    table.write_text("label,t_us\nheel,1\n")
+    assert texts(tables.read(table, OWN).conflict.missing) == [("ball", 3), ("toe", 2)]
+
+
+def test_a_file_system_that_cannot_exchange_files_is_written_too(table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 1)
+    monkeypatch.setattr(_label_table, "_exchange", lambda *_: False)
+    sync, times = os.fsync, []
+
+    def late(descriptor: int) -> None:
+        if len(times) < 2 and not times.append(0):
+            new = table.with_name("editor")
+            new.write_text(table.read_text() + f"hand,{len(times)}\n")
+            os.replace(new, table)
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", late)
+    read = mark(tables, table, "toe", 2)
+    assert texts(read.rows) == [("hand", 1), ("hand", 2), ("heel", 1), ("toe", 2)] == sorted(held(table))
+    hidden = [file.name for file in table.parent.iterdir() if file.name.startswith(f".{table.name}.")]
+    assert hidden == [f".{table.name}.acknowledged"]
+
+
 def test_what_was_acknowledged_is_damaged(table: Path, tables) -> None:
     mark(tables, table, "heel", 1)
     (table.parent / ".walk.notes.csv.acknowledged").write_text("[]")
