@@ -145,7 +145,10 @@ class Frames(Columns):
         """Return consecutive pictures."""
         if not isinstance(chosen, slice):
             raise ProblemError(f"frames[{shown(chosen)}]: choose pictures by a slice")
-        return Frames(self.values[chosen], self.t[chosen], unit=self.unit, array=self.array)
+        try:
+            return Frames(self.values[chosen], self.t[chosen], unit=self.unit, array=self.array)
+        except (TypeError, ValueError) as error:
+            raise ProblemError(f"frames[{shown(chosen)}]: {error}") from None
 
     def between(self, start: float, stop: float) -> Frames:
         """Return the pictures of ``start <= t < stop`` (us).

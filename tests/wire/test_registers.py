@@ -118,7 +118,7 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
         (lambda: Registers(speed=1), 'register "speed": there are random_lines, '),
         (lambda: Registers(line_period=3.001), "line_period is 3.001 us: must be a whole multiple of 0.01 us"),
         (lambda: Registers(line_period="slow"), "line_period is 'slow': must be a number"),
-        (lambda: Registers(line_period=float("nan")), "line_period is nan: must be a number"),
+        (lambda: Registers(line_period=float("nan")), "line_period is nan: must be finite"),
         (lambda: Registers(ramp=1.5), "ramp is 1.5: must be a whole number"),
         (lambda: Registers(ramp=-1), "ramp is -1: must be a whole number from 1 to 65534"),
         (lambda: Registers(nrows=0.5), "nrows is 0.5: must be a whole number from 0 to 255"),

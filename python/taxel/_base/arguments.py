@@ -394,8 +394,12 @@ def nth(what: str, chosen: SupportsIndex, length: int) -> int:
     Raises
     ------
     IndexError : the number is out of range
+    ProblemError : no whole number, as a span of time
     """
-    n = operator.index(chosen)
+    try:
+        n = operator.index(chosen)
+    except TypeError:
+        raise ProblemError(f"{what} {shown(chosen)}: must be a whole number") from None
     if not -length <= n < length:
         raise IndexError(f"{what} {n} of {length}")
     return n % length

@@ -102,8 +102,13 @@ class Trial:
             t = self.recorded.t
             object.__setattr__(self, "scored", (int(t.min()), int(t.max())) if len(t) else (0, 0))
         else:
-            first, last = arguments.window("us", *arguments.several("scored", self.scored))
-            object.__setattr__(self, "scored", (arguments.whole("scored", first), arguments.whole("scored", last)))
+            ends = arguments.several("scored", self.scored)
+            if len(ends) != 2:
+                raise ProblemError(f"scored is {arguments.shown(self.scored)}: must be two times, us")
+            first, last = (arguments.whole("scored", end, unit="us") for end in ends)
+            if first > last:
+                raise ProblemError(f"scored is {first} to {last} us: must not end before it begins")
+            object.__setattr__(self, "scored", (first, last))
 
     @property
     def frames(self) -> Frames:

@@ -6,12 +6,14 @@ it is loaded only if a stream is named, and then with a warning.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
 from taxel._base.arguments import text
+from taxel._base.limits import VALUE
 from taxel._base.messages import installing, warn
 from taxel._core import Error, ProblemError
 
@@ -81,7 +83,9 @@ class LslInlet:
                 if values is None:
                     continue
                 try:
-                    receive([stamp, *map(float, values)], time.time_ns())
+                    # Infinity, and what does not fit 32 bits, is a missing value, and counted as one.
+                    held = [value if abs(value) <= VALUE else math.nan for value in map(float, values)]
+                    receive([stamp, *held], time.time_ns())
                 except (Error, OSError):
                     # The recording has ended; its own end reports why.
                     return

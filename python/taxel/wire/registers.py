@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, number, several, shown, text, whole
+from taxel._base.arguments import finite, flag, instance, several, shown, text, whole
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.wire.command import Command
@@ -328,11 +328,11 @@ def described(registers: Registers) -> list[tuple[str, float, str, str, str]]:
 def _raw(name: str, value: object) -> int:
     """Return a field's value in the register's own unit."""
     if name in _TIMES:
-        units = number(name, value) * 100
-        if not abs(units - np.rint(units)) < 1e-6:
-            raise ProblemError(f"{name} is {shown(value)} us: must be a whole multiple of 0.01 us")
+        units = finite(name, value) * 100
         if not 0 <= units < 2**32:
             raise DeviceError(f"{name} {shown(value)} us does not fit its bits (rule 4)")
+        if not abs(units - np.rint(units)) < 1e-6:
+            raise ProblemError(f"{name} is {shown(value)} us: must be a whole multiple of 0.01 us")
         return int(np.rint(units))
     if _MANUAL.get(name, name) in _FLAGS:
         return int(flag(name, bool(value) if isinstance(value, int) and value in (0, 1) else value))
