@@ -21,6 +21,11 @@ from taxel import Array, Frames
 
 from .marked import ENDS, TAXEL, WITHIN_S, Marked
 
+#: All ends, of which one signal stands for those that are handled alike, where each takes long.
+EACH = [
+    pytest.param(end, marks=() if end in ("kill", "SIGINT", "closed terminal") else pytest.mark.slow) for end in ENDS
+]
+
 
 def files(folder: Path) -> dict[str, int]:
     """Return the files of a folder and when they were written, without what the test itself keeps there."""
@@ -70,7 +75,9 @@ def test_a_recording_is_closed_however_the_command_is_stopped(tmp_path: Path, en
 
 
 @pytest.mark.parametrize("end", ["kill", "SIGTERM", "SIGHUP", "closed terminal"])
-@pytest.mark.parametrize("command", ["view", "live", "emulate", "demo"])
+@pytest.mark.parametrize(
+    "command", ["view", "live", *(pytest.param(name, marks=pytest.mark.slow) for name in ("emulate", "demo"))]
+)
 def test_a_command_ends_with_its_children_however_it_is_stopped(tmp_path: Path, command: str, end: str) -> None:
     file = tmp_path / "mat.h5"
     taxel.convert(Frames(np.ones((50, 4, 4)), np.arange(50) * 10_000, unit="kPa", array=Array(4, 4)), file)
@@ -89,7 +96,7 @@ def test_a_command_ends_with_its_children_however_it_is_stopped(tmp_path: Path, 
         check_end(one, end, code)
 
 
-@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("end", EACH)
 def test_workers_of_a_study_end_with_it(tmp_path: Path, end: str) -> None:
     words = ["study", "fig6.9", "--jobs", 2, "--report", "report"]
     with Marked(tmp_path / "here", TAXEL, *words, on_terminal=end == "closed terminal") as one:
@@ -113,7 +120,7 @@ def pressed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("end", EACH)
 def test_a_training_ends_with_the_server_that_began_it(pressed: Path, tmp_path: Path, end: str) -> None:
     client = pytest.importorskip("websockets.sync.client")
     from panel.protocol import Client

@@ -79,12 +79,12 @@ def asked_to_end() -> Iterator[threading.Event]:
 def leave(code: int | str | None) -> NoReturn:
     """End the process with an exit code.
 
-    Where a thread that Python does not wait for runs Python code yet, the interpreter must not end as usual: it would
-    end the thread inside compiled code that called Python, which aborts the process. A request of the panel's page may
-    be such a thread.
+    Where a thread that Python did not begin runs Python code yet, the interpreter must not end as usual: it would end
+    the thread inside compiled code that called Python, which aborts the process. A request of the panel's page may be
+    such a thread.
     """
-    awaited = {thread.ident for thread in threading.enumerate() if not thread.daemon}
-    if not isinstance(code, int) or set(sys._current_frames()) <= awaited:
+    known = {one.ident for one in threading.enumerate() if not isinstance(one, threading._DummyThread)}
+    if not isinstance(code, int) or set(sys._current_frames()) <= known:
         sys.exit(code)
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
