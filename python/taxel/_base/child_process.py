@@ -1,0 +1,166 @@
+"""Starts every child process of taxel without code of the current folder, and ends it when its parent has ended.
+
+The parent holds one end of a pipe, which the system closes however the parent ends. The child is this file, run by its
+path: before it runs its program, it starts a thread that waits for the end of the pipe. The thread removes the files
+that are unfinished and sends SIGTERM to its own process, which ends it; a program that has to clean up handles SIGTERM,
+as the command line does. A process that still runs after `GRACE_S` is killed. So a program needs no code for this. It
+may be a file that does not import taxel, such as ``h5_child.py``, because this one imports the standard library alone::
+
+    child = ChildProcess(Path("h5_child.py"), [path, memory], pass_fds=[memory], stdin=PIPE, stdout=PIPE)
+
+A child has a session of its own: Ctrl-C in the terminal reaches the parent alone, which then ends its children.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import runpy
+import signal
+import subprocess
+import sys
+import threading
+import time
+import weakref
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+__all__ = ["GRACE_S", "ChildProcess", "safe_environment", "search_path"]
+
+#: How long a child may take to end by itself after its parent has ended, s.
+GRACE_S = 3.0
+#: How long its parent waits for that, s.
+_END_WITHIN_S = GRACE_S + 1.0
+
+
+class ChildProcess(subprocess.Popen[Any]):
+    """A Python process that ends within `GRACE_S` when this one ends or calls `end`.
+
+    Parameters
+    ----------
+    program : str or Path
+        The name of a module, which is run as by ``python -m``, or the path of a file.
+    arguments : iterable of str, path or number
+    unfinished : sequence of path
+        Files that the child writes and that are removed if its parent ends before it.
+    env : mapping, optional
+        Variables beside those of this process.
+    pass_fds : sequence of int
+    options : of `subprocess.Popen`
+    """
+
+    def __init__(
+        self,
+        program: str | Path,
+        arguments: Iterable[object] = (),
+        *,
+        unfinished: Iterable[str | os.PathLike[str]] = (),
+        env: Mapping[str, str] | None = None,
+        pass_fds: Sequence[int] = (),
+        **options: Any,
+    ) -> None:
+        watched, held = os.pipe()
+        self._held = [held]
+        order = {
+            "watched": watched,
+            "unfinished": [os.path.abspath(path) for path in unfinished],
+            "is_file": isinstance(program, Path),
+        }
+        try:
+            super().__init__(
+                [sys.executable, "-P", __file__, json.dumps(order), str(program), *map(str, arguments)],
+                env=safe_environment({**os.environ, **(env or {})}),
+                pass_fds=[*pass_fds, watched],
+                start_new_session=True,
+                **options,
+            )
+        except BaseException:
+            self._let_go()
+            raise
+        finally:
+            os.close(watched)
+        _running.add(self)
+
+    def _let_go(self) -> None:
+        """Close this end of the pipe; several threads may do so at a time."""
+        with contextlib.suppress(IndexError):
+            os.close(self._held.pop())
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for the end of the child and return its exit code, as `subprocess.Popen` does."""
+        code = super().wait(timeout)
+        self._let_go()
+        return code
+
+    def end(self) -> int:
+        """End the child as if this process had ended, wait for it, and return its exit code."""
+        self._let_go()
+        try:
+            return self.wait(_END_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            return self.wait()
+
+
+_running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
+
+
+def _let_go_of_all() -> None:
+    """Close the pipes in a fork of this process, which would keep the children running after their parent."""
+    for child in list(_running):
+        child._let_go()
+
+
+os.register_at_fork(after_in_child=_let_go_of_all)
+
+
+def safe_environment(variables: Mapping[str, str]) -> dict[str, str]:
+    """Return environment variables with which Python adds neither the current folder nor a script's to its path.
+
+    An empty entry of PYTHONPATH, which Python takes for the current folder, is left out.
+    """
+    safe = {**variables, "PYTHONSAFEPATH": "1"}
+    named = [entry for entry in safe.pop("PYTHONPATH", "").split(os.pathsep) if entry]
+    return safe | ({"PYTHONPATH": os.pathsep.join(named)} if named else {})
+
+
+def search_path() -> list[str]:
+    """Return this process' `sys.path` for a child: without "", the current folder of an interactive Python."""
+    return [entry for entry in sys.path if entry]
+
+
+def _watch(watched: int, unfinished: Sequence[str]) -> None:
+    """Wait for the end of the parent, then end this process."""
+    # Nothing is ever written: to read returns when the parent's end is closed.
+    os.read(watched, 1)
+    _remove(unfinished)
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(GRACE_S)
+    _remove(unfinished)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _remove(files: Sequence[str]) -> None:
+    for file in files:
+        with contextlib.suppress(OSError):
+            os.unlink(file)
+
+
+def _main() -> None:
+    """Run a program in the child."""
+    order = json.loads(sys.argv[1])
+    os.set_inheritable(order["watched"], False)
+    threading.Thread(
+        target=_watch, args=(order["watched"], order["unfinished"]), name="taxel-parent", daemon=True
+    ).start()
+    sys.argv = sys.argv[2:]
+    if order["is_file"]:
+        runpy.run_path(sys.argv[0], run_name="__main__")
+    else:
+        runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+
+
+if __name__ == "__main__":
+    _main()
