@@ -221,10 +221,19 @@ def test_graded_spikes_are_refused(tmp_path: Path) -> None:
 
 def test_another_file_is_one_error(tmp_path: Path) -> None:
     (tmp_path / "a.nir").write_text("nothing of the kind")
-    with pytest.raises(taxel.FormatError, match=r"a\.nir: no NIR graph"):
+    with pytest.raises(taxel.FormatError, match=r"a\.nir: not a whole HDF5 file"):
         taxel.Readout.from_nir(tmp_path / "a.nir")
     with pytest.raises(FileNotFoundError):
         taxel.Readout.from_nir(tmp_path / "b.nir")
+    nir.write(tmp_path / "c.nir", nir.Linear(np.ones((2, 8))))
+    with refused(r"c\.nir: a Linear; must be a NIRGraph", taxel.FormatError):
+        taxel.Readout.from_nir(tmp_path / "c.nir", encoder=ENCODER)
+    graph = graph_of()
+    for metadata in ({"taxel_readout": np.ones(3)}, {"taxel_spike_s": "soon"}, {"taxel_readout": {"a": "b"}}):
+        graph.metadata = metadata
+        nir.write(tmp_path / "d.nir", graph)
+        with refused(r"d\.nir: taxel_(readout|spike_s)", taxel.Error):
+            taxel.Readout.from_nir(tmp_path / "d.nir", encoder=ENCODER)
 
 
 def test_the_command_writes_the_graph_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,6 +14,7 @@ import pytest
 
 import taxel
 from taxel import _core
+from taxel._base import h5_writing
 
 from .making import HEADER, some_events
 
@@ -69,7 +70,7 @@ def test_a_full_device_is_an_oserror_that_names_it(full_device: Path) -> None:
     assert caught.value.filename == "/dev/full"
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
 def test_an_existing_file_is_never_overwritten_unless_asked(tmp_path: Path, ending: str) -> None:
     path, events = tmp_path / f"a{ending}", some_events(50)
     path.write_bytes(b"precious")
@@ -81,13 +82,13 @@ def test_an_existing_file_is_never_overwritten_unless_asked(tmp_path: Path, endi
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([path.name] + ["a.lss"] * (ending == ".lsa"))
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
 def test_a_missing_folder_is_a_file_not_found(tmp_path: Path, ending: str) -> None:
     with pytest.raises(FileNotFoundError, match="nowhere"):
         taxel.convert(some_events(5), tmp_path / "nowhere" / f"a{ending}")
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
 def test_a_forbidden_folder_is_a_permission_error(tmp_path: Path, ending: str) -> None:
     if os.geteuid() == 0:
         pytest.skip("root may write anywhere")
@@ -99,7 +100,7 @@ def test_a_forbidden_folder_is_a_permission_error(tmp_path: Path, ending: str) -
         tmp_path.chmod(0o700)
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
 def test_a_conversion_that_fails_leaves_no_file(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"a{ending}"
     code = (
@@ -119,3 +120,78 @@ def test_a_conversion_that_fails_leaves_no_file(tmp_path: Path, ending: str) -> 
     assert said.stdout.split() == [str(errno.EFBIG), str(path)]
     # A .lsa is written in place, as while recording; that it is not complete shows in the missing .lss.
     assert [p.name for p in tmp_path.iterdir()] == ([path.name] if ending == ".lsa" else [])
+
+
+#: Writes a file of HDF5 again and again, each time with another limit of its size, and prints how each ended.
+HDF5 = """
+import json, os, resource, sys
+import numpy as np
+import taxel
+
+def convert(path):
+    taxel.convert(taxel.Frames(np.random.default_rng(1).random((200, 16, 16)), np.arange(200) * 1000), path)
+
+def nir(path):
+    taxel.Readout(taxel.encode.LevelCrossing(levels=(50.0,)), {"a": (taxel.Neuron(), [0.1] * 8)}).to_nir(path)
+
+def nwb(path):
+    taxel.SpikeTrains.from_lists([np.arange(5000.0)], stop=5000.0).to_nwb(path)
+
+folder, write = sys.argv[1], globals()[sys.argv[2]]
+for limit in map(int, sys.argv[3:]):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    try:
+        write(f"{folder}/a.h5")
+        ended = None
+    except OSError as error:
+        ended = [error.errno, error.filename]
+    there = os.listdir(folder)
+    for name in there:
+        os.unlink(f"{folder}/{name}")
+    print(json.dumps([limit, ended, there]))
+"""
+
+
+@pytest.mark.parametrize("kind", ["convert", "nir", "nwb"])
+def test_hdf5_that_does_not_fit_is_one_error_and_no_file(tmp_path: Path, kind: str) -> None:
+    pytest.importorskip({"nir": "nir", "nwb": "pynwb"}.get(kind, "h5py"))
+    limits = ["0", "100", "2048", "5000"]
+    done = subprocess.run(
+        [sys.executable, "-c", HDF5, tmp_path, kind, *limits, "10000000"], capture_output=True, text=True, check=False
+    )
+    said = [json.loads(line) for line in done.stdout.splitlines()]
+    assert said == [
+        *([int(limit), [errno.EFBIG, str(tmp_path / "a.h5")], []] for limit in limits),
+        [10_000_000, None, ["a.h5"]],
+    ], done.stderr
+
+
+def test_a_command_that_fills_the_disk_with_hdf5_ends_with_one_line_and_exit_code_3(tmp_path: Path) -> None:
+    taxel.convert(some_events(2000), tmp_path / "a.npz")
+    code = (
+        "import resource, sys\n"
+        "from taxel.cli import main\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (3000, resource.RLIM_INFINITY))\n"
+        "main(sys.argv[1:])\n"
+    )
+    for arguments in (["convert", "a.npz", "b.h5"], ["cut", "a.npz", "b.h5", "--from", "0", "--to", "9"]):
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, done.stderr.count("\n")) == (3, 1), done.stderr
+        assert "b.h5" in done.stderr
+        assert "file too large" in done.stderr
+        assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
+
+
+def test_a_library_that_crashes_while_it_writes_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    child = tmp_path / "child.py"
+    monkeypatch.setattr(h5_writing, "_CHILD", child)
+    for code, said in (
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "status -11"),
+        ('print(\'{"error": "no reason", "kind": "ValueError"}\')', "no reason"),
+    ):
+        child.write_text(code)
+        with pytest.raises(taxel.Error, match=rf"a\.h5: HDF5 cannot be written \(.*{said}"):
+            taxel.convert(some_events(5), tmp_path / "a.h5")
+        assert [p.name for p in tmp_path.iterdir()] == ["child.py"]

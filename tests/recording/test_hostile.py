@@ -258,7 +258,7 @@ def test_times_that_are_no_numbers_are_refused_by_name(tmp_path: Path) -> None:
 # what is write-protected, and what stays empty
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
 def test_a_write_protected_file_is_never_replaced(tmp_path: Path, ending: str) -> None:
     """A rename asks the folder alone, and the superuser may do all: neither counts."""
     path = tmp_path / f"a{ending}"

@@ -15,6 +15,7 @@ A child has a session of its own: Ctrl-C in the terminal reaches the parent alon
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 import runpy
@@ -47,6 +48,9 @@ class ChildProcess(subprocess.Popen[Any]):
     arguments : iterable of str, path or number
     unfinished : sequence of path
         Files that the child writes and that are removed if its parent ends before it.
+    at_once : bool
+        Whether the system kills the child when this process ends, also while a library keeps the interpreter from its
+        threads: for a child that has nothing to clean up.
     env : mapping, optional
         Variables beside those of this process.
     pass_fds : sequence of int
@@ -59,6 +63,7 @@ class ChildProcess(subprocess.Popen[Any]):
         arguments: Iterable[object] = (),
         *,
         unfinished: Iterable[str | os.PathLike[str]] = (),
+        at_once: bool = False,
         env: Mapping[str, str] | None = None,
         pass_fds: Sequence[int] = (),
         **options: Any,
@@ -69,6 +74,7 @@ class ChildProcess(subprocess.Popen[Any]):
             "watched": watched,
             "unfinished": [os.path.abspath(path) for path in unfinished],
             "is_file": isinstance(program, Path),
+            "at_once": at_once,
         }
         variables = {**os.environ, **(env or {})}
         make_safe(variables)
@@ -163,6 +169,10 @@ def _main() -> None:
     """Run a program in the child."""
     order = json.loads(sys.argv[1])
     os.set_inheritable(order["watched"], False)
+    if order["at_once"]:
+        # SIGIO, which ends a process by default, is sent when the other end of the pipe is closed.
+        fcntl.fcntl(order["watched"], fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(order["watched"], fcntl.F_SETFL, os.O_ASYNC)
     threading.Thread(
         target=_watch, args=(order["watched"], order["unfinished"]), name="taxel-parent", daemon=True
     ).start()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import mmap
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import column, numbers
 from taxel._base.limits import unpacked
 
-__all__ = ["Columns", "Growing", "OwnMemory", "frozen", "frozen_whole", "own", "own_column", "own_numbers"]
+__all__ = ["Columns", "Growing", "frozen", "frozen_whole", "own", "own_column", "own_numbers"]
 
 
 class Columns:
@@ -23,10 +22,6 @@ class Columns:
             if isinstance(value, np.ndarray):
                 frozen(value)
         self.__dict__.update(state)
-
-
-class OwnMemory(mmap.mmap):
-    """Memory to which nothing but an array of ours refers."""
 
 
 class Growing:
@@ -136,4 +131,4 @@ def _unchangeable(array: object) -> bool:
         if array.flags.writeable:
             return False
         array = array.base
-    return array is None or isinstance(array, bytes | OwnMemory) or type(array).__name__ == "PySliceContainer"
+    return array is None or isinstance(array, bytes) or type(array).__name__ == "PySliceContainer"

@@ -1,25 +1,26 @@
-"""Reads a .h5 by a child process: with a damaged file the HDF5 library can hang and ignore signals."""
+"""Reads a .h5 by a child process: with a damaged file the HDF5 library can hang, crash and ignore signals."""
 
 from __future__ import annotations
 
 import json
 import math
-import mmap
 import os
 import selectors
 import subprocess
-import sys
-import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
-from taxel._base.columns import OwnMemory
+from taxel._base.arguments import shown
+from taxel._base.child_process import ChildProcess, search_path
+from taxel._base.files import open_file
 from taxel._base.limits import DESCRIPTION, unpacked
+from taxel._base.messages import first_line
 from taxel._core import FormatError
 
 __all__ = ["Entry", "H5File"]
@@ -27,9 +28,11 @@ __all__ = ["Entry", "H5File"]
 _CHILD = Path(__file__).with_name("h5_child.py")
 #: The longest time between two lines of the child, s; and the longest time for its start, which loads libraries.
 PATIENCE_S, BEGIN_S = 10.0, 120.0
+#: Bytes that a text takes in memory beside its characters.
+_TEXT_BYTES = 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Entry:
     """Describe a data set or a group.
 
@@ -58,50 +61,61 @@ class H5File:
 
     Attributes
     ----------
-    attributes : dict from str to int or None
-        Attributes of the root; None for one that is not a whole number.
     entries : dict from str to Entry
-        Data sets and groups by their path, those within groups as "run1/pressure".
+        Data sets and groups by their path, those within groups as "run1/pressure". A group that several paths lead to
+        is listed by one of them.
+    left_out : dict from str to str
+        Soft links that lead nowhere, and why.
 
     Raises
     ------
-    FormatError : not a whole HDF5 file, or one at which the library hangs or crashes
+    FormatError : not a whole HDF5 file; one at which the library hangs or crashes; one of which a link or a data set
+        leads to another file (names it)
     OSError : the file is not there, or cannot be read
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
+        self._claimed = 0
         # Opening the file here raises Python's own errors.
-        with self.path.open("rb"):
-            pass
-        self._memory = os.memfd_create("h5") if hasattr(os, "memfd_create") else _unnamed()
-        self._filled = 0
-        try:
-            self._child = subprocess.Popen(
-                [sys.executable, "-P", str(_CHILD), str(self.path), str(self._memory)],
+        with open_file(self.path) as file:
+            self._child = ChildProcess(
+                _CHILD,
+                [file.fileno()],
+                at_once=True,
+                pass_fds=[file.fileno()],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                pass_fds=[self._memory],
-                # Ctrl-C reaches this process only, which then ends the child.
-                start_new_session=True,
             )
-        except BaseException:
-            os.close(self._memory)
-            raise
-        self._answers, self._rest = selectors.DefaultSelector(), b""
+        self._answers, self._rest = selectors.DefaultSelector(), bytearray()
         assert self._child.stdout is not None  # a pipe
         self._answers.register(self._child.stdout, selectors.EVENT_READ)
+        self.entries: dict[str, Entry] = {}
+        self.left_out: dict[str, str] = {}
         try:
-            self._order(sys.path)
+            self._order(search_path())
             self._answer(BEGIN_S)
-            while "entries" not in (answer := self._answer(PATIENCE_S)):
-                pass
-            self.attributes: dict[str, int | None] = answer["attributes"]
-            self.entries = {name: Entry(dtype, tuple(shape)) for name, (dtype, shape) in answer["entries"].items()}
+            while "listed" not in (answer := self._answer(PATIENCE_S)):
+                if "entry" in answer:
+                    self.entries[answer["entry"]] = Entry(answer["dtype"], tuple(answer["shape"]))
+                elif "left_out" in answer:
+                    why = f"a soft link to {shown(answer['target'])} that leads nowhere ({answer['why']})"
+                    self.left_out[answer["left_out"]] = why
         except BaseException:
             self.close()
             raise
+
+    def attribute(self, name: str) -> int | str | None:
+        """Return an attribute of the root: a whole number, "" for any other value, None where there is none.
+
+        Raises
+        ------
+        FormatError : the attribute is damaged
+        """
+        self._order({"attribute": name})
+        value: int | str | None = self._answer(PATIENCE_S)["done"]
+        return value
 
     def text(self, name: str) -> str:
         """Return a data set that is one text.
@@ -112,13 +126,50 @@ class H5File:
         """
         if self.entries[name] != Entry("text", ()):
             raise FormatError(f"{self._place(name)}: must be a text")
-        self._order({"name": name, "text": True})
-        text = str(self._done())
-        unpacked(self._place(name), len(text), DESCRIPTION)
-        return text
+        return str(self.texts(name)[()])
 
-    def numbers(self, name: str) -> NDArray[Any]:
+    def texts(self, name: str) -> NDArray[np.object_]:
+        """Return a data set of texts.
+
+        Raises
+        ------
+        FormatError : no texts, more of them than a file may hold, or damage
+        """
+        entry = self.entries[name]
+        if entry.dtype != "text":
+            raise FormatError(f"{self._place(name)}: must hold texts")
+        size = _TEXT_BYTES * (math.prod(entry.shape) - 1)
+        unpacked(self._place(name), size, DESCRIPTION)
+        read: list[str] = []
+        self._order({"name": name, "text": True})
+        while "done" not in (answer := self._answer(PATIENCE_S)):
+            size += sum(answer["lengths"])
+            unpacked(self._place(name), size, DESCRIPTION)
+            read += [bytes(self._bytes(length)).decode() for length in answer["lengths"]]
+        texts = np.empty(len(read), object)
+        texts[:] = read
+        return texts.reshape(entry.shape)
+
+    def check_size(self, names: Iterable[str]) -> None:
+        """Refuse data sets of numbers that have more bytes together than a file may hold, before one is read.
+
+        Raises
+        ------
+        FormatError : more bytes than a file may hold
+        """
+        entries = (self.entries[name] for name in names)
+        sizes = (math.prod(one.shape) * np.dtype(one.dtype).itemsize for one in entries if one.is_numbers)
+        unpacked(str(self.path), sum(sizes))
+
+    def numbers(self, name: str, dtype: DTypeLike | None = None) -> NDArray[Any]:
         """Return a data set of numbers.
+
+        Parameters
+        ----------
+        name : str
+        dtype : dtype, optional
+            What the values are converted to, piece by piece as they are read. What it cannot hold becomes infinite or
+            wraps around.
 
         Raises
         ------
@@ -129,20 +180,21 @@ class H5File:
         if not entry.is_numbers:
             what = f"holds {entry.dtype}; must hold numbers" if entry.dtype else "a group; must be a column"
             raise FormatError(f"{self._place(name)}: {what}")
-        dtype = np.dtype(entry.dtype)
-        size = math.prod(entry.shape) * dtype.itemsize
+        stored, kept = np.dtype(entry.dtype), np.dtype(dtype or entry.dtype)
+        size = math.prod(entry.shape) * kept.itemsize
         unpacked(self._place(name), size)
-        at = self._filled
+        self._claimed += size
+        unpacked(str(self.path), self._claimed)
         try:
-            os.ftruncate(self._memory, at + max(1, size))
-            shared = OwnMemory(self._memory, max(1, size), offset=at)
-        except OSError as error:
-            raise MemoryError(str(error)) from None
-        # The next data set begins at the next place that can be mapped, so this one is the array's, without a copy.
-        self._filled += -(-size // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
-        self._order({"name": name, "text": False, "at": at, "size": size})
-        self._done()
-        return np.frombuffer(shared, dtype, math.prod(entry.shape)).reshape(entry.shape)
+            array = np.empty(entry.shape, kept)
+        except ValueError as error:
+            raise FormatError(f"{self._place(name)}: shape {entry.shape}: {first_line(error)}") from None
+        self._order({"name": name, "text": False})
+        while "done" not in (answer := self._answer(PATIENCE_S)):
+            place = tuple(slice(*edges) for edges in answer["block"])
+            with np.errstate(over="ignore", invalid="ignore"):
+                array[place] = self._bytes(answer["size"]).view(stored).reshape(array[place].shape)
+        return array
 
     def _place(self, name: str) -> str:
         return f"{self.path}, data set {name}"
@@ -156,33 +208,43 @@ class H5File:
             # The last answer of the child has the reason.
             return
 
-    def _done(self) -> Any:
-        """Wait for the end of a request and return its answer."""
-        while "done" not in (answer := self._answer(PATIENCE_S)):
-            pass
-        return answer["done"]
-
     def _answer(self, patience_s: float) -> dict[str, Any]:
         """Return the next line that the child writes."""
-        assert self._child.stdout is not None  # a pipe
-        while b"\n" not in self._rest:
-            if not self._answers.select(patience_s):
-                raise FormatError(
-                    f"{self.path}: not a whole HDF5 file (the library has read nothing for {patience_s:g} s)"
-                )
-            more = os.read(self._child.stdout.fileno(), 1 << 16)
-            if not more:
-                raise FormatError(
-                    f"{self.path}: not a whole HDF5 file (reading it ended the library, status {self._child.wait()})"
-                )
-            self._rest += more
-        line, _, self._rest = self._rest.partition(b"\n")
+        while (end := self._rest.find(b"\n")) < 0:
+            self._rest += self._more(1 << 16, patience_s)
+        line = bytes(self._rest[:end])
+        del self._rest[: end + 1]
         answer: dict[str, Any] = json.loads(line)
-        if answer.get("kind") == "MemoryError":
-            raise MemoryError(answer["error"])
+        if "refused" in answer:
+            place = f"{self.path}, {shown(answer['entry'])}" if answer["entry"] else str(self.path)
+            raise FormatError(f"{place}: {answer['refused']}")
         if "error" in answer:
             raise FormatError(f"{self.path}: not a whole HDF5 file ({answer['error']})")
         return answer
+
+    def _bytes(self, size: int) -> NDArray[np.uint8]:
+        """Return the bytes that follow a line."""
+        data = np.empty(size, np.uint8)
+        ready = min(size, len(self._rest))
+        data[:ready] = np.frombuffer(self._rest, np.uint8, ready)
+        del self._rest[:ready]
+        while ready < size:
+            more = self._more(size - ready, PATIENCE_S)
+            data[ready : ready + len(more)] = np.frombuffer(more, np.uint8)
+            ready += len(more)
+        return data
+
+    def _more(self, most: int, patience_s: float) -> bytes:
+        """Return what the child has written since, as soon as there is something."""
+        assert self._child.stdout is not None  # a pipe
+        if not self._answers.select(patience_s):
+            raise FormatError(f"{self.path}: not a whole HDF5 file (the library has read nothing for {patience_s:g} s)")
+        more = os.read(self._child.stdout.fileno(), most)
+        if not more:
+            raise FormatError(
+                f"{self.path}: not a whole HDF5 file (reading it ended the library, status {self._child.wait()})"
+            )
+        return more
 
     def close(self) -> None:
         """End the child."""
@@ -195,7 +257,6 @@ class H5File:
                     continue
         self._child.wait()
         self._answers.close()
-        os.close(self._memory)
 
     def __enter__(self) -> Self:
         return self
@@ -204,9 +265,3 @@ class H5File:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _unnamed() -> int:
-    """Return the descriptor of an unnamed temporary file, for systems without anonymous memory files."""
-    with tempfile.TemporaryFile() as file:
-        return os.dup(file.fileno())

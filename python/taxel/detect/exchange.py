@@ -14,16 +14,18 @@ What NIR cannot express stands in the graph's metadata, so that taxel reads back
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, number, shown
 from taxel._base.arguments import path as checked_path
-from taxel._base.files import whole_file
+from taxel._base.h5_file import H5File
+from taxel._base.h5_writing import write_h5
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.detect.trained import TrainedNeuron
@@ -75,12 +77,16 @@ R = TypeVar("R")
 
 def write_nir(readout: Parts, path: str | os.PathLike[str], *, spike_ms: float | None, overwrite: bool) -> list[str]:
     """Write the graph of a readout to a file; return what NIR cannot hold."""
+    graph = _graph(readout, _spike(spike_ms))
+    write_h5(path, _write, lambda pipe: pickle.dump(graph, pipe), overwrite=overwrite)
+    return lost(readout)
+
+
+def _write(file: BinaryIO, source: BinaryIO) -> None:
+    """Write the graph that `write_nir` sends."""
     import nir  # noqa: PLC0415  an extra
 
-    graph = _graph(readout, _spike(spike_ms))
-    with whole_file(path, overwrite=overwrite) as part:
-        nir.write(part, graph)
-    return lost(readout)
+    nir.write(file, pickle.load(source))
 
 
 def _check_ungraded(encoder: Encoder) -> None:
@@ -137,26 +143,55 @@ def read_nir(
     FormatError : no NIR graph, or one that no readout can stand for (names file and node)
     ProblemError : no encoder is known
     """
-    import nir  # noqa: PLC0415  an extra
-
     place, spike_ms = checked_path("path", path), _spike(spike_ms)
     encoder = None if encoder is None else instance("encoder", encoder, Encoder)
     neuron = None if neuron is None else instance("neuron", neuron, Neuron)
-    open(place, "rb").close()  # a missing file is Python's own error
-    try:
-        graph = nir.read(place)
-    except Exception as error:  # h5py and nir raise errors of many kinds for a foreign or broken file
-        raise FormatError(f"{place}: no NIR graph that can be read: {shown(str(error))}") from None
+    graph = _read_graph(place)
     held = graph.metadata.get(READOUT)
     try:
-        own = None if held is None else parts_of(held if isinstance(held, str) else bytes(held).decode())
+        if held is not None and not isinstance(held, str):
+            raise FormatError(f"{READOUT} in the metadata: must be a text")
+        own = None if held is None else parts_of(held)
         if spike_ms is None and SPIKE in graph.metadata:
-            spike_ms = _spike(1000.0 * float(graph.metadata[SPIKE]) or None)
+            spike_ms = _spike(1000.0 * number(SPIKE, graph.metadata[SPIKE]) or None)
         if own is not None and encoder is None and neuron is None and _same(graph, _graph(own, spike_ms)):
             return build(own)
         return build(_parts(graph, own, encoder, neuron, spike_ms))
     except (FormatError, ProblemError) as error:
         raise type(error)(f"{place}: {error}") from None
+
+
+def _read_graph(place: str | os.PathLike[str]) -> NIRGraph:
+    """Read the graph of a file, as `nir.read` does, by the process that reads every HDF5 file."""
+    import nir  # noqa: PLC0415  an extra
+
+    try:
+        graph = nir.dict2NIRNode(_tree(place)["node"])
+        if not isinstance(graph, nir.NIRGraph) or not isinstance(graph.metadata, dict):
+            raise FormatError(f"{place}: a {type(graph).__name__}; must be a NIRGraph with its metadata")
+    except (FormatError, MemoryError, OSError):
+        raise
+    except Exception as error:  # nir raises errors of many kinds for a graph that is none
+        raise FormatError(f"{place}: no NIR graph that can be read: {shown(str(error))}") from None
+    return graph
+
+
+def _tree(place: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the groups and data sets of the graph in a file, group within group."""
+    root: dict[str, Any] = {}
+    with H5File(place) as h5:
+        paths = [path for path in h5.entries if path.split("/", maxsplit=1)[0] == "node"]
+        h5.check_size(paths)
+        for path in paths:
+            entry, (*groups, name) = h5.entries[path], path.split("/")
+            inner = root
+            for group in groups:
+                inner = inner[group]
+            if not entry.dtype:
+                inner[name] = {}
+            else:
+                inner[name] = (h5.texts(path) if entry.dtype == "text" else h5.numbers(path))[()]
+    return root
 
 
 def _spike(spike_ms: object) -> float | None:

@@ -320,7 +320,8 @@ class Readout(_Detector):
 
         Raises
         ------
-        FormatError : no NIR file, or a graph that no readout can stand for (names file and node)
+        FormatError : no NIR file; a graph that no readout can stand for (names file and node); a link or a data set
+            that leads to another file (names it)
         FileNotFoundError : no such file
         ProblemError : no encoder is known
         ImportError : nir is not installed (``pip install 'taxel[nir]'``)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from taxel._base import arguments
 from taxel._base.columns import frozen
 from taxel._base.h5_file import H5File
-from taxel._base.limits import unpacked
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
@@ -84,8 +83,7 @@ def _image(h5: H5File, name: str, file: Path) -> NDArray[np.int32]:
     entry = h5.entries[name]
     if not entry.is_numbers or np.dtype(entry.dtype).kind not in "ui" or len(entry.shape) != 3 or 0 in entry.shape:
         raise FormatError(f"{file.name}, {name}: must be whole numbers, rows x columns x frames")
-    unpacked(f"{file.name}, {name}", 4 * math.prod(entry.shape))
-    image: NDArray[np.int32] = h5.numbers(name).astype(np.int32)
+    image: NDArray[np.int32] = h5.numbers(name, np.int32)
     if image.min() < 0 or not image.any():
         raise FormatError(f"{file.name}, {name}: {'counts below 0' if image.min() < 0 else 'never loaded'}")
     return image

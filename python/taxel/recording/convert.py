@@ -105,8 +105,7 @@ def convert(
         case ".csv":
             write_whole(place, lambda file: write_csv(file, written), overwrite=overwrite)
         case ".h5":
-            with whole_file(place, overwrite=overwrite) as part:
-                write_h5(part, written)
+            write_h5(place, written, overwrite=overwrite)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
                 sources = {written.label: (whole, written)}

@@ -10,11 +10,17 @@ beginning. ``about`` is JSON: the sensor, the source, registers, notes, detectio
 
 from __future__ import annotations
 
-from mmap import ACCESS_READ, mmap
+import json
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
+from taxel._base import h5_writing
+from taxel._base.arguments import shown
+from taxel._base.files import open_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
@@ -35,29 +41,73 @@ def is_ours(path: Path) -> bool:
     """Return whether a .h5 has the layout that `taxel convert` writes; false for a file that is not HDF5."""
     try:
         # The name of an attribute is in the file as it is: without it the library, which begins slowly, is not asked.
-        with path.open("rb") as file:
-            if not path.stat().st_size or mmap(file.fileno(), 0, access=ACCESS_READ).find(_MARK.encode()) < 0:
+        with open_file(path) as file:
+            if not _holds(file, _MARK.encode()):
                 return False
         with H5File(path) as h5:
-            return _MARK in h5.attributes
+            return h5.attribute(_MARK) is not None
     except (FormatError, OSError):
         return False
 
 
-def write_h5(part: Path, contents: Contents) -> None:
-    """Write a .h5."""
+def _holds(file: BinaryIO, word: bytes) -> bool:
+    """Return whether a word is in a file."""
+    before = b""
+    while piece := file.read(_PIECE_BYTES):
+        if word in before + piece:
+            return True
+        before = piece[1 - len(word) :]
+    return False
+
+
+def write_h5(path: Path, contents: Contents, *, overwrite: bool) -> None:
+    """Write a .h5, column after column in pieces.
+
+    Raises
+    ------
+    As `taxel._base.h5_writing.write_h5`.
+    """
+    columns = columns_of(contents)
+
+    def send(pipe: BinaryIO) -> None:
+        for name, column in columns.items():
+            if name in TEXTS:
+                said = str(column).encode()
+                pipe.write(json.dumps([name, "text", [len(said)]]).encode() + b"\n" + said)
+                continue
+            pipe.write(json.dumps([name, column.dtype.str, column.shape]).encode() + b"\n")
+            for piece in _pieces(column.shape, column.itemsize):
+                pipe.write(column[piece].tobytes())
+
+    h5_writing.write_h5(path, _write, send, overwrite=overwrite)
+
+
+def _write(file: BinaryIO, source: BinaryIO) -> None:
+    """Write the columns that `write_h5` sends."""
     import h5py  # noqa: PLC0415  loads slowly
 
-    with h5py.File(part, "w") as h5:
+    with h5py.File(file, "w") as h5:
         h5.attrs[_MARK] = _VERSION
-        for name, column in columns_of(contents).items():
-            if name in TEXTS:
-                h5.create_dataset(name, data=str(column))
+        for line in iter(source.readline, b""):
+            name, dtype, shape = json.loads(line)
+            if dtype == "text":
+                h5.create_dataset(name, data=source.read(*shape).decode())
                 continue
-            row = max(1, column[:1].nbytes)
-            chunks = (max(1, min(len(column), _PIECE_BYTES // row)), *column.shape[1:]) if column.size else None
+            itemsize = np.dtype(dtype).itemsize
+            pieces = list(_pieces(shape, itemsize))
+            chunks = (pieces[0].stop, *shape[1:]) if 0 not in shape else None
             packed = {"chunks": chunks, "compression": "gzip", "compression_opts": 4, "shuffle": True} if chunks else {}
-            h5.create_dataset(name, data=column, **packed)
+            column = h5.create_dataset(name, shape, dtype, **packed)
+            for piece in pieces:
+                rows = (piece.stop - piece.start, *shape[1:])
+                column[piece] = np.frombuffer(source.read(itemsize * math.prod(rows)), dtype).reshape(rows)
+
+
+def _pieces(shape: Sequence[int], itemsize: int) -> Iterator[slice]:
+    """Yield the parts of a column that are compressed one by one."""
+    step = max(1, _PIECE_BYTES // max(1, itemsize * math.prod(shape[1:])))
+    for start in range(0, shape[0], step):
+        yield slice(start, min(start + step, shape[0]))
 
 
 def read_h5(path: Path, array: Array | None) -> Contents:
@@ -68,12 +118,14 @@ def read_h5(path: Path, array: Array | None) -> Contents:
     FormatError : not an HDF5 file, or one of another layout
     """
     with H5File(path) as h5:
-        if _MARK not in h5.attributes:
+        version = h5.attribute(_MARK)
+        if version is None:
             raise FormatError(
                 f"{path}: HDF5, but without the attribute taxel of what taxel convert writes; other people's files are "
                 "read by taxel.open and taxel.formats.trials"
             )
-        if h5.attributes[_MARK] != _VERSION:
-            raise FormatError(f"{path}: layout {h5.attributes['taxel']}; this version reads {_VERSION}")
+        if version != _VERSION:
+            raise FormatError(f"{path}: layout {shown(version)}; this version reads {_VERSION}")
+        h5.check_size(h5.entries)
         columns = {name: np.array(h5.text(name)) if name in TEXTS else h5.numbers(name) for name in h5.entries}
     return contents_of(path, "h5", columns, array)

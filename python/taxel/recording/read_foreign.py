@@ -379,10 +379,12 @@ def _data(path: Path, how: Data) -> _Read:
         wanted = [there[0], *named] if how.array is None else named
         missing = next((name for name in wanted if name not in there), None)
         if missing is not None:
+            if (why := _left_out_of(path).get(missing)) is not None:
+                raise FormatError(f"{path}, {missing}: {why}")
             size = as_size(missing)
             hint = f"; a size is said by {size}" if size else ""
             raise FormatError(f"{path}: holds no array {missing}; there are {listed(every)}{hint}")
-        arrays = arrays_of(path, wanted)
+        arrays = arrays_of(path, wanted, pictures=wanted[0])
     values, unread = arrays[wanted[0]], ", ".join(name for name in there if name not in wanted)
     lost = (f"other arrays of the file: {unread}",) if unread else ()
     if values.dtype.kind not in "uifb" or values.ndim not in (2, 3) or 0 in values.shape:
@@ -428,9 +430,17 @@ def shapes_of(path: Path) -> dict[str, tuple[int, ...]]:
         return {name: entry.shape for name, entry in h5.entries.items() if entry.is_numbers}
 
 
-def arrays_of(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """Read the arrays of these names of a .npz or .h5."""
+def _left_out_of(path: Path) -> dict[str, str]:
+    """Return the names in a .h5 that lead to no array, and why."""
+    if path.suffix.lower() in (".npy", ".npz"):
+        return {}
+    with H5File(path) as h5:
+        return h5.left_out
+
+
+def arrays_of(path: Path, names: Sequence[str], pictures: str | None = None) -> dict[str, NDArray[Any]]:
+    """Read the arrays of these names of a .npz or .h5; of a .h5 that of the pictures as float32, without a copy."""
     if path.suffix.lower() == ".npz":
         return read_arrays(path, names)
     with H5File(path) as h5:
-        return {name: h5.numbers(name) for name in names}
+        return {name: h5.numbers(name, np.float32 if name == pictures else None) for name in names}

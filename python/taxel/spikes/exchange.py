@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+import pickle
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, BinaryIO, Literal
 from uuid import uuid4
-from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import number, shown, text
 from taxel._base.arguments import path as checked_path
-from taxel._base.files import whole_file
+from taxel._base.h5_file import H5File
+from taxel._base.h5_writing import write_h5
 from taxel._core import FormatError, ProblemError
 
 __all__ = ["read_nwb", "write_nwb"]
 
 Kind = Literal["unsigned", "signed", "graded"]
 
-#: Times (ms) train by train, start, stop, values train by train, and their kind.
-Read = tuple[list[NDArray[np.float64]], float, float, list[NDArray[np.float32]] | None, Kind]
+#: Times (ms) of all trains, their offsets, start, stop, values and their kind: the arguments of `SpikeTrains`.
+Read = tuple[NDArray[np.float64], NDArray[np.int64], float, float, NDArray[Any] | None, Kind]
 
 
 def write_nwb(
@@ -39,8 +38,6 @@ def write_nwb(
     overwrite: bool,
 ) -> Path:
     """Write spike trains to an NWB file, one unit a train; see `SpikeTrains.to_nwb`."""
-    from pynwb import NWBHDF5IO, NWBFile  # noqa: PLC0415  heavy, and an extra
-
     if begun is None:
         begun = datetime.now()
     if not isinstance(begun, datetime):
@@ -51,71 +48,86 @@ def write_nwb(
         raise ProblemError(f"begun is {begun}: must be a date that this machine's clock knows") from None
     if "\0" in text("description", description):
         raise ProblemError(f"description is {shown(description)}: NWB takes no zero in a text")
-    file = NWBFile(description, str(uuid4()), begun)
+    told = (description, str(uuid4()), begun, times, values, kind, np.array([window_ms]) / 1000.0)
+    write_h5(path, _write, lambda pipe: pickle.dump(told, pipe), overwrite=overwrite)
+    return Path(path)
+
+
+def _write(file: BinaryIO, source: BinaryIO) -> None:
+    """Write the units that `write_nwb` sends."""
+    import h5py  # noqa: PLC0415  loads slowly
+    from pynwb import NWBHDF5IO, NWBFile  # noqa: PLC0415  heavy, and an extra
+
+    description, identifier, begun, times, values, kind, window_s = pickle.load(source)
+    session = NWBFile(description, identifier, begun)
     if values is not None:
         meaning = "factor of the weight" if kind == "graded" else "polarity or bits"
-        file.add_unit_column("value", f"{kind} value of each spike: {meaning}", index=True)
+        session.add_unit_column("value", f"{kind} value of each spike: {meaning}", index=True)
     valued: dict[str, object] = {}
     if kind == "graded":
-        file.add_unit_column("value_kind", "what the values of the spikes mean")
+        session.add_unit_column("value_kind", "what the values of the spikes mean")
         valued["value_kind"] = kind
-    window_s = np.array([window_ms]) / 1000.0
     for n, train in enumerate(times):
         if values is not None:
             valued["value"] = values[n]
-        file.add_unit(id=n, spike_times=train / 1000.0, obs_intervals=window_s, **valued)
-    with whole_file(path, overwrite=overwrite) as part, _quiet_about_names(), NWBHDF5IO(part, "w") as io:
-        io.write(file)
-    return Path(path)
+        session.add_unit(id=n, spike_times=train / 1000.0, obs_intervals=window_s, **valued)
+    with h5py.File(file, "w") as h5, NWBHDF5IO(file=h5, mode="w") as io:
+        io.write(session)
 
 
 def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | None) -> Read:
     """Read the units of an NWB file; see `SpikeTrains.from_nwb`."""
-    from pynwb import NWBHDF5IO  # noqa: PLC0415  heavy, and an extra
-
     place = checked_path("path", path)
     window_ms = [
         None if edge is None else number(name, edge, "ms") for name, edge in (("start", start), ("stop", stop))
     ]
-    open(place, "rb").close()  # a missing file is Python's own error
-    try:
-        with _quiet_about_names(), NWBHDF5IO(place, "r") as io:
-            units = io.read().units
-            columns = () if units is None else units.colnames
-            if "spike_times" not in columns:
-                raise FormatError(f"{place}: an NWB file without spike times in a table of units")
-            times = [1000.0 * np.asarray(units["spike_times"][n], np.float64) for n in range(len(units))]
-            values: list[NDArray[np.float32]] | None = None
-            kind: Kind = "unsigned"
-            if "value" in columns:
-                kind = _kind_of(units, columns)
-                values = [np.asarray(units["value"][n], np.float32) for n in range(len(units))]
-            watched = np.empty((0, 2))
-            if "obs_intervals" in columns and len(units):
-                watched = 1000.0 * np.concatenate([np.reshape(i, (-1, 2)) for i in units["obs_intervals"][:]])
-    except FormatError:
-        raise
-    except Exception as error:  # h5py and pynwb raise errors of many kinds for a foreign or broken file
-        raise FormatError(f"{place}: no NWB file that can be read: {shown(str(error))}") from None
-    every = np.concatenate([*times, [0.0]])
-    widest = (watched[:, 0].min(), watched[:, 1].max()) if len(watched) else (every.min(), every.max())
+    with H5File(place) as h5:
+        if h5.attribute("nwb_version") is None:
+            raise FormatError(f"{place}: no NWB file: it has no attribute nwb_version")
+        if "units/spike_times" not in h5.entries:
+            raise FormatError(f"{place}: an NWB file without spike times in a table of units")
+        seconds, offsets = _lists(h5, "spike_times")
+        values: NDArray[Any] | None = None
+        kind: Kind = "unsigned"
+        if "units/value" in h5.entries:
+            kind = _kind_of(h5)
+            values, others = _lists(h5, "value")
+            if not np.array_equal(offsets, others):
+                raise FormatError(f"{place}, units/value: must have the lengths of the trains, one value a spike")
+        watched = np.empty((0, 2))
+        if "units/obs_intervals" in h5.entries and len(offsets) > 1:
+            watched = 1000.0 * h5.numbers("units/obs_intervals").astype(np.float64)
+            if watched.ndim != 2 or watched.shape[1] != 2:
+                raise FormatError(f"{place}, units/obs_intervals: shape {watched.shape}; must be (intervals, 2)")
+    times = 1000.0 * seconds.astype(np.float64, copy=False)
+    if len(watched):
+        widest = (watched[:, 0].min(), watched[:, 1].max())
+    else:
+        widest = (times.min(initial=0.0), times.max(initial=0.0))
     first, last = (
         float(outermost) if chosen is None else chosen for chosen, outermost in zip(window_ms, widest, strict=True)
     )
-    return times, first, last, values, kind
+    return times, offsets, first, last, values, kind
 
 
-def _kind_of(units: Any, columns: Iterable[str]) -> Kind:
+def _lists(h5: H5File, name: str) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    """Return a column of the table of units, of which each row is a list: all values, and the offsets of the lists."""
+    column, index = f"units/{name}", f"units/{name}_index"
+    if index not in h5.entries:
+        raise FormatError(f"{h5.path}, {column}: has no list for each unit: there is no {index}")
+    values, ends = h5.numbers(column), h5.numbers(index)
+    if values.ndim != 1 or ends.ndim != 1 or ends.dtype.kind not in "ui":
+        raise FormatError(f"{h5.path}, {column}: {values.dtype} of shape {values.shape}; must be a list for each unit")
+    offsets = np.concatenate([[0], ends.astype(np.int64)])
+    if np.any(offsets[1:] < offsets[:-1]) or offsets[-1] > len(values):
+        raise FormatError(f"{h5.path}, {index}: must ascend from 0 to {len(values)}, the number of values")
+    return values[: offsets[-1]], offsets
+
+
+def _kind_of(h5: H5File) -> Kind:
     """Return the kind of the values in a table of units: signed, unless all units are graded."""
-    graded = {str(kind) == "graded" for kind in units["value_kind"][:]} if "value_kind" in columns else {False}
+    kinds = h5.texts("units/value_kind") if "units/value_kind" in h5.entries else np.array([""])
+    graded = {kind == "graded" for kind in kinds.flat}
     if graded == {True, False}:
-        raise FormatError("units of different value_kind: must be one for all")
+        raise FormatError(f"{h5.path}: units of different value_kind: must be one for all")
     return "graded" if graded == {True} else "signed"
-
-
-@contextmanager
-def _quiet_about_names() -> Iterator[None]:
-    """Suppress pynwb's warnings about the name of the temporary file and about columns that NWB does not define."""
-    with catch_warnings():
-        filterwarnings("ignore", category=UserWarning, module="pynwb|hdmf")
-        yield

@@ -496,13 +496,13 @@ class SpikeTrains(Columns):
 
         Raises
         ------
-        FormatError : no NWB file, one without units, or units without spike times (names the file)
+        FormatError : no NWB file; one without units, or units without spike times; one of which a link or a data set
+            leads to another file (names the file)
         FileNotFoundError : no such file
-        ImportError : pynwb is not installed (``pip install 'taxel[nwb]'``)
         """
-        times, first, last, values, kind = read_nwb(path, start, stop)
+        times, offsets, first, last, values, kind = read_nwb(path, start, stop)
         try:
-            return cls.from_lists(times, first, last, values, kind=kind)
+            return cls(times, offsets, first, last, values, kind=kind)
         except ProblemError as error:
             # With the caller's own window the window may be wrong, otherwise the file is.
             fault = FormatError if start is None and stop is None else ProblemError
