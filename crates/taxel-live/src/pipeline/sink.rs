@@ -1,5 +1,7 @@
 //! Detections with the time of their output, and where they go.
 
+use std::fmt::Write as _;
+
 use taxel_core::detect::Detection;
 
 /// A detection, and the time of its output.
@@ -14,14 +16,15 @@ pub struct OutputDetection {
 }
 
 impl OutputDetection {
-    /// A line of JSON with the keys of `taxel detect --json` and the time of the output, including the line end.
+    /// A line of JSON with the keys of `taxel detect --json` and the time of the output, including the line end. It is
+    /// ASCII, as those lines are: a terminal would obey control characters of a label.
     ///
     /// # Errors
     ///
     /// If the detection cannot be written as JSON.
     pub fn line(&self) -> std::io::Result<Vec<u8>> {
         let Self { detection, output_ns, output_us } = self;
-        let mut line = serde_json::to_vec(&serde_json::json!({
+        let text = serde_json::to_string(&serde_json::json!({
             "label": detection.label,
             "t_us": detection.t,
             "known_us": detection.known,
@@ -30,8 +33,15 @@ impl OutputDetection {
             "said_us": output_us,
             "said_ns": output_ns,
         }))?;
-        line.push(b'\n');
-        Ok(line)
+        let mut line = String::with_capacity(text.len() + 1);
+        for unit in text.encode_utf16() {
+            match u8::try_from(unit) {
+                Ok(plain @ b' '..=b'~') => line.push(char::from(plain)),
+                _ => write!(line, "\\u{unit:04x}").map_err(std::io::Error::other)?,
+            }
+        }
+        line.push('\n');
+        Ok(line.into_bytes())
     }
 }
 
@@ -59,5 +69,20 @@ impl<W: std::io::Write + Send> Sink for Lines<W> {
     fn output(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
         self.0.write_all(&detection.line()?)?;
         self.0.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_ascii_and_keeps_the_label() {
+        let label = "ä\u{1b}[2J\n\u{7f}\u{9b}31m\u{202e}\u{2028}\"\\\u{1f590}";
+        let detection = Detection { label: label.into(), t: 5, known: 7, slope: 1.5, repaired: false };
+        let line = OutputDetection { detection, output_ns: 9, output_us: 8 }.line().unwrap();
+        assert!(line[..line.len() - 1].iter().all(|byte| (b' '..=b'~').contains(byte)) && line.ends_with(b"\n"));
+        let read: serde_json::Value = serde_json::from_slice(&line).unwrap();
+        assert_eq!((read["label"].as_str(), read["t_us"].as_i64()), (Some(label), Some(5)));
     }
 }
