@@ -108,8 +108,6 @@ class Readout(_Detector):
         instance("encoder", encoder, Encoder)
         if not isinstance(neurons, Mapping) or not neurons:
             raise ProblemError(f"neurons is {shown(neurons)}: must be trained neurons by label, one or more")
-        if not isinstance(delay_ms, Mapping):
-            delay_ms = number("delay_ms", delay_ms, "ms")
         named = {} if inputs is None else mapping("inputs", inputs)
         for label in named:
             if label not in neurons:
@@ -117,6 +115,9 @@ class Readout(_Detector):
         trained = {
             text("label", label): _trained(label, one, delay_ms, named.get(label)) for label, one in neurons.items()
         }
+        if not isinstance(delay_ms, Mapping):
+            # Also where each neuron comes with its own.
+            number("delay_ms", delay_ms, "ms")
         first = next(iter(trained.values())).neuron
         made = _core.make_readout(
             parameters(
