@@ -27,7 +27,7 @@ STEPS = {
     "imported": lambda *_: None,
     "opened": lambda path, _: taxel.open(path),
     "listed": lambda path, _: listed(path),
-    "decoded": lambda path, _: _core.RecordingReader(path, 1 << 32).decode("direct"),
+    "decoded": lambda path, _: _core.RecordingReader(path, 1 << 32, False).decode("direct"),
     "read": lambda path, _: taxel.open(path).events,
     "sliced": lambda path, _: sliced(path),
     "cut": lambda path, _: taxel.cut(taxel.open(path), columns=slice(0, 32)),

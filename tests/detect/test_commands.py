@@ -281,7 +281,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
     [
         (("detect", "none.npz", "--readout", "touch.json"), "none.npz: no such file"),
         (("detect", "9.npz", "--readout", "none.json"), "none.json: no such file"),
-        (("detect", "9.npz", "--readout", "labels.csv"), "labels.csv: readout: not JSON"),
+        (("detect", "9.npz", "--readout", "labels.csv"), "labels.csv: not JSON"),
         (
             ("detect", "9.npz", "--readout", "touch.json"),
             "touch.json: the readout needs the taxels' rest: give --tare SECONDS at rest, or --tare FILE",

@@ -293,7 +293,7 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
     path = tmp_path / "a.json"
     good = json.loads(readout.to_json())
     cases = [
-        (b"\x80\xff", "not text, so no readout"),
+        (b"\x80\xff", "not text in UTF-8"),
         (b"", "not JSON"),
         (b"{}", "does not say"),
         (json.dumps({**good, "version": 2}).encode(), "version 2, this taxel reads version 1 only"),

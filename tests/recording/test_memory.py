@@ -22,6 +22,7 @@ import taxel
 from taxel import FormatError, ProblemError, formats
 from taxel._base import limits
 from taxel._base.columns import Growing
+from taxel.cli import main
 
 from . import large
 from .hostile import KINDS as SMALL
@@ -250,3 +251,24 @@ def test_columns_that_grow_stop_at_the_limit() -> None:
     read.add(t=[1])
     with pytest.raises(ProblemError, match="limit is 0"):
         taxel.open("a.npz", limit=0)
+
+
+@pytest.mark.parametrize("name", ["walk.npz", "walk.mcap", "walk.lsa", "walk.csv"])
+@pytest.mark.parametrize("command", ["info", "convert", "cut", "merge", "encode", "emulate"])
+def test_a_command_names_its_option_in_one_line(
+    command: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taxel.convert(some_events(), tmp_path / name)
+    out = str(tmp_path / "b.npz")
+    more = {
+        "convert": [out],
+        "cut": [out, "--to", "1"],
+        "merge": [str(tmp_path / name), "-o", out],
+        "encode": [out, "--encoder", "change_events"],
+    }
+    path = ["--replay", str(tmp_path / name)] if command == "emulate" else [str(tmp_path / name)]
+    with pytest.raises(SystemExit) as ended:
+        main([command, *path, *more.get(command, []), "--limit", "100"])
+    assert ended.value.code == 2
+    (said,) = capsys.readouterr().err.strip().splitlines()
+    assert re.search(rf"{name}.* \d+ bytes.*at most 100 are read.*--limit BYTES", said)

@@ -153,7 +153,7 @@ def test_a_command_says_it_in_one_line(command: str, tmp_path: Path, capsys: pyt
     more = {
         "convert": [str(tmp_path / "b.npz")],
         "cut": [str(tmp_path / "b.npz"), "--to", "1"],
-        "encode": ["--encoder", "change_events"],
+        "encode": [str(tmp_path / "b.npz"), "--encoder", "change_events"],
         "merge": [str(path), "-o", str(tmp_path / "b.npz")],
         "detect": ["--readout", str(path)],
         "train": ["--labels", str(path), "-o", str(tmp_path / "b.json")],

@@ -61,8 +61,8 @@ struct RecordingReader {
 #[pymethods]
 impl RecordingReader {
     #[new]
-    fn open(py: Python<'_>, path: PathBuf, memory: u64) -> PyResult<Self> {
-        Ok(Self { reader: enter(py, |_| Reader::open_within(&path, memory))? })
+    fn open(py: Python<'_>, path: PathBuf, memory: u64, allowed: bool) -> PyResult<Self> {
+        Ok(Self { reader: enter(py, |_| Reader::open_within(&path, memory, allowed))? })
     }
 
     /// The same reader, which returns at most so many bytes.

@@ -149,7 +149,9 @@ def _read_otherwise(part: Path, of: Contents) -> list[str]:
         return []
     events = of.events
     assert events is not None  # it has events
-    again = Events._from_parts(_core.RecordingReader(part, limits.memory(None)).decode("direct")[0], events.array)
+    again = Events._from_parts(
+        _core.RecordingReader(part, limits.memory(None), False).decode("direct")[0], events.array
+    )
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
         return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]
     return ["the order of times that step back by more than 0.1 s"] * (not np.array_equal(again.t, events.t))

@@ -434,7 +434,7 @@ def check_recording(file: Path, layout: str | os.PathLike[str] | None = None) ->
         refuse_without_layout(file)
     kind = _kind(file, layout)
     if kind == "mcap":
-        _core.RecordingReader(file, limits.memory(None))
+        _core.RecordingReader(file, limits.memory(None), False)
     elif kind == "csv":
         check_head(file)
 

@@ -39,7 +39,7 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     OSError : the file cannot be read
     """
     limit = limits.given()
-    reader = _core.RecordingReader(path, limits.memory(limit))
+    reader = _core.RecordingReader(path, limits.memory(limit), limit is not None)
     sources: dict[str, Contents] = {}
     for name in reader.sources():
         one = _Source(path, reader.of_source(name), sources, limit)

@@ -40,6 +40,8 @@ pub struct Reader {
     rebuilt: Rebuilt,
     /// How many bytes of a source may be in memory at once.
     memory: u64,
+    /// Whether a user said so.
+    allowed: bool,
 }
 
 /// State between blocks: the file's channels, and the last arrival number.
@@ -159,15 +161,16 @@ impl Reader {
     ///
     /// `File` if it cannot be read; `Core` (format) if it is not an MCAP file, or not one of ours.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_within(path, limits::MEMORY)
+        Self::open_within(path, limits::MEMORY, false)
     }
 
-    /// As [`Reader::open`], where a function that returns all of a source may return at most `memory` bytes.
+    /// As [`Reader::open`], where a function that returns all of a source may return at most `memory` bytes; if a user
+    /// `allowed` as much, the datagrams may unpack to that too.
     ///
     /// # Errors
     ///
     /// As [`Reader::open`].
-    pub fn open_within(path: &Path, memory: u64) -> Result<Self> {
+    pub fn open_within(path: &Path, memory: u64, allowed: bool) -> Result<Self> {
         let file = open_regular(path)?;
         let length = file.metadata().map_err(Error::file(path))?.len();
         let mut walk = Walk::of(path, &file, length, memory);
@@ -184,7 +187,7 @@ impl Reader {
         };
         header.check().map_err(|error| Error::format(path, &format!("header: {error}")))?;
         let (blocks, header, ends) = (Arc::new(blocks), Arc::new(header), Arc::new(ends));
-        Ok(Self { blocks, header, source: 0, ending, ends, rebuilt, memory })
+        Ok(Self { blocks, header, source: 0, ending, ends, rebuilt, memory, allowed })
     }
 
     /// The names of the sources; the reader starts with the first.
@@ -365,7 +368,8 @@ impl Reader {
         mut take: impl FnMut(Message<'_>) -> Result<()>,
     ) -> Result<Unread> {
         let skipped = self.blocks.skipped.binary_search_by_key(&(block + 1), |(before, _)| *before);
-        let (block, most) = (self.blocks.places[block], limits::datagrams(self.blocks.length).max(self.memory));
+        let allowed = if self.allowed { self.memory } else { 0 };
+        let (block, most) = (self.blocks.places[block], limits::datagrams(self.blocks.length).max(allowed));
         let Place { topics, last, in_datagrams, bytes } = place;
         let (mut wrong, mut read) = (None, Indexed::new());
         let sound = self.blocks.records(block, bytes, |record| {
