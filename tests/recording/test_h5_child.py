@@ -77,6 +77,28 @@ def test_a_child_whose_parent_is_gone_ends_by_itself(tmp_path: Path, entries: st
     assert child.returncode == code
 
 
+def test_a_library_that_keeps_the_interpreter_ends_with_a_killed_parent(tmp_path: Path) -> None:
+    """No thread of the child runs meanwhile, so the system must end it."""
+    taxel.convert(some_events(20), tmp_path / "a.h5")
+    child, written = tmp_path / "child.py", tmp_path / "child.pid"
+    # A function of PyDLL keeps Python's lock.
+    child.write_text(BLOCKED.replace("while True:\n    time.sleep(60)", "__import__('ctypes').PyDLL(None).sleep(60)"))
+    opening = "import sys, pathlib, taxel; from taxel._base import h5_file; "
+    opening += "h5_file._CHILD = pathlib.Path(sys.argv[2]); taxel.open(sys.argv[1])"
+    process = subprocess.Popen([sys.executable, "-c", opening, tmp_path / "a.h5", child])
+    end = time.monotonic() + 120
+    while not (written.exists() and written.read_text()):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    time.sleep(0.3)  # the child's lines until it sleeps
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 5
+    while not gone(int(written.read_text())):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
 def test_ctrl_c_ends_a_library_that_hangs(tmp_path: Path) -> None:
     path, child = tmp_path / "a.h5", tmp_path / "child.py"
     taxel.convert(some_events(20), path)
