@@ -42,9 +42,9 @@ class Checked:
         The largest distance of the potential from the threshold at a target.
     room_mv : float, mV
         A distance that the potential is proven to keep below the threshold wherever silence is required: at least 0.8
-        of the least one. Within the last millisecond before a target, where it falls to 0, it is divided by the ms
-        left. On a grid it is the least one at the grid points. Where it is not above 0, it is the distance found, or
-        none is proven.
+        of the least one, unless the check reaches its limits. Within the last millisecond before a target, where it
+        falls to 0, it is divided by the ms left. On a grid it is the least one at the grid points. Where it is not
+        above 0, it is the distance found, or none is proven.
     slope : float, mV/ms
         The least slope at which the potential crosses the threshold at a target; infinite without targets or on a grid.
     wrong : str or None
