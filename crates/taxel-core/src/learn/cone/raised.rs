@@ -62,16 +62,16 @@ mod tests {
     use crate::learn::statement::Bound;
     use crate::{Spike, SpikeKind, SpikeTrains};
 
-    const TARGET: f64 = 50.0;
+    const TARGET: f64 = 50.5;
 
-    /// Solved problems of graded patterns with four inputs `behind` ms after the target, and their weights.
+    /// Solved problems of graded patterns with two inputs `behind` ms after the target, and their weights.
     fn solved(behind: f64, lambdas: [f64; 3]) -> Vec<(Exact, Vec<f64>)> {
         let mut found = vec![];
         for seed in 0..20 {
             let mut random = StdRng::seed_from_u64(seed);
             let mut input = |t: f64, train| Spike { t, train, value: random.random_range(-2.0..2.0) };
             let mut inputs: Vec<Spike> = (0..60).map(|n| input(f64::from(n), n % 30)).collect();
-            inputs.extend((0..4).map(|n| input(TARGET + behind, 7 * n)));
+            inputs.extend((0..2).map(|n| input(TARGET + behind, 7 * n)));
             let pattern = SpikeTrains::from_spikes(&inputs, 30, SpikeKind::Graded, 0.0, 70.0).unwrap();
             let cone = ConeX { lambdas, lb: Bound::All(-2.0), ub: Bound::All(2.0), ..ConeX::default() };
             let problem = ConeXProblem::new(&cone, &[pattern], &[vec![TARGET]], Stop::never()).unwrap();
