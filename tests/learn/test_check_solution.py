@@ -7,12 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from exact import excess, reaches
 from making import made
 from stated import examples, graded
 from test_solved_is_true import KINDS
 
 from taxel import Neuron, NotFittedError, ProblemError, SpikeTrains
-from taxel.learn import ConeR, ConeX, check_solution
+from taxel.learn import ConeR, ConeX, check_solution, solution
+from taxel.learn._statement import PatternRows
+from taxel.learn.cone_x import Margin
 
 
 def fitted(weights, neuron):
@@ -119,6 +122,94 @@ def test_what_is_wrong_is_named():
     assert "does not fire at target 0" in check_solution(weak, patterns, targets).wrong
     out.weights_ = cone.weights_ + np.eye(60)[7] * 9
     assert check_solution(out, patterns, targets).wrong.startswith("weight 7: ")
+
+
+def little_room(seed):
+    """A solved problem whose margin falls so slowly to a target that floats cannot tell it from 0 there; else None."""
+    random = np.random.default_rng([62, seed])
+    neuron = Neuron(
+        tau=float(random.choice([0.5, 2.0, 15.0])),
+        kernel=str(random.choice(["alpha", "double_exponential"])),
+        tau_s=random.choice([None, 0.3, 1e-3]),
+        theta_plus=float(random.choice([0.0, 0.2])),
+        after_spike=str(random.choice(["keep", "ignore", "reset"])),
+        first_threshold=str(random.choice(["theta_0", "printed"])),
+    )
+    own = np.cumsum(random.uniform(12, 40, random.integers(1, 3))) + 10
+    stop = float(own[-1]) + float(random.choice([20.0, 3.6e6]))
+    times = [random.choice(own) - random.exponential(3 * neuron.tau, random.integers(1, 4)) for _ in range(20)]
+    for n in random.choice(20, 3, replace=False):
+        times[n] = np.append(times[n], random.choice(own) - random.uniform(0, neuron.tau) + 1e-10 * np.arange(9))
+    patterns = [SpikeTrains.from_lists([np.sort(t[t >= 0]) for t in times], stop=stop)]
+    if seed % 2:
+        patterns = graded(patterns, seed)
+    least = float(10 ** random.uniform(-9, -6))
+    cone = ConeX(neuron=neuron, lb=-50, ub=50, margin=least, slope=least)
+    cone.fit(patterns, [own.tolist()])
+    return (cone, patterns, own.tolist()) if cone.status_ == "solved" else None
+
+
+def test_a_right_fit_is_not_refused_where_its_margin_is_below_rounding(monkeypatch):
+    problems = [found for seed in range(40) if (found := little_room(seed)) is not None]
+    assert len(problems) > 20
+    for cone, patterns, own in problems:
+        found = check_solution(cone, patterns, [own])
+        assert found, found
+        assert found.room_mv > 0
+    # Without the digits these are unproven, and none is wrong.
+    monkeypatch.setattr(solution, "_EXPONENTIALS", 0)
+    said = [check_solution(cone, patterns, [own]) for cone, patterns, own in problems]
+    assert all(found.wrong is None for found in said)
+    unproven = [found for found in said if not found]
+    assert len(unproven) > 3
+    for found in unproven:
+        assert found.unproven.startswith("pattern 0: whether ")
+        assert " ms" in found.unproven
+        assert found.unproven.endswith(" is not proven")
+        assert found.room_mv <= 0 or "fires" in found.unproven
+
+
+def test_the_intervals_looked_at_are_limited(monkeypatch):
+    cone, patterns, own = next(found for seed in range(40) if (found := little_room(seed)) is not None)
+    monkeypatch.setattr(solution, "_INTERVALS", 3)
+    found = check_solution(cone, patterns, [own])
+    assert not found
+    assert found.wrong is None
+    assert "is not proven" in found.unproven
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-14, 1e-11, 1e-8, 1e-5])
+def test_a_potential_lifted_to_the_threshold_somewhere_is_wrong_and_one_below_it_is_not(off):
+    """Weights are changed: the potential at one silent instant is the threshold to rounding, or `off` beside it."""
+    reached = below = 0
+    for seed in range(24):
+        if (problem := little_room(seed)) is None:
+            continue
+        cone, patterns, own = problem
+        random = np.random.default_rng([63, seed])
+        rows = PatternRows(cone.neuron_, patterns[0], np.array(own), margin=Margin(0.0, 0.0))
+        t = float(random.choice([random.uniform(0, own[-1]), random.choice(own) - 10 ** random.uniform(-5, 0)]))
+        fired = [target for target in own if target < t]
+        if not rows.is_silent(np.array([t]))[0]:
+            continue
+        row, _ = rows.row(t, np.array(fired))
+        if row @ row < 1e-6:
+            continue
+        gap = float(rows.threshold(np.array([t]))[0] - row @ cone.weights_)
+        lifted = copy.copy(cone).set_params(lb=-1e9, ub=1e9)
+        lifted.weights_ = cone.weights_ + row / (row @ row) * (gap + off * float(random.choice([-1, 1])))
+        found = check_solution(lifted, patterns, [own])
+        weights, pattern = lifted.weights_, patterns[0]
+        misses = any(not reaches(cone.neuron_, weights, pattern, own, k) for k in range(len(own)))
+        assert found.unproven is None
+        if excess(cone.neuron_, weights, pattern, t, fired) >= 0:
+            assert found.wrong is not None
+            reached += 1
+        elif found:
+            assert not misses
+            below += 1
+    assert reached > 3 or off == 0
+    assert reached + below > 3
 
 
 def test_on_a_grid_a_margin_decides_and_a_target_is_a_point():

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._core import ProblemError
 from taxel.learn._checked import checked_examples, fitted
-from taxel.learn._statement import BLOCK, PatternRows, pattern_rows
+from taxel.learn._exact import ExactPotential
+from taxel.learn._statement import AT_EDGE, BLOCK, PatternRows, pattern_rows
 from taxel.learn.cone_r import ConeR
 from taxel.learn.cone_x import ConeX, Margin
 from taxel.spikes import SpikeTrains
@@ -21,27 +23,34 @@ __all__ = ["Checked", "check_solution"]
 _TOUCH = 1e-12 / 0.3
 #: The share of the least room found that is proven.
 _PROVEN = 0.8
+#: If the rounding of a potential is not below this share of its distance from the threshold, it is computed exactly.
+_VAGUE = 0.02
+#: The most exponentials that are computed exactly in a check (a few seconds), intervals of a block, halvings of one.
+_EXPONENTIALS, _INTERVALS, _HALVINGS = 100_000, 1_000_000, 200
 _Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Checked:
-    """Tell whether a fitted neuron fires at its targets and nowhere else, and by how much; true if it does.
+    """Tell whether a fitted neuron fires at its targets and nowhere else, and by how much; true if that is proven.
 
     Parameters
     ----------
     holds : bool
-        Whether it does, with every weight within its bounds.
+        Whether it provably does, with every weight within its bounds: nothing is `wrong` and nothing `unproven`.
     missed_mv : float, mV
         The largest distance of the potential from the threshold at a target.
     room_mv : float, mV
         A distance that the potential is proven to keep below the threshold wherever silence is required: at least 0.8
-        of the least one. Within the last millisecond before a target, where it falls to 0, it is divided by the ms
-        left. On a grid it is the least one at the grid points. Where it is not above 0, it is the distance found.
+        of the least one, unless the check reaches its limits. Within the last millisecond before a target, where it
+        falls to 0, it is divided by the ms left. On a grid it is the least one at the grid points. Where it is not
+        above 0, it is the distance found, or none is proven.
     slope : float, mV/ms
         The least slope at which the potential crosses the threshold at a target; infinite without targets or on a grid.
     wrong : str or None
-        The first pattern and time at which something is wrong.
+        The first pattern and time at which something is proven to be wrong.
+    unproven : str or None
+        The first pattern and time at which neither can be proven, in the time that the check allows itself.
     """
 
     holds: bool
@@ -49,6 +58,7 @@ class Checked:
     room_mv: float
     slope: float
     wrong: str | None
+    unproven: str | None
 
     def __bool__(self) -> bool:
         return self.holds
@@ -63,7 +73,9 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
 
     In continuous time silence is proven at every instant, not at samples: between two inputs the potential is one curve
     of the kernel's family, whose second derivative is bounded. An interval whose ends and curvature leave no room is
-    halved. A target counts as met if the first crossing is at most 1e-6 ms before it, as `ConeX` has it.
+    halved, and a potential that floats cannot tell from the threshold is computed to 50 digits. Halvings and digits are
+    limited, to a few seconds in all; what is then still open is `unproven`. A target counts as met if the first
+    crossing is at most 1e-6 ms before it, as `ConeX` has it.
 
     Parameters
     ----------
@@ -86,8 +98,8 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
 
     Notes
     -----
-    Thesis 6.3.2, equations 6.7 to 6.9. Compiled code takes no part. Windows of silence (`ConeR.fit`) are not read:
-    silence is checked everywhere. Cost: inputs times the inputs of the last 50 `tau`.
+    Thesis 6.3.2, equations 6.7 to 6.9. Compiled code of taxel takes no part. Windows of silence (`ConeR.fit`) are not
+    read: silence is checked everywhere. Cost: inputs times the inputs of the last 50 `tau`.
 
     Examples
     --------
@@ -109,40 +121,100 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
     lb, ub = (np.broadcast_to(np.asarray(bound, np.float64), len(w)) for bound in (cone.lb, cone.ub))
     out = np.flatnonzero((w < lb) | (w > ub))[:1]
     wrong = [f"weight {n}: {w[n]} mV is outside of its bounds, {lb[n]} to {ub[n]} mV" for n in out]
-    touch = _TOUCH * cone.neuron_.theta_0
+    unproven: list[str] = []
+    touch, exponentials = _TOUCH * cone.neuron_.theta_0, _EXPONENTIALS
     for p, rows in enumerate(all_rows):
-        least, at, close = _on_grid(rows, w) if rows.on_grid else _room(rows, w)
-        if least <= close + (touch if rows.on_grid else 0.0):
-            wrong.append(f"pattern {p}: the potential reaches the threshold at {at:.6f} ms, where silence is required")
-        room = min(room, least)
+        exact = ExactPotential(rows, w, exponentials)
+        least = _on_grid(rows, w, exact, touch) if rows.on_grid else _room(rows, w, exact)
+        room = min(room, least.room)
+        if least.silent is False:
+            wrong.append(
+                f"pattern {p}: the potential reaches the threshold at {least.at:.6f} ms, where silence is required"
+            )
+        elif least.silent is None:
+            unproven.append(
+                f"pattern {p}: whether the potential stays below the threshold at {least.at:.6f} ms is not proven"
+            )
         for k, t in enumerate(rows.targets):
-            coefficients, sizes = rows.target(k)
-            off = float(coefficients @ w - rows.threshold(rows.targets[k : k + 1])[0])
+            off, fires = _at_target(rows, w, exact, k, touch)
             missed = max(missed, abs(off))
-            rounding = (np.abs(w) @ sizes + cone.neuron_.theta_0) * np.finfo(float).eps * (len(rows.times) + len(w))
-            if off < -touch - rounding:
+            if fires is False:
                 wrong.append(f"pattern {p}: does not fire at target {k} ({t:g} ms), {-off:.1e} mV below the threshold")
+            elif fires is None:
+                unproven.append(f"pattern {p}: whether it fires at target {k} ({t:g} ms) is not proven")
             if rows.on_grid and not rows.is_point(float(t)):
                 wrong.append(f"pattern {p}: target {k} ({t:g} ms) lies between grid points, where no neuron fires")
             if not rows.on_grid:
                 slope = min(slope, float(-rows.slope(k)[0] @ w + rows.fall(k)))
-    return Checked(not wrong, missed, float(room), slope, wrong[0] if wrong else None)
+        exponentials = exact.left
+    said = (wrong[0] if wrong else None, unproven[0] if unproven else None)
+    return Checked(not wrong and not unproven, missed, float(room), slope, *said)
 
 
-def _on_grid(rows: PatternRows, w: _Floats) -> tuple[float, float, float]:
-    """Return the least distance below the threshold over the silent grid points, its time, and its rounding."""
-    least = (np.inf, rows.start, 0.0)
+class _Least(NamedTuple):
+    """The least distance below the threshold, its time, and whether silence holds; None: that is not proven."""
+
+    room: float
+    at: float
+    silent: bool | None
+
+
+def _decided(excess: float, rounding: float) -> bool | None:
+    """Return whether an excess is 0 or more; None where its rounding leaves that open."""
+    return None if abs(excess) < rounding else bool(excess >= 0)
+
+
+def _vague(excess: _Floats, rounding: _Floats) -> NDArray[np.bool_]:
+    """Return where rounding is a considerable part of an excess, or either is no number."""
+    return ~(rounding < _VAGUE * np.abs(excess))
+
+
+def _at_target(rows: PatternRows, w: _Floats, exact: ExactPotential, k: int, touch: float) -> tuple[float, bool | None]:
+    """Return the potential less the threshold at a target, and whether the neuron fires there; None: not proven."""
+    coefficients, sizes = rows.target(k)
+    off = float(coefficients @ w - rows.threshold(rows.targets[k : k + 1])[0])
+    rounding = (np.abs(w) @ sizes + rows.neuron.theta_0) * np.finfo(float).eps * (len(rows.times) + len(w))
+    if rows.on_grid or abs(off + touch) > rounding:
+        # On a grid the neuron allows for the rounding of a point's time.
+        return off, bool(off >= -touch - rounding)
+    # What floats cannot tell from the threshold may reach it up to 1e-6 ms later, as the potential rises.
+    t, last = float(rows.targets[k]), float(rows.last(rows.targets[k : k + 1])[0])
+    times = np.unique(rows.times[(rows.times > t) & (rows.times < t + AT_EDGE)])
+    for begin in (t, *times.tolist(), t + AT_EDGE):
+        found = exact.excess(begin, 0.0, last, here=begin > t)
+        if found is None or (fires := _decided(found[0] + touch, found[1])) is None:
+            return off, None
+        off = found[0] if begin == t else off
+        if fires:
+            return off, True
+    return off, False
+
+
+def _on_grid(rows: PatternRows, w: _Floats, exact: ExactPotential, touch: float) -> _Least:
+    """Return the least distance below the threshold over the silent grid points, at which no potential may touch it."""
+    least = _Least(np.inf, rows.start, True)
     for t, potential, size in rows.potentials(rows.values * w[rows.trains]):
         room = rows.threshold(t) - potential
+        rounding = np.finfo(float).eps * (len(rows.times) + rows.roundings) * (size + np.abs(room))
+        for j in np.flatnonzero(np.abs(room - touch) <= rounding):
+            found = exact.excess(float(t[j]), 0.0, float(rows.last(t[j : j + 1])[0]), here=False)
+            if found is not None:
+                room[j], rounding[j] = -found[0], found[1]
         k = int(room.argmin())
-        if room[k] < least[0]:
-            rounding = np.finfo(float).eps * (len(rows.times) + rows.roundings) * (size[k] + room[k])
-            least = (float(room[k]), float(t[k]), float(rounding))
+        reached = np.flatnonzero(room - touch <= -rounding)[:1]
+        open_ones = np.flatnonzero(room - touch <= rounding)[:1]
+        if len(reached):
+            return _Least(float(room[k]), float(t[reached[0]]), False)
+        room_here = min(least.room, float(room[k]))
+        if len(open_ones) and least.silent:
+            least = _Least(room_here, float(t[open_ones[0]]), None)
+        elif room[k] < least.room:
+            least = _Least(room_here, float(t[k]) if least.silent else least.at, least.silent)
     return least
 
 
-def _room(rows: PatternRows, w: _Floats) -> tuple[float, float, float]:
-    """Return the least distance below the threshold that is proven, or one found that is not above 0; its time, and 0.
+def _room(rows: PatternRows, w: _Floats, exact: ExactPotential) -> _Least:
+    """Return the least distance below the threshold that is proven, or one found that is not above 0, and its time.
 
     Within 1 ms before a target the distance is divided by the ms left.
     """
@@ -158,23 +230,23 @@ def _room(rows: PatternRows, w: _Floats) -> tuple[float, float, float]:
     if rows.neuron.first_threshold == "printed":
         asked &= ~((end == rises) & ~np.isfinite(rows.last(end)))
     begin, end = begin[asked], end[asked]
-    proven, place, found = np.inf, rows.start, np.inf
+    least, found = _Least(np.inf, rows.start, True), np.inf
     for first in range(0, len(begin), BLOCK):
         here = slice(first, first + BLOCK)
-        room, at, found = _Curves(rows, w, begin[here], end[here]).least(found)
-        if room < proven:
-            proven, place = room, at
-        if proven <= 0:
-            break
-    return proven, place, 0.0
+        one, found = _Curves(rows, w, exact, begin[here], end[here]).least(found)
+        if one.silent is False:
+            return one
+        if least.silent and (one.silent is None or one.room < least.room):
+            least = one
+    return least
 
 
 class _Curves:
     """The potential in intervals between inputs: ``a * kernel(x) + b * exp(-x / fast)``, x ms after the beginning."""
 
-    def __init__(self, rows: PatternRows, w: _Floats, begin: _Floats, end: _Floats) -> None:
-        self.rows, self.begin, self.end = rows, begin, end
-        self.left = rows.following(end)
+    def __init__(self, rows: PatternRows, w: _Floats, exact: ExactPotential, begin: _Floats, end: _Floats) -> None:
+        self.rows, self.exact, self.begin, self.end = rows, exact, begin, end
+        self.last, self.left = rows.last(end), rows.following(end)
         near = np.flatnonzero((rows.times <= begin[-1]) & (rows.times > begin[0] - rows.reach))
         weights = (rows.values * w[rows.trains])[near]
         counts, age = rows.counting(near, begin, rows.targets, here=True)
@@ -185,58 +257,77 @@ class _Curves:
         self.a, self.b = decay @ weights, kernels @ weights
         self.a_size, self.b_size = (decay * exponents) @ np.abs(weights), (kernels * exponents) @ np.abs(weights)
         self.roundings = (len(near) + rows.roundings) * np.finfo(float).eps
-        self.rise = rows.rise(begin, rows.last(end))
+        self.rise = rows.rise(begin, self.last)
 
-    def excess(self, k: NDArray[np.intp], x: _Floats) -> tuple[_Floats, _Floats]:
+    def excess(self, k: NDArray[np.intp], x: _Floats) -> _Floats:
         """Return the potential less the threshold x ms after the beginning of intervals k, and its largest rounding."""
         rows = self.rows
         kernel, decay = rows.kernel(x), np.exp(-x / rows.fast)
         potential = self.a[k] * kernel + self.b[k] * decay
         size = (self.a_size[k] * kernel + self.b_size[k] * decay) * (1 + x / rows.fast)
         theta = rows.neuron.theta_0 + self.rise[k] * np.exp(-x / rows.recovery)
-        return potential - theta, self.roundings * (size + theta)
+        excess, rounding = potential - theta, self.roundings * (size + theta)
+        for j in np.flatnonzero(_vague(excess, rounding)) if self.exact.left > 0 else ():
+            found = self.exact.excess(float(self.begin[k[j]]), float(x[j]), float(self.last[k[j]]), here=True)
+            if found is not None:
+                excess[j], rounding[j] = found
+        return np.array([excess, rounding])
 
-    def least(self, found: float) -> tuple[float, float, float]:
-        """Return the least room in these intervals that is proven, or one not above 0; its time; the least found.
+    def least(self, found: float) -> tuple[_Least, float]:
+        """Return the least room in these intervals that is proven, or one not above 0; the least found here and before.
 
         Intervals are halved until what is proven of each is near the least room found here and before.
         """
-        k, proven, place = np.arange(len(self.begin)), np.inf, self.rows.start
+        k, least, intervals = np.arange(len(self.begin)), _Least(np.inf, self.rows.start, True), 0
         low, high = np.zeros(len(k)), self.end - self.begin
-        while len(k):
+        at_low, at_high = self.excess(k, low), self.excess(k, high)
+        for _ in range(_HALVINGS):
             begin, left = self.begin[k], np.minimum(1.0, self.left[k] - (self.begin[k] + low))
-            room = np.full(len(k), np.inf)
-            for x in (low, high):
-                excess, rounding = self.excess(k, x)
-                below = -(excess + rounding)
-                worst = int(below.argmin())
-                if below[worst] <= 0:
-                    return float(below[worst]), float(begin[worst] + x[worst]), found
-                here = below / np.minimum(1.0, self.left[k] - (begin + x))
-                room = np.minimum(room, here)
-            found = min(found, float(room.min()))
-            bound = self.bound(k, low, high) / left
-            kept = bound >= _PROVEN * found
-            if kept.any() and (least_kept := float(bound[kept].min())) < proven:
-                proven, place = least_kept, float((begin + low)[kept][bound[kept].argmin()])
-            k, low, high = k[~kept], low[~kept], high[~kept]
+            for x, (excess, rounding) in ((low, at_low), (high, at_high)):
+                reached = np.flatnonzero((excess >= rounding) & np.isfinite(rounding))
+                if len(reached):
+                    worst = reached[(excess - rounding)[reached].argmax()]
+                    return _Least(float(-excess[worst]), float(begin[worst] + x[worst]), False), found
+                room = -(excess + rounding) / np.minimum(1.0, self.left[k] - (begin + x))
+                found = min(found, float(room.min(initial=np.inf, where=room > 0)))
+            bound, settled = self.bound(k, (low, at_low), (high, at_high))
+            bound /= left
+            kept = (bound >= _PROVEN * found) | settled
+            if kept.any():
+                j = int(np.flatnonzero(kept)[bound[kept].argmin()])
+                if bound[j] < least.room:
+                    least = _Least(float(bound[j]), float(begin[j] + low[j]), True if bound[j] > 0 else None)
+            k, low, high, at_low, at_high = k[~kept], low[~kept], high[~kept], at_low[:, ~kept], at_high[:, ~kept]
+            intervals += len(k)
+            if not len(k) or intervals > _INTERVALS:
+                break
             middle = low + 0.5 * (high - low)
-            if (flat := (middle <= low) | (middle >= high)).any():
-                # No time between the two ends: rounding leaves open whether the threshold is reached.
-                return 0.0, float((self.begin[k] + low)[flat][0]), found
+            between = self.excess(k, middle)
             k, low, high = np.tile(k, 2), np.append(low, middle), np.append(middle, high)
-        return proven, place, found
+            at_low, at_high = np.hstack([at_low, between]), np.hstack([between, at_high])
+        if len(k) and least.silent:
+            least = _Least(min(0.0, float(bound.min())), float(self.begin[k[0]] + low[0]), None)
+        return least, found
 
-    def bound(self, k: NDArray[np.intp], low: _Floats, high: _Floats) -> _Floats:
-        """Return the distance below the threshold that intervals keep for certain, from ends and curvature."""
-        rows = self.rows
-        ends = [self.excess(k, x) for x in (low, high)]
-        highest, rounding = np.maximum(ends[0][0], ends[1][0]), np.maximum(ends[0][1], ends[1][1])
+    def bound(
+        self, k: NDArray[np.intp], lower: tuple[_Floats, _Floats], higher: tuple[_Floats, _Floats]
+    ) -> tuple[_Floats, NDArray[np.bool_]]:
+        """Return the distance below the threshold that intervals keep for certain, from ends and curvature.
+
+        Also whether rounding decides and is more than curvature, so that halves would prove no more. An end is its x
+        and, at x, the potential less the threshold and its rounding.
+        """
+        rows, (low, at_low), (high, at_high) = self.rows, lower, higher
         decay = np.exp(-low / rows.fast)
         a, b = self.a[k] * np.exp(-low / rows.neuron.tau), self.b[k] * decay + self.a[k] * rows.kernel(low)
-        curved = np.abs(a) * rows.steepest * (1 / rows.fast + 1 / rows.neuron.tau) + np.abs(b) / rows.fast**2
+        rounding = 2 * self.roundings * (self.a_size[k] + self.b_size[k] + rows.neuron.theta_0)
+        curved = (np.abs(a) + rounding) * rows.steepest * (1 / rows.fast + 1 / rows.neuron.tau)
+        curved += (np.abs(b) + rounding) / rows.fast**2
         curved += self.rise[k] * np.exp(-low / rows.recovery) / rows.recovery**2
-        by_ends = highest + (high - low) ** 2 / 8 * curved
-        by_state: _Floats = np.maximum(a, 0) * rows.largest + np.maximum(b, 0) - rows.neuron.theta_0
-        least: _Floats = -(np.minimum(by_ends, by_state) + rounding)
-        return least
+        curve = (high - low) ** 2 / 8 * curved
+        by_ends = np.maximum(at_low.sum(axis=0), at_high.sum(axis=0)) + curve
+        by_state = np.maximum(a, 0) * rows.largest + np.maximum(b, 0) - rows.neuron.theta_0 + rounding
+        # What is no number is not proven, and no halves of it are numbers.
+        below = np.nan_to_num(-np.minimum(by_ends, by_state), nan=-np.inf)
+        settled = [_vague(*end) & ~(curve > end[1]) for end in (at_low, at_high)]
+        return below, settled[0] | settled[1]

@@ -5,6 +5,7 @@ mod cone_r;
 mod cone_x;
 mod exact;
 mod mix;
+mod raised;
 mod shortest;
 
 pub(crate) use cone_r::Asked;

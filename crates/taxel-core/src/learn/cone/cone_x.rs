@@ -224,7 +224,7 @@ pub struct ConeXFit {
 #[derive(Debug, Clone)]
 pub struct ConeXProblem {
     parameters: ConeX,
-    exact: Exact,
+    pub(super) exact: Exact,
     /// Whether the caller left the margin to its default, so that it may be reduced.
     free_margin: bool,
 }
@@ -445,13 +445,19 @@ impl Exact {
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {
             *w = w.clamp(l, u);
         }
+        let unmet = match self.raised(&weights)? {
+            Some(raised) if self.unmet(&raised)?.is_none() => {
+                weights = raised;
+                None
+            }
+            _ => self.unmet(&weights)?,
+        };
         let parts = self.parts(&weights);
         let objective = parts.sum();
         let gap = relative_gap(objective, least);
         let lifts = self.targets.thresholds.iter().map(|threshold| (self.objective.kappa * threshold).powi(2));
         let nothing = NOTHING * self.objective.b * lifts.sum::<f64>();
         let known = gap <= self.tolerance || objective - least <= nothing;
-        let unmet = self.unmet(&weights)?;
         let status = match unmet {
             None if known => Status::Solved,
             None => Status::Feasible,

@@ -159,7 +159,7 @@ impl Exact {
         Ok(None)
     }
 
-    fn is_grid(&self) -> bool {
+    pub(super) fn is_grid(&self) -> bool {
         self.statement.neuron.time == Time::Grid
     }
 

@@ -155,7 +155,7 @@ pub(crate) fn end_of(
 
 impl Example {
     /// The inputs before `t`, in order of time.
-    fn before(&self, t: f64) -> &[Spike] {
+    pub(super) fn before(&self, t: f64) -> &[Spike] {
         &self.inputs[..self.inputs.partition_point(|i| i.t < t)]
     }
 
@@ -456,21 +456,36 @@ impl Statement {
     /// targets only.
     fn sum(&self, example: &Example, t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
         out.fill(0.0);
+        self.for_inputs(example, t, earlier, part, |input, one| {
+            out[input.train as usize] += f64::from(input.value) * one;
+        });
+    }
+
+    /// Calls `each` with the inputs before `t`, and `part` of their kernels' states at `t`, given spikes at the
+    /// `earlier` targets only.
+    pub(super) fn for_inputs(
+        &self,
+        example: &Example,
+        t: f64,
+        earlier: &[f64],
+        part: impl Fn(KernelSum) -> f64,
+        mut each: impl FnMut(&Spike, f64),
+    ) {
         let inputs = example.before(t);
         let age = self.neuron.ages(example.start, t);
         let from = inputs.partition_point(|i| i.t < t - example.forgotten);
         let (mut at, mut one) = (f64::NAN, 0.0);
-        for &Spike { t: s, train, value } in &inputs[from..] {
+        for input in &inputs[from..] {
             // With times in whole ms, many inputs share a time: the exponential is computed once per time.
-            if s != at {
-                at = s;
-                one = if lost(&self.neuron, earlier, s, t) {
+            if input.t != at {
+                at = input.t;
+                one = if lost(&self.neuron, earlier, at, t) {
                     0.0
                 } else {
-                    part(self.shape.after(self.shape.input(), age(s)))
+                    part(self.shape.after(self.shape.input(), age(at)))
                 };
             }
-            out[train as usize] += f64::from(value) * one;
+            each(input, one);
         }
     }
 }

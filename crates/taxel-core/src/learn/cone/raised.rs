@@ -1,0 +1,114 @@
+//! Targets at which the potential must not stay below the threshold by a rounding error.
+//!
+//! A row that is met to rounding may leave the potential at its target slightly below the threshold. The neuron then
+//! fires shortly afterwards, because the potential still rises, unless an inhibitory input ends the rise first. There the
+//! row is raised by its largest rounding error, so that the exact sum of kernels reaches the threshold.
+
+use super::exact::Exact;
+use crate::learn::engines::{HardRows, nearest};
+use crate::learn::statement::{Bounds, Row, until};
+use crate::vectors::dot;
+use crate::{Result, Stop};
+
+impl Exact {
+    /// The nearest weights of the same signs with these rows raised; `None` if no row needs it, or none can be raised.
+    ///
+    /// A row is left as it is if the neuron, with the row raised, might fire before the end of silence, 1e-6 ms before
+    /// the target.
+    pub(super) fn raised(&self, weights: &[f64]) -> Result<Option<Vec<f64>>> {
+        let statement = &self.statement;
+        let (mut below, mut limit, mut silent) = (vec![], vec![], vec![0.0; weights.len()]);
+        for ((row, &name), &t) in self.targets.iter().zip(&self.targets.names).zip(&self.targets.times) {
+            if self.is_grid() || !statement.is_turned_down(name, weights) {
+                continue;
+            }
+            let (pattern, end) = (name.0, until(t));
+            let rounding = statement.rounding_at(pattern, t, weights);
+            let wanted = row.threshold + rounding;
+            let rise = wanted - dot(row.at, weights);
+            if rise <= 0.0 {
+                continue;
+            }
+            if statement.is_asked(pattern, end) {
+                let row = Row::Silence { pattern, t: end };
+                let threshold = statement.state_into(row, &mut silent)? + statement.margin_of(row);
+                if dot(&silent, weights) + rise + rounding > threshold {
+                    continue;
+                }
+            }
+            below.extend(row.at.iter().map(|a| -a));
+            limit.push(-wanted);
+        }
+        if limit.is_empty() {
+            return Ok(None);
+        }
+        let Bounds { lower, upper } = &self.objective.bounds;
+        // An input that has no effect, or an excitatory one, must not become inhibitory.
+        let lower: Vec<f64> = lower.iter().zip(weights).map(|(l, w)| if *w >= 0.0 { l.max(0.0) } else { *l }).collect();
+        let upper: Vec<f64> = upper.iter().zip(weights).map(|(u, w)| if *w <= 0.0 { u.min(0.0) } else { *u }).collect();
+        let rows = HardRows { below: &below, limit: &limit, ..HardRows::default() };
+        nearest(weights, &rows, &lower, &upper, Stop::never())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::rngs::StdRng;
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+    use crate::learn::cone::{ConeX, ConeXProblem};
+    use crate::learn::fit::Status;
+    use crate::learn::statement::Bound;
+    use crate::{Spike, SpikeKind, SpikeTrains};
+
+    const TARGET: f64 = 50.5;
+
+    /// Solved problems of graded patterns with two inputs `behind` ms after the target, and their weights.
+    fn solved(behind: f64, lambdas: [f64; 3]) -> Vec<(Exact, Vec<f64>)> {
+        let mut found = vec![];
+        for seed in 0..20 {
+            let mut random = StdRng::seed_from_u64(seed);
+            let mut input = |t: f64, train| Spike { t, train, value: random.random_range(-2.0..2.0) };
+            let mut inputs: Vec<Spike> = (0..60).map(|n| input(f64::from(n), n % 30)).collect();
+            inputs.extend((0..2).map(|n| input(TARGET + behind, 7 * n)));
+            let pattern = SpikeTrains::from_spikes(&inputs, 30, SpikeKind::Graded, 0.0, 70.0).unwrap();
+            let cone = ConeX { lambdas, lb: Bound::All(-2.0), ub: Bound::All(2.0), ..ConeX::default() };
+            let problem = ConeXProblem::new(&cone, &[pattern], &[vec![TARGET]], Stop::never()).unwrap();
+            let fit = problem.fit(&[], &mut |_| (), Stop::never()).unwrap().fit;
+            if fit.status == Status::Solved {
+                found.push((problem.exact, fit.weights));
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn weights_without_an_inhibitory_input_at_a_target_remain_as_they_are() {
+        for lambdas in [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]] {
+            let fits = solved(1.01e-8, lambdas);
+            assert!(fits.len() > 5);
+            assert!(fits.iter().all(|(exact, weights)| exact.raised(weights).unwrap().is_none()));
+        }
+    }
+
+    #[test]
+    fn weights_just_below_the_threshold_are_raised_by_the_rounding_error() {
+        let (mut raised, mut left) = (0, 0);
+        for (exact, weights) in [0.0, 1e-12, 1e-8].into_iter().flat_map(|behind| solved(behind, [0.0, 1.0, 0.0])) {
+            let low: Vec<f64> = weights.iter().map(|w| w * (1.0 - 1e-14)).collect();
+            let Some(high) = exact.raised(&low).unwrap() else {
+                assert!(!exact.statement.is_turned_down((0, 0), &low));
+                left += 1;
+                continue;
+            };
+            let row = exact.targets.row(0);
+            let rounding = exact.statement.rounding_at(0, TARGET, &high);
+            let excess = dot(row.at, &high) - row.threshold;
+            assert!(excess > 0.9 * rounding && excess < 2.0 * rounding && rounding < 1e-13, "{excess}, {rounding}");
+            assert!(high.iter().zip(&low).all(|(h, l)| (h - l).abs() <= 1e-13 && h * l >= 0.0));
+            raised += 1;
+        }
+        assert!(raised > 20 && left > 0, "{raised}, {left}");
+    }
+}
