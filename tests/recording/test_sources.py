@@ -68,7 +68,8 @@ def record_all(path: Path) -> dict[str, taxel.Events]:
         counts, verdict = summary.counters["sources"], summary.verdict
     os.close(ours)
     os.close(theirs)
-    assert counts["imu"] == {"lines": 51, "strange": 1, "trouble": None}
+    none = {"bytes_in_no_line": 0, "bytes_of_unfinished_lines": 0, "trouble": None}
+    assert counts["imu"] == {"lines": 51, "strange": 1, **none}
     assert counts["given"]["lines"] == 5
     assert verdict.parts["imu"].damaged == verdict.damaged == {"lines_that_could_not_be_read": 1}
     assert (verdict.status, verdict.parts["left"].status) == ("damaged", "complete after arrival")

@@ -18,5 +18,5 @@ pub use command::{Command, CommandReader};
 pub use cut::{Cut, cut};
 pub use decoder::{Counts, Decoder, Pairing, decode, most_rows};
 pub use registers::{Refusal, Registers};
-pub use sender_decoder::{Ahead, DatagramInfo, SenderDecoder};
+pub use sender_decoder::{Ahead, DatagramInfo, Order, SenderDecoder, StepBack};
 pub use v1::{STAMP_US, WORD_BYTES, Word, encode};

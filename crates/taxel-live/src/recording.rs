@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
-pub(crate) use damage::{ADDRESS, EMPTY, REFUSED};
+pub(crate) use damage::{ADDRESS, EMPTY, REFUSED, add_order};
 pub use damage::{Found, damage, damage_of_version_1};
 pub use event_pictures::EventPictures;
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
@@ -36,7 +36,7 @@ pub use mcap_reader::{Datagrams, Decoded, Message, Numbers, Place, Reader, Remar
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
 pub use pictures::{Encoding, PictureSource, Pictures};
-pub use stream::{Faults, Samples, Stream, fields};
+pub use stream::{Faults, LeftOut, Samples, Stream, fields};
 pub use topic::Topic;
 pub(crate) use verdict::JUMPED_BEFORE;
 pub use verdict::{Basis, Condition, Counts, Ending, NOTHING_LOST, Rebuilt, Status, Verdict};
@@ -74,6 +74,9 @@ pub struct Header {
     /// The verdict of the recording that this one was converted from: here, so that a file that was cut still states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub converted: Option<Verdict>,
+    /// The counts of that recording, by cause, as its reader gives them.
+    #[serde(default, skip_serializing_if = "serde_json::Map::is_empty")]
+    pub counts: serde_json::Map<String, serde_json::Value>,
     /// The numbers of events that a state gave, in a file made of events whose datagrams do not state it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<u64>,
@@ -221,6 +224,7 @@ impl Header {
             lost: vec![],
             remarks: vec![],
             converted: None,
+            counts: serde_json::Map::new(),
             repaired: vec![],
             difference: false,
             origin_us: 0,

@@ -157,7 +157,8 @@ def doubted(counters: dict[str, Any]) -> Iterator[str]:
 def exit_code(summary: Summary, array: Array) -> int:
     """Return the exit code for what was received and lost."""
     unsent = any(one["lost"] for one in summary.counters["sent"])
-    if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent:
+    left_out = any(one.get("bytes_in_no_line") for one in summary.counters["sources"].values())
+    if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent or left_out:
         return OUTSIDE
     return WRONG_INPUT if outside(summary.counters, array) else 0
 

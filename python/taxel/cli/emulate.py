@@ -86,7 +86,14 @@ class _Typed:
     preset: Annotated[str | None, _option("preset")] = None
     wire: Annotated[int | None, _option("wire")] = None
     board: Annotated[int, _option("board", of=Version2)] = Version2.board
-    session: Annotated[int, _option("seed", of=Version2)] = Version2.seed
+    session: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=65_535,
+            help="Wire 2: the number of the first session. Default: drawn, as at each reset of a board.",
+        ),
+    ] = None
     hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us)
     heartbeat: Annotated[float, _in_ms("heartbeat_us")] = to_ms(Version2.heartbeat_us)
     states: Annotated[float, _in_ms("states_us")] = to_ms(Version2.states_us)
@@ -209,9 +216,8 @@ def _played(typed: _Typed) -> _Played:
 def _emulated(typed: _Typed, played: _Played, console: Console) -> EmulatorReport:
     """Run the board until its end or Ctrl-C, and show the progress."""
     host, port, line, wire = typed.host, typed.port, typed.line, typed.wire
-    version_2 = Version2(
-        typed.board, typed.session, *(round(1e3 * ms) for ms in (typed.hold, typed.heartbeat, typed.states))
-    )
+    session = secrets.randbelow(65_536) if typed.session is None else typed.session
+    version_2 = Version2(typed.board, session, *(round(1e3 * ms) for ms in (typed.hold, typed.heartbeat, typed.states)))
     console.print(f"{played.text}, to {host}:{port}", soft_wrap=True)
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(pulse_style="bar.complete"), TextColumn("{task.fields[status]}"),

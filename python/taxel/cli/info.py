@@ -363,11 +363,14 @@ def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     counts = facts["counts"]
-    for name in ("datagrams", "bytes", "received", "dropped_by_kernel", "dropped_by_queue", "missing_numbers"):
+    always = ("datagrams", "bytes", "received", "dropped_by_kernel", "dropped_by_queue", "missing_numbers")
+    for name in always:
         if counts.get(name) is not None:
             yield name.replace("_", " "), str(counts[name])
-    no_loss = ("bytes", "words", "changes", "intensities", "markers", "datagrams", "intact", "events", "states")
-    for found in (counts.get("decoder", {}), counts.get("decoder_version_2", {}), facts["rebuilt"]):
+    no_loss = {"bytes", "words", "changes", "intensities", "markers", "datagrams", "intact", "events", "states"}
+    no_loss |= {"messages", "pictures", "samples"}
+    others = {name: n for name, n in counts.items() if isinstance(n, int) and name not in {*always, *facts["rebuilt"]}}
+    for found in (others, counts.get("decoder", {}), counts.get("decoder_version_2", {}), facts["rebuilt"]):
         for name, n in found.items():
             if n and name not in no_loss:
                 yield name.replace("_", " "), str(n)

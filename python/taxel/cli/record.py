@@ -92,8 +92,8 @@ def record(
     empty trials in a row end the command with exit code 3. While it records, a key on the terminal, or a line on any
     other standard input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the
     input is not for taxel). --source records other boards, and lines of numbers, into the same .mcap, each with its own
-    clock. Exit code 3: nothing was received, or something was lost after it had arrived; 2: the board has more taxels
-    than --array.
+    clock. Exit code 3: nothing was received, or something was lost after it had arrived, as bytes of a source
+    of lines that are in no line; 2: the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
@@ -285,6 +285,8 @@ def _print(summary: Summary, as_json: bool) -> None:
             received = f"{counted(counts['decoded'], 'datagram')}, {counted(counts['events'], 'event')}"
         else:
             received = counted(counts["lines"], "line")
+            if counts["bytes_in_no_line"]:
+                received += f", {counted(counts['bytes_in_no_line'], 'byte')} in no line"
         trouble = counts.get("trouble")  # sources of lines alone have this key
         say(f"  {name}: {received}" + (f"; {trouble}" if trouble else ""))
     for why in doubted(counters):

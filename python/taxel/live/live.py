@@ -235,7 +235,9 @@ class Live:
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
         `wire_late` (events of version 2 that arrived after time had passed theirs), `wire_jumps` (of the times of
         version 1 ahead of this computer's clock), `wire_repeated` (datagrams of version 1 that came again),
-        `wire_empty` (those without bytes), `arrived_ns` (when the latest datagram arrived, ns since 1970, or None),
+        `wire_empty` (those without bytes), `wire_overtaken` and `wire_far_behind` (events of version 2 before an
+        earlier one's time, by 0.1 s or less and by more), `wire_steps_back` (how often times stepped back),
+        `arrived_ns` (when the latest datagram arrived, ns since 1970, or None),
         `heartbeat_us` (the longest interval between heartbeats of a board of version 2, or None), `arrival` (state:
         "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended),
         `bridged` (None, or of a board of another computer: parcels, missing, dropped, dropped_by_kernel, repeated,
@@ -244,7 +246,8 @@ class Live:
         `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range
         that it had in training; None if that is not known), `detections_dropped`, `sources` (the counts of
-        each other source), `sent` (of each destination: to,
+        each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble),
+        `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
         `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
         drift_ppm, or None), `pace` (drift_ppm, delay: as a latency, beyond the shortest; doubt: why they cannot be, or

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from taxel.recording import open_recording
-from taxel.recording.read_mcap import DOUBTS
+from taxel.recording.read_mcap import DOUBTS, STEPS
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 
@@ -69,7 +69,8 @@ def summary_of(text: str) -> Summary:
     path = None if values["path"] is None else Path(values["path"])
     tare = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
     verdict = Verdict._from(values["verdict"])
-    if set(DOUBTS) & set(verdict.damaged) and path is not None and path.suffix == ".mcap":
+    # Of these the file has its own times.
+    if {*DOUBTS, *STEPS} & {*verdict.damaged, *verdict.noted} and path is not None and path.suffix == ".mcap":
         verdict = open_recording(path).verdict
     return Summary(values["counters"], verdict, path, tare)
 

@@ -23,7 +23,9 @@ from taxel.recording.notes import BoardChange, Zeroing
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
-__all__ = ["about_of", "array_of", "board_changes_of", "detections_of", "json_of", "notes_of", "zeroings_of"]
+__all__ = [
+    "about_of", "array_of", "board_changes_of", "counts_of", "detections_of", "json_of", "notes_of", "zeroings_of",
+]  # fmt: skip
 
 
 def json_of(contents: Contents) -> str:
@@ -145,12 +147,12 @@ def _registers(values: Any, driven: Array) -> Any:
     return Registers._of(values, driven)
 
 
-def _counts(counts: Any, depth: int = 0) -> dict[str, Any]:
+def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
     """Return counts by cause, whole numbers of 0 or more; those of the decoder are a nested mapping."""
     if not isinstance(counts, dict):
         raise ProblemError("no object")
     return {
-        name: n if n is None else _counts(n, 1) if isinstance(n, dict) and depth == 0 else whole(name, n, 0)
+        name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else whole(name, n, 0)
         for name, n in counts.items()
     }
 
@@ -173,7 +175,7 @@ _ENTRIES: dict[str, Any] = {
     "board_changes": lambda value, _: board_changes_of(value),
     "notes": lambda value, _: notes_of(value),
     "detections": lambda value, _: detections_of(value),
-    "counts": lambda value, _: _counts(value),
+    "counts": lambda value, _: counts_of(value),
     # Earlier versions wrote its line alone.
     "verdict": lambda value, _: Verdict(value) if isinstance(value, str) else Verdict.from_dict(value),
     "remarks": lambda value, _: _texts(value),
@@ -181,6 +183,6 @@ _ENTRIES: dict[str, Any] = {
     "columns": lambda value, _: _texts(value),
     "untimed": lambda value, _: flag("untimed", value),
     "truncated": lambda value, _: flag("truncated", value),
-    "rebuilt": lambda value, _: _counts(value),
+    "rebuilt": lambda value, _: counts_of(value),
     "lost": lambda value, _: _texts(value),
 }

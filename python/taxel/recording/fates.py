@@ -117,8 +117,8 @@ LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "clock": lambda of, _: [] if of.holds("datagrams") else "arrival times",
     "clock_of": lambda of, _: f"by whose clock times are ({of.clock_of})",
     "counts": lambda _, __: "what was received and lost, by cause",
-    # This field is the counts in one line.
-    "verdict": None,
+    # With counts, this is what they say.
+    "verdict": lambda of, _: [] if of.holds("counts") else "what was lost, in one line",
     "remarks": lambda of, _: [f"the remark: {line}" for line in of.remarks],
     "datagrams": _datagrams,
     "payload": lambda _, __: "raw bytes (words that are no events)",

@@ -101,8 +101,10 @@ def _moved(of: Contents, name: str, times: Times | None) -> Contents:
         return tuple(replace(note, t=None if note.t is None else one(note.t)) for note in of.notes)
 
     def verdict() -> str | None:
-        doubtful = verdict_of(of).doubtful_after_us
-        return of.verdict if doubtful is None else verdict_of(of)._later(one(doubtful) - doubtful)
+        told = verdict_of(of)
+        doubtful, steps = told.doubtful_after_us, told.steps_back
+        at = steps[0]["after_us"] if doubtful is None and steps else doubtful
+        return of.verdict if at is None else told._later(one(at) - at)
 
     return after(
         "on_clock",

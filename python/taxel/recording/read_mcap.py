@@ -19,15 +19,24 @@ from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import Contents, Once, alone, once
-from taxel.recording.description import array_of, board_changes_of, detections_of, notes_of, zeroings_of
+from taxel.recording.description import (
+    array_of,
+    board_changes_of,
+    counts_of,
+    detections_of,
+    notes_of,
+    zeroings_of,
+)
 from taxel.recording.notes import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
-__all__ = ["DOUBTS", "ascending", "read_mcap"]
+__all__ = ["DOUBTS", "STEPS", "ascending", "read_mcap"]
 
 #: The damage after which times are doubtful; from when on is known by the file's own times alone.
 DOUBTS = ("jumps_of_time", "stamps_out_of_order", "drifts_from_arrival")
+#: What is counted where times step back, by how much and where.
+STEPS = ("events_out_of_order", "events_overtaken")
 
 
 def read_mcap(path: Path, pairing: str) -> Contents:
@@ -64,6 +73,7 @@ class _Source:
         about = json.loads(reader.about())
         self.header, self.ending, self.opened = about["header"], about["ending"] or {}, about["rebuilt"]
         self.array = array_of(self.header["array"])
+        self.before = _counts_before(path, self.header)
         self.remarks = Once(lambda: json.loads(self.reader().remarks()))
         self.common: dict[str, Any] = {
             "path": path,
@@ -95,7 +105,7 @@ class _Source:
             **self.remarked(),
             events=once(lambda: Events._from_parts(decoded()[0], self.array)),
             clock=once(lambda: _clock(decoded()), arrived),
-            counts=once(lambda: self.counts_of_board(decoded()), lambda: True),
+            counts=self.counts(lambda: self.counts_of_board(decoded())),
             datagrams=once(lambda: Datagrams(*self.reader().datagrams()), arrived),
             version_2=once(lambda: bool(json.loads(decoded()[5])["intact"])),
             differences=bool(self.header["difference"]),
@@ -138,7 +148,7 @@ class _Source:
             **self.common,
             **self.remarked(),
             frames=once(frames),
-            counts=once(counts, lambda: True),
+            counts=self.counts(counts),
             columns=tuple(names) if names else None,
             untimed=not about.get("clock", True),
         )
@@ -166,7 +176,7 @@ class _Source:
             **self.common | {"verdict": once(lambda: self.verdict(lambda: read()[4]))},
             frames=once(frames),
             clock=once(lambda: Clock(read()[2], read()[0])),
-            counts=once(lambda: self.counts_of_stream(read()), lambda: True),
+            counts=self.counts(lambda: self.counts_of_stream(read())),
             samples=once(samples, lambda: self.remarks()["samples"] > 0),
             columns=tuple(name for name in stream["columns"] if name != stream.get("time")),
         )
@@ -200,6 +210,15 @@ class _Source:
         rebuilt = {key: int(value) for key, value in self.opened.items() if key != "unfinished"}
         return {**rebuilt, "bad_chunks": int(self.remarks()["condition"]["bad_chunks"])}
 
+    def counts(self, read: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Return the field of counts: those that are read, or those of the recording that this one was converted from.
+
+        Those have the damage of this file beside them.
+        """
+        if not self.before:
+            return once(read, lambda: True)
+        return once(lambda: {**self.before, **{cause: n for cause, n in self.rebuilt().items() if n}}, lambda: True)
+
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
         remarks = self.remarks()
@@ -221,8 +240,10 @@ class _Source:
 
     def counts_of_stream(self, read: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and lines of a stream, by cause."""
-        found = {"samples": len(read[2]), **json.loads(read[4])["damage"]}
-        return {**found, "received": self.counted().get("received"), **self.rebuilt()}
+        found, counts = json.loads(read[4])["damage"], self.counted() or self.remarks()["counts"] or {}
+        # What was in no line is not in the file.
+        said = {cause: max(n, counts.get("decoder", {}).get(cause, 0)) for cause, n in found.items()}
+        return {"samples": len(read[2]), **said, "received": self.counted().get("received"), **self.rebuilt()}
 
     def counted(self) -> dict[str, Any]:
         """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""
@@ -237,12 +258,21 @@ class _Source:
         return Verdict._of({"file": condition})
 
     def must_decode(self) -> bool:
-        """Return whether the counts in the file do not tell what decoding finds: damage at the end, doubtful times."""
+        """Return whether the counts in the file do not tell what decoding finds: damage at the end, wrong times."""
         if "finished" not in self.ending:
             return True
         counts = self.ending["finished"]["counts"]
         converted = self.header.get("converted") or counts.get("converted")
-        return not converted and any(counts["decoder"].get(cause, 0) for cause in DOUBTS)
+        causes = DOUBTS if counts.get("steps_back") else (*DOUBTS, *STEPS)
+        return not converted and any(counts["decoder"].get(cause, 0) for cause in causes)
+
+
+def _counts_before(path: Path, header: dict[str, Any]) -> dict[str, Any]:
+    """Return the counts of the recording that a source was converted from, if any."""
+    try:
+        return counts_of(header.get("counts", {}))
+    except ProblemError as error:
+        raise FormatError(f"{path}, header, counts: {error}") from None
 
 
 def _clock(decoded: tuple[Any, ...]) -> Clock:

@@ -52,6 +52,10 @@ class Verdict(str):
         What is no loss of its own: repeated datagrams, repaired values, resets of the board and others.
     doubtful_after_us : int, us, or None
         The time after which times are doubtful; of several parts the earliest.
+    steps_back : list of dict of int
+        Where times step back in the order of arrival, at most the 256 largest steps: "after_us", the latest time before
+        it; "by_us", how far the earliest event is before that; "events", how many are. Files of earlier versions do
+        not state them.
     stretch_of : str or None
         Of a stretch of a recording a name of the whole, whose losses these are: `merge` counts them once.
     parts : dict of Verdict
@@ -135,6 +139,11 @@ class Verdict(str):
         return self._held["doubtful_after_us"]  # type: ignore[no-any-return]
 
     @property
+    def steps_back(self) -> list[dict[str, int]]:
+        """Where times step back, in the order of arrival."""
+        return [dict(step) for step in self._held["steps_back"]]
+
+    @property
     def stretch_of(self) -> str | None:
         """The name of the whole recording, of a stretch of one."""
         return self._held["stretch_of"]  # type: ignore[no-any-return]
@@ -160,8 +169,8 @@ class Verdict(str):
         numbers = {name: dict(self._held[name]) for name in _NUMBERS}
         parts = {name: part.to_dict() for name, part in self.parts.items()}
         about = {"status": self.status, "text": str(self), **numbers}
-        rest = {"doubtful_after_us": self.doubtful_after_us, "stretch_of": self.stretch_of, "parts": parts}
-        return about | rest
+        rest = {"doubtful_after_us": self.doubtful_after_us, "steps_back": self.steps_back}
+        return about | rest | {"stretch_of": self.stretch_of, "parts": parts}
 
     @classmethod
     def from_dict(cls, held: Mapping[str, Any]) -> Self:
@@ -184,6 +193,17 @@ class Verdict(str):
         return cls._of({"together": [("", _stated(held))]})
 
 
+def _are_steps(steps: Any) -> bool:
+    """Return whether these are steps back as `to_dict` gives them."""
+    least = {"after_us": -(2**63), "by_us": 1, "events": 1}
+    return isinstance(steps, list | tuple) and all(
+        isinstance(step, Mapping)
+        and step.keys() == least.keys()
+        and all(type(step[name]) is int and low <= step[name] < 2**63 for name, low in least.items())
+        for step in steps
+    )
+
+
 def _stated(held: Any) -> dict[str, Any]:
     """Return a verdict from `to_dict` as the compiled part states it."""
     own = held if isinstance(held, Mapping) else {}
@@ -196,6 +216,7 @@ def _stated(held: Any) -> dict[str, Any]:
         or not all(type(count) is int and 0 <= count < 2**64 for count in counts)
         or type(own.get(doubtful, None)) not in (int, type(None))
         or not isinstance(own.get("stretch_of"), str | None)
+        or not _are_steps(own.get("steps_back", []))
     ):
         raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
     for name, least in (("lost", "lost"), ("damaged", "damaged")):
@@ -227,6 +248,7 @@ def _stated(held: Any) -> dict[str, Any]:
                     f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be no fewer"
                 )
     made = {"status": own["status"], "text": own["text"], doubtful: own.get(doubtful)}
+    made |= {"steps_back": [dict(step) for step in own.get("steps_back", [])]}
     made |= {"stretch_of": own.get("stretch_of")}
     made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
     return made | {"parts": list(stated.items())}

@@ -104,7 +104,8 @@ def _told(contents: Contents) -> dict[str, Any]:
     """Return what a header states of the recording that a file was made of."""
     # The verdict stands here and not with the final counts, so that a file that was cut still states it.
     converted = None if contents.verdict is None else verdict_of(contents)._held
-    return {"lost": contents.lost, "remarks": contents.remarks, "converted": converted}
+    counts = dict(contents.counts)
+    return {"lost": contents.lost, "remarks": contents.remarks, "converted": converted, "counts": counts}
 
 
 def _write_pictures(

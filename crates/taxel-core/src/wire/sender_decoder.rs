@@ -1,6 +1,7 @@
 //! Decodes one sender's datagrams to events, whichever version of the wire it sends.
 
 mod ahead;
+mod order;
 mod recent;
 
 use crate::wire::decoder::{Counts, Decoder};
@@ -9,6 +10,7 @@ use crate::wire::v1::{FIRST, WORD_BYTES};
 use crate::wire::v2::{self, Header, Outcome};
 use crate::{Array, Events};
 pub use ahead::Ahead;
+pub use order::{Order, StepBack};
 use recent::Recent;
 
 /// For how long only whole words of version 1 must arrive before a sender of version 2 counts as changed to version 1,
@@ -52,6 +54,7 @@ pub struct SenderDecoder {
     refused: u64,
     changes: u64,
     ahead: Ahead,
+    order: Order,
     recent: Recent,
     repeated: u64,
     empty: u64,
@@ -74,6 +77,7 @@ impl SenderDecoder {
             refused: 0,
             changes: 0,
             ahead: Ahead::default(),
+            order: Order::default(),
             recent: Recent::default(),
             repeated: 0,
             empty: 0,
@@ -126,6 +130,12 @@ impl SenderDecoder {
     #[must_use]
     pub fn ahead(&self) -> &Ahead {
         &self.ahead
+    }
+
+    /// Where times step back, in the order of arrival.
+    #[must_use]
+    pub fn order(&self) -> &Order {
+        &self.order
     }
 
     /// Number of datagrams of version 1 that came again; their events are decoded again too.
@@ -189,6 +199,7 @@ impl SenderDecoder {
                 self.ahead.note(newest, first.unwrap_or(last + offset), last + offset, arrived);
             }
         }
+        self.order.note(&out.t[rows..], second);
         if let Some(&t) = out.t[rows..].last() {
             let latest = self.latest.map_or(t, |(latest, _)| latest.max(t));
             self.latest = Some((latest, arrived));
@@ -204,6 +215,7 @@ impl SenderDecoder {
         let (rows, markers) = (out.len(), out.markers.len());
         self.one.finish_into(out);
         self.carry(rows, markers, None, out);
+        self.order.note(&out.t[rows..], false);
     }
 
     /// Whether only whole words of version 1 have arrived for long enough.

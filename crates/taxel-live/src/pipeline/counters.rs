@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 use taxel_core::encode::Tare;
-use taxel_core::wire;
+use taxel_core::wire::{self, StepBack};
 
 use super::sending::Sent;
 use crate::bridged::Bridged;
@@ -70,6 +70,15 @@ pub struct DecodingCounts {
     /// The time after which times are doubtful since, us.
     #[serde(skip)]
     pub wire_doubtful_after: Option<i64>,
+    /// Events of version 2 before the latest time, by 0.1 s or less: the network reorders datagrams.
+    pub wire_overtaken: u64,
+    /// Events of version 2 before the latest time, by more than that.
+    pub wire_far_behind: u64,
+    /// Number of times that times stepped back, in either version.
+    pub wire_steps_back: u64,
+    /// The largest of these steps; of a recording that began later none, as its own clock may have others.
+    #[serde(skip)]
+    pub wire_steps: Vec<StepBack>,
     /// Number of datagrams of version 1 that came again.
     pub wire_repeated: u64,
     /// Number of datagrams of version 1 without bytes.
@@ -221,6 +230,10 @@ impl DecodingCounts {
             wire_late: self.wire_late - earlier.wire_late,
             wire_jumps: self.wire_jumps - earlier.wire_jumps,
             wire_doubtful_after: self.wire_doubtful_after,
+            wire_overtaken: self.wire_overtaken - earlier.wire_overtaken,
+            wire_far_behind: self.wire_far_behind - earlier.wire_far_behind,
+            wire_steps_back: self.wire_steps_back - earlier.wire_steps_back,
+            wire_steps: vec![],
             wire_repeated: self.wire_repeated - earlier.wire_repeated,
             wire_empty: self.wire_empty - earlier.wire_empty,
             events: self.events - earlier.events,
@@ -268,6 +281,11 @@ pub enum SourceCounts {
         lines: u64,
         /// Number of lines that could not be parsed; they are recorded as they arrived.
         strange: u64,
+        /// Number of bytes that were left out, as they are in no line of numbers: what follows in a line that is longer than
+        /// 65 536 bytes, and before the first line what cannot be one.
+        bytes_in_no_line: u64,
+        /// Number of bytes of lines whose end did not arrive, or whose beginning did not.
+        bytes_of_unfinished_lines: u64,
         /// The system's last error, if reading failed.
         trouble: Option<String>,
         /// What is wrong with its lines and stamps, as a verdict states it.

@@ -221,6 +221,12 @@ impl DecodeStage {
         counters.decoding.wire_late = self.late;
         counters.decoding.wire_jumps = self.decoder.ahead().jumps;
         counters.decoding.wire_doubtful_after = self.decoder.ahead().after;
+        let order = self.decoder.order();
+        counters.decoding.wire_overtaken = order.overtaken();
+        counters.decoding.wire_far_behind = order.far();
+        counters.decoding.wire_steps_back = order.count();
+        counters.decoding.wire_steps.clear();
+        counters.decoding.wire_steps.extend_from_slice(order.steps());
         counters.decoding.wire_repeated = self.decoder.repeated();
         counters.decoding.wire_empty = self.decoder.empty();
         counters.decoding.events += self.events.len() as u64;

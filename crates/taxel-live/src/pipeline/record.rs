@@ -21,7 +21,7 @@ use crate::locked::lock;
 use crate::recording::{BoardChange, Change, now_ns};
 
 /// Interval at which the counts are written to an unfinished recording.
-const COUNTS_EVERY: Duration = Duration::from_secs(1);
+pub(super) const COUNTS_EVERY: Duration = Duration::from_secs(1);
 
 pub(super) struct RecordStage {
     shared: Arc<Shared>,

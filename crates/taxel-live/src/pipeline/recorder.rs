@@ -432,6 +432,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
     let DecodingCounts { wire, wire_jumps, wire_repeated, wire_v2, .. } = &now.decoding;
     let (mut decoder, missing) = recording::damage(wire, *wire_jumps, *wire_repeated, wire_v2);
+    recording::add_order(&mut decoder, now.decoding.wire_far_behind, now.decoding.wire_overtaken);
     decoder.insert(recording::REFUSED.to_owned(), now.decoding.wire_refused);
     decoder.insert("changes_between_senders".to_owned(), now.capture.changes_between_senders);
     decoder.insert(recording::EMPTY.to_owned(), now.decoding.wire_empty);
@@ -447,6 +448,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         dropped_by_queue: now.capture.dropped_by_queue,
         several_a_message: counters.capture.gro && counters.capture.datagrams > counters.capture.messages,
         decoder,
+        steps_back: now.decoding.wire_steps.clone(),
         missing: missing.filter(|n| *n > 0 || knows),
         bridged: now.bridged.map(Box::new),
         ..recording::Counts::default()

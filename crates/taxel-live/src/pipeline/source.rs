@@ -17,7 +17,7 @@ use taxel_core::{Array, problem};
 
 use super::sending::{BAUD, serial};
 use crate::locked::lock;
-use crate::recording::{Header, Stream, fields, now_ns};
+use crate::recording::{Header, LeftOut, Stream, fields, now_ns};
 use crate::{Error, Result, address};
 
 /// Timeout for the first line of a source, which defines its columns, if they are not given.
@@ -26,7 +26,7 @@ const FIRST_LINE: Duration = Duration::from_secs(3);
 /// Interval at which a failed line is opened again, and the end is checked.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// Longest line, bytes; a longer one is not a line of numbers.
+/// Longest line, bytes; a longer one is not a line of numbers, and what follows in it is left out.
 const LONGEST: usize = 1 << 16;
 
 /// A further source of a recording.
@@ -220,18 +220,24 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
     let mut numbers = None;
     while Instant::now() < until {
         let ended = reader.fill().map_err(|error| reader.broken(error))?;
-        while let Some(line) = reader.line(ended) {
+        while let Some(Line { text, bytes, cut }) = reader.line(ended) {
             if std::mem::take(&mut skip) {
+                reader.left_out.unfinished += bytes;
                 continue;
             }
-            let found: Vec<&str> = fields(&line).collect();
-            if found.is_empty() || line.starts_with('#') {
+            // Neither numbers nor names.
+            if cut || text.contains(|c: char| c == char::REPLACEMENT_CHARACTER || (c.is_control() && c != '\t')) {
+                reader.left_out.in_no_line += bytes;
+                continue;
+            }
+            let found: Vec<&str> = fields(&text).collect();
+            if found.is_empty() || text.starts_with('#') {
                 continue;
             }
             if found.iter().all(|field| field.parse::<f64>().is_ok()) {
                 numbers = Some(found.len());
                 // The first line contains data, so it is processed again.
-                reader.bytes.splice(0..0, format!("{line}\n").into_bytes());
+                reader.bytes.splice(0..0, format!("{text}\n").into_bytes());
                 break;
             }
             let stream = Stream::of_columns(found.into_iter().map(str::to_owned).collect());
@@ -248,7 +254,11 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
         }
         None => {
             let waited = FIRST_LINE.as_secs();
-            Err(problem!("{place}: no line within {waited} s; name its columns, as columns=t_us:ax:ay:az").into())
+            let came = match reader.bytes.len() as u64 + reader.left_out.in_no_line + reader.left_out.unfinished {
+                0 => String::new(),
+                bytes => format!(" in the {bytes} bytes that came"),
+            };
+            Err(problem!("{place}: no line{came} within {waited} s; name its columns, as columns=t_us:ax:ay:az").into())
         }
     }
 }
@@ -257,9 +267,24 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
 pub(super) struct LineReader {
     place: Place,
     file: Option<Box<dyn ReadsAsItComes>>,
+    /// What arrived after the last line: at most a line and what one read returns.
     bytes: Vec<u8>,
+    /// Number of these bytes that hold no end of a line.
+    searched: usize,
+    /// Whether they continue a line of which the beginning was returned, as it is too long.
+    cut: bool,
+    left_out: LeftOut,
     /// When the last bytes arrived, ns since 1970.
     pub(super) came_ns: i64,
+}
+
+/// A line of text, without its end.
+pub(super) struct Line {
+    pub(super) text: String,
+    /// Number of its bytes.
+    pub(super) bytes: u64,
+    /// Whether this is only the beginning of a line that is too long.
+    pub(super) cut: bool,
 }
 
 trait ReadsAsItComes: Read + AsRawFd + Send {}
@@ -267,7 +292,9 @@ impl<T: Read + AsRawFd + Send> ReadsAsItComes for T {}
 
 impl LineReader {
     pub(super) fn open(place: &Place) -> Result<Self> {
-        Ok(Self { place: place.clone(), file: Some(open(place)?), bytes: vec![], came_ns: 0 })
+        let file = Some(open(place)?);
+        let left_out = LeftOut::default();
+        Ok(Self { place: place.clone(), file, bytes: vec![], searched: 0, cut: false, left_out, came_ns: 0 })
     }
 
     pub(super) fn is_serial(&self) -> bool {
@@ -301,14 +328,54 @@ impl LineReader {
         Ok(false)
     }
 
-    /// The next whole line; of a line that is too long, the part that has arrived. The last one may lack its end where no more
-    /// can arrive (`ended`).
-    pub(super) fn line(&mut self, ended: bool) -> Option<String> {
-        let whole = self.bytes.iter().position(|&byte| byte == b'\n');
-        let long = (self.bytes.len() > LONGEST).then_some(LONGEST);
-        let rest = if ended { self.bytes.len().checked_sub(1) } else { None };
-        let line: Vec<u8> = self.bytes.drain(..=whole.or(long).or(rest)?).collect();
-        Some(String::from_utf8_lossy(&line).trim_end_matches(['\r', '\n']).to_owned())
+    /// The next line, which a line feed or a carriage return ends; the last one may lack its end where no more can arrive
+    /// (`ended`). Of a line that is too long the beginning is returned, and the rest is left out.
+    pub(super) fn line(&mut self, ended: bool) -> Option<Line> {
+        loop {
+            let end = self.bytes[self.searched..].iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+            let end = end.map(|place| self.searched + place);
+            let length = end.unwrap_or(self.bytes.len());
+            if self.cut {
+                self.left_out.in_no_line += length as u64;
+                self.cut = end.is_none();
+                self.remove(end.map_or(length, |end| end + 1));
+                if self.cut {
+                    return None;
+                }
+                continue;
+            }
+            let long = length > LONGEST;
+            if end.is_none() && !long && !(ended && length > 0) {
+                self.searched = length;
+                return None;
+            }
+            let length = length.min(LONGEST);
+            let text = String::from_utf8_lossy(&self.bytes[..length]).into_owned();
+            self.cut = long;
+            self.remove(if long { length } else { end.map_or(length, |end| end + 1) });
+            return Some(Line { text, bytes: length as u64, cut: long });
+        }
+    }
+
+    fn remove(&mut self, bytes: usize) {
+        self.bytes.drain(..bytes);
+        self.searched = 0;
+    }
+
+    /// The bytes that were left out since the last call; at the end (`last`) with those of the line that has not ended.
+    pub(super) fn take_left_out(&mut self, last: bool) -> LeftOut {
+        if last {
+            self.discard();
+        }
+        std::mem::take(&mut self.left_out)
+    }
+
+    /// Leaves out what arrived of a line that has not ended.
+    fn discard(&mut self) {
+        let place = if self.cut { &mut self.left_out.in_no_line } else { &mut self.left_out.unfinished };
+        *place += self.bytes.len() as u64;
+        self.remove(self.bytes.len());
+        self.cut = false;
     }
 
     pub(super) fn broken(&self, error: io::Error) -> Error {
@@ -316,9 +383,9 @@ impl LineReader {
         Error::file(path)(error)
     }
 
-    /// Opens the line again, and discards an incomplete line.
+    /// Opens the line again, and leaves out an incomplete line.
     pub(super) fn again(&mut self) {
-        self.bytes.clear();
+        self.discard();
         self.file = open(&self.place).ok();
         if self.file.is_none() {
             std::thread::sleep(LOOK_EVERY);
@@ -352,6 +419,9 @@ fn comes(descriptor: RawFd, most: Duration) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use rand::rngs::StdRng;
+    use rand::{Rng, SeedableRng};
+
     use super::*;
 
     #[test]
@@ -377,5 +447,63 @@ mod tests {
         ] {
             assert!(text.parse::<SourceKind>().is_err(), "{text}");
         }
+    }
+
+    /// The lines of bytes by their definition, each with whether it is only a beginning, and what is left out.
+    fn split(bytes: &[u8]) -> (Vec<(Vec<u8>, bool)>, LeftOut) {
+        let (mut lines, mut left_out) = (vec![], LeftOut::default());
+        let mut parts: Vec<&[u8]> = bytes.split(|byte| matches!(byte, b'\n' | b'\r')).collect();
+        let last = parts.pop().unwrap_or_default();
+        for line in parts {
+            lines.push((line[..line.len().min(LONGEST)].to_vec(), line.len() > LONGEST));
+            left_out.in_no_line += line.len().saturating_sub(LONGEST) as u64;
+        }
+        if last.len() > LONGEST {
+            lines.push((last[..LONGEST].to_vec(), true));
+            left_out.in_no_line += (last.len() - LONGEST) as u64;
+        } else {
+            left_out.unfinished = last.len() as u64;
+        }
+        (lines, left_out)
+    }
+
+    #[test]
+    fn each_byte_that_comes_is_in_a_line_or_counted_and_few_are_held() {
+        let folder = std::env::temp_dir().join(format!("taxel-lines-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        for seed in 0..30 {
+            let mut random = StdRng::seed_from_u64(seed);
+            let mut bytes: Vec<u8> = vec![];
+            for _ in 0..random.random_range(0..20) {
+                let near = LONGEST + random.random_range(0..3) - 1;
+                let length = [random.random_range(0..20), 5000, near, 300_000][random.random_range(0..4)];
+                match random.random_range(0..4) {
+                    0 => bytes.extend((0..length).map(|_| random.random::<u8>())),
+                    kind => bytes.extend(std::iter::repeat_n([b'1', 0, 0xff][kind - 1], length)),
+                }
+                bytes.extend([&b"\n"[..], b"\r\n", b"\r", b""][random.random_range(0..4)]);
+            }
+            let path = folder.join(format!("{seed}"));
+            std::fs::write(&path, &bytes).unwrap();
+            let mut reader = LineReader::open(&Place::Pipe(path)).unwrap();
+            let (mut lines, mut left_out, mut read) = (vec![], LeftOut::default(), 0);
+            while read < bytes.len() {
+                read += (bytes.len() - read).min(4096);
+                assert!(!reader.fill().unwrap());
+                while let Some(line) = reader.line(false) {
+                    lines.push((line.text, line.bytes, line.cut));
+                }
+                assert!(reader.bytes.capacity() <= 4 * LONGEST, "seed {seed}: {}", reader.bytes.capacity());
+                let more = reader.take_left_out(read == bytes.len());
+                left_out.in_no_line += more.in_no_line;
+                left_out.unfinished += more.unfinished;
+            }
+            let (expected, of_rest) = split(&bytes);
+            let text = |line: &[u8]| String::from_utf8_lossy(line).into_owned();
+            let expected: Vec<_> = expected.iter().map(|(line, cut)| (text(line), line.len() as u64, *cut)).collect();
+            assert!(lines == expected, "seed {seed}");
+            assert_eq!(left_out, of_rest, "seed {seed}");
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -8,16 +8,18 @@ use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::JoinHandle;
+use std::time::Instant;
 
 use taxel_core::problem;
 
 use super::counters::{Counters, SourceCounts};
 use super::options::LiveOptions;
+use super::record::COUNTS_EVERY;
 use super::recorder::{Host, Part};
 use super::shared::Shared;
-use super::source::{LineReader, Place, Source, SourceKind};
+use super::source::{Line, LineReader, Place, Source, SourceKind};
 use crate::locked::lock;
-use crate::recording::{self, Faults, Found, Stream, Track, fields};
+use crate::recording::{self, Faults, Found, LeftOut, Stream, Track, fields, now_ns};
 use crate::{Error, Result};
 
 /// A running stream of numbers.
@@ -40,12 +42,14 @@ struct NumbersTrack {
     /// What is wrong with the lines of this part, and of all.
     faults: Faults,
     all: Faults,
+    /// When the counts were last written.
+    counted: Option<Instant>,
 }
 
 impl Numbers {
     pub(super) fn new(part: Part, stream: Stream, always: bool) -> Self {
         let faults = Faults::new(&stream);
-        let track = NumbersTrack { track: None, lines: 0, before: 0, all: faults.clone(), faults };
+        let track = NumbersTrack { track: None, lines: 0, before: 0, all: faults.clone(), faults, counted: None };
         Self { part, always, track: Mutex::new(track), stream, trouble: Mutex::default(), ends: AtomicBool::new(false) }
     }
 
@@ -74,13 +78,37 @@ impl Numbers {
     }
 
     /// Records a line of text.
-    fn line(&self, arrived_ns: i64, line: &str) -> Result<()> {
-        match self.stream.parse(line) {
-            Some(values) => self.sample(arrived_ns, &values),
+    fn line(&self, arrived_ns: i64, line: &Line) -> Result<()> {
+        let text = &*line.text;
+        match self.stream.parse(text) {
+            Some(values) if !line.cut => self.sample(arrived_ns, &values),
             // A repeated line of column names contains no numbers.
-            None if fields(line).eq(self.stream.columns.iter().map(String::as_str)) || line.trim().is_empty() => Ok(()),
-            None => self.record(Faults::strange, |track, number| track.strange_line(arrived_ns, number, line)),
+            None if !line.cut
+                && (fields(text).eq(self.stream.columns.iter().map(String::as_str)) || text.trim().is_empty()) =>
+            {
+                Ok(())
+            }
+            _ => self.record(Faults::strange, |track, number| track.strange_line(arrived_ns, number, text)),
         }
+    }
+
+    /// Counts bytes that arrived and are in no line; an unfinished recording states them too.
+    fn left_out(&self, bytes: LeftOut) -> Result<()> {
+        if bytes == LeftOut::default() {
+            return Ok(());
+        }
+        let mut current = lock(&self.track);
+        if self.always && current.track.is_none() {
+            current.track = Some(self.part.open()?);
+        }
+        current.faults.left_out(bytes);
+        current.all.left_out(bytes);
+        if current.counted.is_some_and(|counted| counted.elapsed() < COUNTS_EVERY) {
+            return Ok(());
+        }
+        current.counted = Some(Instant::now());
+        let counts = losses_of_lines(current.lines - current.before, &current.faults.found());
+        current.track.as_ref().map_or(Ok(()), |track| track.counts(now_ns(), &counts))
     }
 
     /// Records into this part of a recording from now on, or not at all; ends the previous part with its counts, and
@@ -106,8 +134,15 @@ impl Numbers {
     }
 
     fn counts_of(&self, lines: u64, faults: Found) -> SourceCounts {
-        let strange = faults.strange();
-        SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone(), faults }
+        let LeftOut { in_no_line, unfinished } = faults.left_out();
+        SourceCounts::Numbers {
+            lines,
+            strange: faults.strange(),
+            bytes_in_no_line: in_no_line,
+            bytes_of_unfinished_lines: unfinished,
+            trouble: lock(&self.trouble).clone(),
+            faults,
+        }
     }
 
     /// Records no more lines: ends its part of the recording with its counts.
@@ -123,37 +158,44 @@ impl Numbers {
         let (numbers, mut reader) = (Arc::clone(self), begun.map_or_else(|| LineReader::open(place), Ok)?);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
-            // After opening, a serial line may start in the middle of a line: the rest of that line is skipped.
-            let mut first = !whole;
-            while !numbers.ends.load(Ordering::Acquire) {
-                let ended = match reader.fill() {
-                    Ok(ended) => ended,
-                    Err(error) => {
-                        *lock(&numbers.trouble) = Some(reader.broken(error).to_string());
-                        reader.again();
-                        first = true;
-                        continue;
-                    }
-                };
-                let at_ns = reader.came_ns;
-                while let Some(line) = reader.line(ended) {
-                    let cut = std::mem::take(&mut first) && numbers.stream.parse(&line).is_none();
-                    let recorded = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
-                    if let Err(error) = recorded {
-                        if !numbers.ends.load(Ordering::Acquire)
-                            && let Some(host) = numbers.part.host.upgrade()
-                        {
-                            host.fail(error);
-                        }
-                        return;
-                    }
-                }
-                if ended {
-                    return;
-                }
+            if let Err(error) = numbers.read_lines(&mut reader, !whole)
+                && !numbers.ends.load(Ordering::Acquire)
+                && let Some(host) = numbers.part.host.upgrade()
+            {
+                host.fail(error);
             }
         };
         thread.spawn(job).map_err(Error::socket("thread"))
+    }
+
+    /// Reads lines until the end; `first`: a serial line may start in the middle of a line after opening, and the rest of that
+    /// line is skipped.
+    fn read_lines(&self, reader: &mut LineReader, mut first: bool) -> Result<()> {
+        while !self.ends.load(Ordering::Acquire) {
+            let ended = match reader.fill() {
+                Ok(ended) => ended,
+                Err(error) => {
+                    *lock(&self.trouble) = Some(reader.broken(error).to_string());
+                    reader.again();
+                    first = true;
+                    continue;
+                }
+            };
+            let at_ns = reader.came_ns;
+            while let Some(line) = reader.line(ended) {
+                let has_no_beginning = std::mem::take(&mut first) && self.stream.parse(&line.text).is_none();
+                if has_no_beginning && reader.is_serial() {
+                    self.left_out(LeftOut { unfinished: line.bytes, ..LeftOut::default() })?;
+                } else {
+                    self.line(at_ns, &line)?;
+                }
+            }
+            self.left_out(reader.take_left_out(ended))?;
+            if ended {
+                return Ok(());
+            }
+        }
+        self.left_out(reader.take_left_out(true))
     }
 }
 

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use taxel_core::wire::{self, SenderDecoder};
+use taxel_core::wire::{self, SenderDecoder, StepBack};
+
+use super::stream::LeftOut;
 
 /// What decoding a file found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -17,6 +19,8 @@ pub struct Found {
     pub unnumbered: bool,
     /// The time after which times are doubtful, us.
     pub doubtful_after_us: Option<i64>,
+    /// Where times step back.
+    pub steps_back: Vec<StepBack>,
 }
 
 impl Found {
@@ -26,14 +30,24 @@ impl Found {
         let (mut causes, missing) =
             damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.two().counts());
         causes.extend([(REFUSED.to_owned(), sender.refused()), (EMPTY.to_owned(), sender.empty())]);
+        add_order(&mut causes, sender.order().far(), sender.order().overtaken());
         let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);
-        Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us }
+        let steps = sender.order().steps().iter();
+        let steps_back = steps.map(|step| StepBack { after_us: step.after_us + origin_us, ..*step }).collect();
+        Self { damage: causes, missing, unnumbered: sender.counts().bytes > 0, doubtful_after_us, steps_back }
     }
 
     /// Number of lines that could not be read.
     #[must_use]
     pub fn strange(&self) -> u64 {
         self.damage.get(STRANGE).copied().unwrap_or(0)
+    }
+
+    /// Number of bytes that are in no line.
+    #[must_use]
+    pub fn left_out(&self) -> LeftOut {
+        let of = |cause: &str| self.damage.get(cause).copied().unwrap_or(0);
+        LeftOut { in_no_line: of(IN_NO_LINE), unfinished: of(UNFINISHED_LINES) }
     }
 }
 
@@ -46,10 +60,16 @@ pub fn damage_of_version_1(counts: &wire::Counts) -> BTreeMap<String, u64> {
         ("contradictory_kinds", counts.contradictory),
         ("outside_the_array", counts.outside),
         ("unpaired_intensities", counts.unpaired),
-        ("events_out_of_order", counts.back),
+        (OUT_OF_ORDER, counts.back),
     ]
     .map(|(cause, n)| (cause.to_owned(), n))
     .into()
+}
+
+/// Adds the numbers of events of version 2 that are far before the latest time, and of those that were overtaken.
+pub(crate) fn add_order(causes: &mut BTreeMap<String, u64>, far: u64, overtaken: u64) {
+    *causes.entry(OUT_OF_ORDER.to_owned()).or_default() += far;
+    causes.insert(OVERTAKEN.to_owned(), overtaken);
 }
 
 /// The same of both versions, with the jumps of [`wire::Ahead`] and the datagrams of version 1 that came `again`; and the
@@ -92,6 +112,10 @@ pub(super) const EVENTS_DROPPED: &str = "events_dropped_by_board";
 pub(super) const BOARD_RESET: &str = "resets";
 pub(super) const REPAIRED: &str = "events_repaired";
 pub(super) const REPEATED: &str = "datagrams_repeated";
+/// Events before the latest time: of version 1, which does not number its datagrams, and of version 2 those farther before it
+/// than a network reorders; and the other ones of version 2.
+const OUT_OF_ORDER: &str = "events_out_of_order";
+pub(super) const OVERTAKEN: &str = "events_overtaken";
 /// Datagrams that are intact, and of another board than the first.
 pub(super) const OTHER_BOARD: &str = "datagrams_of_another_board";
 /// Datagrams of version 1 that came again: version 1 does not number them, so that their events are there twice.
@@ -101,6 +125,9 @@ pub(crate) const JUMPS: &str = "jumps_of_time";
 /// Of a stream of numbers: lines that could not be read, restarts of its clock, which are no damage, stamps that step back,
 /// and how often the clock left that of arrival little by little.
 pub(super) const STRANGE: &str = "lines_that_could_not_be_read";
+/// Bytes of a stream of numbers that are in no line, and so are lost, and those of lines that have no end or no beginning.
+pub(super) const IN_NO_LINE: &str = "bytes_in_no_line";
+pub(super) const UNFINISHED_LINES: &str = "bytes_of_unfinished_lines";
 pub(super) const ANEW: &str = "clock_began_anew";
 /// Of a stream of numbers: values that a line says are missing (`nan`).
 pub(super) const MISSING: &str = "missing_values";

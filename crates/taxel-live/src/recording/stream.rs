@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
-use super::damage::{Found, MISSING, STRANGE};
+use super::damage::{Found, IN_NO_LINE, MISSING, STRANGE, UNFINISHED_LINES};
 use super::limits;
 use clock::StreamClock;
 
@@ -177,6 +177,7 @@ impl<'a> Sampling<'a> {
 pub struct Faults {
     strange: u64,
     missing: u64,
+    left_out: LeftOut,
     clock: StreamClock,
 }
 
@@ -184,7 +185,8 @@ impl Faults {
     /// None so far.
     #[must_use]
     pub fn new(stream: &Stream) -> Self {
-        Self { strange: 0, missing: 0, clock: StreamClock::new(stream.unit_us) }
+        let clock = StreamClock::new(stream.unit_us);
+        Self { strange: 0, missing: 0, left_out: LeftOut::default(), clock }
     }
 
     /// Counts a line that could not be read.
@@ -195,6 +197,12 @@ impl Faults {
     /// Counts the values of a line that are missing.
     fn missing(&mut self, values: &[f64]) {
         self.missing += values.iter().filter(|value| value.is_nan()).count() as u64;
+    }
+
+    /// Counts bytes that are in no line.
+    pub fn left_out(&mut self, bytes: LeftOut) {
+        self.left_out.in_no_line += bytes.in_no_line;
+        self.left_out.unfinished += bytes.unfinished;
     }
 
     /// The time, us, of a line with this stamp or none that arrived at `at_ns`; none if the stamp is no time.
@@ -218,9 +226,25 @@ impl Faults {
     #[must_use]
     pub fn found(&self) -> Found {
         let mut found = self.clock.found();
-        found.damage.extend([(STRANGE.to_owned(), self.strange), (MISSING.to_owned(), self.missing)]);
+        let LeftOut { in_no_line, unfinished } = self.left_out;
+        let counts = [
+            (STRANGE, self.strange),
+            (MISSING, self.missing),
+            (IN_NO_LINE, in_no_line),
+            (UNFINISHED_LINES, unfinished),
+        ];
+        found.damage.extend(counts.map(|(cause, n)| (cause.to_owned(), n)));
         found
     }
+}
+
+/// Number of bytes that arrived from a source of lines and that are in no line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LeftOut {
+    /// Those that cannot be part of a line of numbers.
+    pub in_no_line: u64,
+    /// Those of lines whose end did not arrive, or whose beginning did not.
+    pub unfinished: u64,
 }
 
 #[cfg(test)]
@@ -241,7 +265,9 @@ mod tests {
         }
         let samples = sampling.finish();
         let Found { mut damage, doubtful_after_us, .. } = samples.found;
-        assert_eq!(damage.remove(STRANGE), Some(0));
+        for none in [STRANGE, IN_NO_LINE, UNFINISHED_LINES] {
+            assert_eq!(damage.remove(none), Some(0));
+        }
         let mut n = |cause: &str| damage.remove(cause).unwrap();
         (
             samples.t,

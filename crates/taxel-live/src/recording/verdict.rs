@@ -8,8 +8,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use taxel_core::wire::StepBack;
+
 use super::damage::{
-    ADDRESS, ANEW, BOARD_DROPPED, BOARD_RESET, EVENTS_DROPPED, Found, MISSING, OTHER_BOARD, REPAIRED, REPEATED,
+    ADDRESS, ANEW, BOARD_DROPPED, BOARD_RESET, EVENTS_DROPPED, Found, IN_NO_LINE, MISSING, OTHER_BOARD, OVERTAKEN,
+    REPAIRED, REPEATED, UNFINISHED_LINES,
 };
 use super::topic::Topic;
 use crate::bridged::Bridged;
@@ -61,6 +64,8 @@ pub struct Verdict {
     pub noted: BTreeMap<String, u64>,
     /// The board's time after which times are doubtful, us.
     pub doubtful_after_us: Option<i64>,
+    /// Where times step back, in the order of arrival; of many the largest steps.
+    pub steps_back: Vec<StepBack>,
     /// Of a stretch of a recording the name of the whole, whose losses these are: several stretches have them once.
     pub stretch_of: Option<String>,
     /// The verdicts of the recordings or sources that this one is made of, by name.
@@ -88,6 +93,8 @@ struct Whole {
     #[serde(default)]
     doubtful_after_us: Option<i64>,
     #[serde(default)]
+    steps_back: Vec<StepBack>,
+    #[serde(default)]
     stretch_of: Option<String>,
     #[serde(default)]
     parts: Vec<(String, Verdict)>,
@@ -97,8 +104,10 @@ impl From<Stored> for Verdict {
     fn from(stored: Stored) -> Self {
         match stored {
             Stored::Line(line) => Self::of_line(&line),
-            Stored::Whole(Whole { status, text, lost, damaged, noted, doubtful_after_us, stretch_of, parts }) => {
-                Self { status, text, lost, damaged, noted, doubtful_after_us, stretch_of, parts }
+            Stored::Whole(whole) => {
+                let Whole { status, text, lost, damaged, noted, doubtful_after_us, steps_back, stretch_of, parts } =
+                    whole;
+                Self { status, text, lost, damaged, noted, doubtful_after_us, steps_back, stretch_of, parts }
             }
         }
     }
@@ -135,6 +144,9 @@ pub struct Counts {
     pub sum: Option<u32>,
     /// What the decoder could not use of the bytes received, by cause; see [`damage`](super::damage::damage).
     pub decoder: BTreeMap<String, u64>,
+    /// Where times step back.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub steps_back: Vec<StepBack>,
     /// What was lost between the computer that received the datagrams and this one, if they are different.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bridged: Option<Box<Bridged>>,
@@ -295,12 +307,14 @@ impl Verdict {
                 "not_recorded",
                 "datagrams received but not recorded",
             ),
+            (of_board(IN_NO_LINE), IN_NO_LINE, "bytes in no line of numbers"),
             (bridged.missing, "lost_between_computers", "datagrams lost between the computers"),
             (bridged.dropped, "dropped_by_other_computer", "datagrams dropped by the other computer"),
             (bridged.dropped_by_kernel, "dropped_by_other_kernel", "messages dropped by the other computer's kernel"),
         ];
         // The board's numbers also skip what was dropped after it was sent, which is counted above.
-        let behind: u64 = dropped.iter().filter(|(_, cause, _)| *cause != "not_recorded").map(|(n, ..)| n).sum();
+        let not_sent = ["not_recorded", IN_NO_LINE];
+        let behind: u64 = dropped.iter().filter(|(_, cause, _)| !not_sent.contains(cause)).map(|(n, ..)| n).sum();
         let missing = counts.missing.unwrap_or(0);
         // Which of them were dropped is not known where more was dropped than is missing (datagrams that came again, or came
         // after the last number), or more datagrams than messages.
@@ -322,6 +336,12 @@ impl Verdict {
             words.push(numbered(n, what));
         }
         if words.is_empty() && counts.missing.is_none() && counts.received + counts.recorded == 0 {
+            let unfinished = of_board(UNFINISHED_LINES);
+            if unfinished > 0 {
+                let text = format!("nothing arrived; {}", numbered(unfinished, OF_UNFINISHED_LINES));
+                let noted = [(UNFINISHED_LINES.to_owned(), unfinished)].into();
+                return Self { noted, ..Self::nothing_arrived(text) };
+            }
             return Self::nothing_arrived("nothing arrived".to_owned());
         }
         // After a reset the board's numbers begin anew: what was lost just before or after it they do not show.
@@ -350,6 +370,8 @@ impl Verdict {
             (of_board(BOARD_RESET), BOARD_RESET, "resets of the board"),
             (of_board(ANEW), ANEW, "restarts of its clock"),
             (of_board(MISSING), MISSING, "missing values"),
+            (of_board(OVERTAKEN), OVERTAKEN, "events overtaken by later ones"),
+            (of_board(UNFINISHED_LINES), UNFINISHED_LINES, OF_UNFINISHED_LINES),
             (of_board(ADDRESS), ADDRESS, "changes of the sender's address"),
         ] {
             if n > 0 {
@@ -367,12 +389,31 @@ impl Verdict {
             ));
         }
         verdict.text = pieces.join("; ");
-        verdict
+        verdict.stepped(counts.steps_back.clone())
+    }
+
+    /// The verdict where times also step back there.
+    pub(crate) fn stepped(mut self, steps: Vec<StepBack>) -> Self {
+        if !steps.is_empty() {
+            self.change(|own| own.steps_back.extend(steps));
+        }
+        self
     }
 
     /// Adds what a decoder could not use; returns its line.
     fn damage_of(&mut self, decoder: &BTreeMap<String, u64>) -> Option<String> {
-        let no_damage = [BOARD_DROPPED, EVENTS_DROPPED, BOARD_RESET, REPAIRED, ANEW, MISSING, ADDRESS];
+        let no_damage = [
+            BOARD_DROPPED,
+            EVENTS_DROPPED,
+            BOARD_RESET,
+            REPAIRED,
+            ANEW,
+            MISSING,
+            ADDRESS,
+            OVERTAKEN,
+            IN_NO_LINE,
+            UNFINISHED_LINES,
+        ];
         let found = || decoder.iter().filter(|(cause, n)| **n > 0 && !no_damage.contains(&cause.as_str()));
         for (cause, n) in found() {
             // Of version 2 each is decoded once.
@@ -430,6 +471,11 @@ impl Verdict {
                 *sum -= least.unwrap_or(0) * (parts.len() as u64).saturating_sub(1);
             }
         }
+        for k in (1..whole.steps_back.len()).rev() {
+            if whole.steps_back[..k].contains(&whole.steps_back[k]) {
+                whole.steps_back.remove(k);
+            }
+        }
         whole.stretch_of = parts.into_iter().find_map(|(_, part)| part.stretch_of);
         whole
     }
@@ -461,6 +507,7 @@ impl Verdict {
         whole.change(|own| {
             // The earliest of those that there are.
             own.doubtful_after_us = named.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
+            own.steps_back = named.iter().flat_map(|(_, part)| part.steps_back.clone()).collect();
             own.parts = named;
         });
         whole
@@ -468,8 +515,9 @@ impl Verdict {
 
     /// The verdict on the recording whose times are later by so many us.
     fn later(mut self, us: i64) -> Self {
-        if us != 0 && self.doubtful_after_us.is_some() {
+        if us != 0 && (self.doubtful_after_us.is_some() || !self.steps_back.is_empty()) {
             self.change(|own| {
+                own.steps_back.iter_mut().for_each(|step| step.after_us = step.after_us.saturating_add(us));
                 own.parts.iter_mut().for_each(|(_, part)| *part = std::mem::take(part).later(us));
                 own.doubtful_after_us = own.doubtful_after_us.map(|after| after.saturating_add(us));
             });
@@ -477,7 +525,7 @@ impl Verdict {
         self
     }
 
-    /// Changes the parts and the time after which times are doubtful, and what the text says of them.
+    /// Changes the parts, the steps back and the time after which times are doubtful, and what the text says of them.
     fn change(&mut self, change: impl FnOnce(&mut Self)) {
         let own = self.text.strip_suffix(&self.end()).unwrap_or(&self.text).trim_end_matches("; ").to_owned();
         change(self);
@@ -485,7 +533,8 @@ impl Verdict {
         self.text = format!("{own}{between}{}", self.end());
     }
 
-    /// What the text ends with: the texts of all parts, and the time after which times are doubtful unless a part says it.
+    /// What the text ends with: the texts of all parts, and the steps back and the time after which times are doubtful unless a
+    /// part says them.
     fn end(&self) -> String {
         let said = self.parts.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
         let own = self.doubtful_after_us.filter(|_| self.doubtful_after_us != said);
@@ -495,7 +544,12 @@ impl Verdict {
             true => "all times are doubtful".to_owned(),
             false => format!("times after {after} us are doubtful"),
         });
-        parts.chain(doubt).collect::<Vec<_>>().join("; ")
+        let largest = self.steps_back.iter().rev().max_by_key(|step| step.by_us).filter(|_| self.parts.is_empty());
+        let back = largest.map(|StepBack { after_us, by_us, .. }| {
+            let times = counted(self.steps_back.len() as u64, "time");
+            format!("times step back {times}, at most by {by_us} us after {after_us} us")
+        });
+        parts.chain(back).chain(doubt).collect::<Vec<_>>().join("; ")
     }
 
     /// The verdict whose line is all that an earlier version wrote: its status, without numbers.
@@ -554,6 +608,8 @@ fn numbered(n: u64, plural: &str) -> String {
     format!("{n} {}", words.join(" "))
 }
 
+/// What the text says of the bytes of lines that have no end or no beginning.
+const OF_UNFINISHED_LINES: &str = "bytes of unfinished lines";
 /// Of a recording that began while its board was received: the jumps of time before it, since which all times are doubtful.
 pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
 /// Of a file without its end: what it lacks by its arrival numbers.

@@ -12,6 +12,7 @@ mod words;
 use super::checksum::split;
 use super::counts::{Counts, Status};
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Refused};
+use crate::events::FARTHEST_BACK_US;
 use crate::vectors::Instructions;
 use crate::wire::columns::{Columns, Laid, Room, Table};
 use crate::wire::silence::silence;
@@ -25,6 +26,10 @@ pub use words::stream_rows;
 
 /// Number of repeated datagrams in turn after which a session has begun again.
 const IN_TURN: u32 = 32;
+
+/// A board that was reset was silent for at least so long before, us, where the host's clock is known. While a board sends,
+/// its heartbeats come more often.
+const SILENT_US: i64 = 50_000;
 
 /// Number of sessions that are kept, for datagrams that arrive after a reset.
 const SESSIONS: usize = 4;
@@ -322,10 +327,16 @@ impl Decoder {
         if let Some(which) = self.sessions.iter().rposition(|session| session.number == header.session) {
             let session = &self.sessions[which];
             // Two successive resets drew the same number: the session begins again. Its first datagrams are told from ones
-            // that a network repeats by their number, or as so many of them come in turn long after those.
-            let behind = session.highest - session.number_of(header.sequence);
-            let in_turn = self.again.0 == session.number_of(header.sequence) && self.again.1 >= IN_TURN;
-            let again = (behind >= WINDOW as i64 || (in_turn && behind >= 8 * i64::from(IN_TURN)))
+            // that a network repeats by their number, or as so many of them come in turn long after those; and one of which the
+            // number never came from one that was delayed, as it is farther behind than the network reorders.
+            let number = session.number_of(header.sequence);
+            let behind = session.highest - number;
+            let in_turn = self.again.0 == number && self.again.1 >= IN_TURN;
+            let silent = arrived.zip(self.last_arrival).is_none_or(|(now, (then, _))| silence(then, now) >= SILENT_US);
+            let far = session.latest.saturating_sub(header.base) > FARTHEST_BACK_US.unsigned_abs();
+            let again = (behind >= WINDOW as i64
+                || (in_turn && behind >= 8 * i64::from(IN_TURN))
+                || (behind > 0 && far && silent && !session.has(number)))
                 && header.sequence < 1024
                 && header.base < session.latest;
             if !again {

@@ -51,7 +51,7 @@ impl Verdict {
                 };
                 let counts = match converted {
                     Some(_) => Some(Counts { converted, ..so_far.unwrap_or_default() }),
-                    None => so_far.filter(|counts| counts.received > 0),
+                    None => so_far.filter(|counts| counts.received > 0 || counts.decoder.values().any(|n| *n > 0)),
                 };
                 no_counts = counts.is_none();
                 // The file may hold more than its counts, which are saved now and then; where parts were skipped,
@@ -157,6 +157,9 @@ impl Verdict {
                 verdict.damaged.entry(cause.clone()).or_insert(*n);
             }
         }
+        if verdict.steps_back.is_empty() && !is_converted {
+            verdict = verdict.stepped(decoded.steps_back);
+        }
         verdict.doubtful(decoded.doubtful_after_us)
     }
 }
@@ -170,6 +173,9 @@ fn so_far_with(mut counts: Counts, found: Found, skipped_numbers: u64, before_fi
     counts.decoder = counts.decoder_with(&found.damage);
     // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
     // among the board's numbers too.
+    if !found.steps_back.is_empty() {
+        counts.steps_back = found.steps_back;
+    }
     let missing =
         found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue + counts.left_out);
     let knows = counts.missing.is_some() && !found.unnumbered;

@@ -71,6 +71,12 @@ impl Session {
         self.number == header.session && header.sequence == (self.highest as u32).wrapping_add(1)
     }
 
+    /// Whether the datagram of a number was received: one within the window, and at most the highest.
+    pub(super) fn has(&self, number: i64) -> bool {
+        let (word, bit) = place(number);
+        self.seen[word] & bit != 0
+    }
+
     #[inline]
     pub(super) fn missing(&self) -> u64 {
         (self.highest - self.lowest + 1) as u64 - self.received

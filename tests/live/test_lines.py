@@ -1,0 +1,148 @@
+"""Sources of lines: each byte that comes is in a line, or counted: live, in the recording and by ``taxel record``."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from loopback import until
+from shell import call
+
+import taxel
+from taxel.live import Live
+
+LOOPBACK = "127.0.0.1"
+#: Longest line, bytes.
+LONGEST = 1 << 16
+
+
+@contextlib.contextmanager
+def writing(place: Path, pieces: list[bytes]) -> Iterator[threading.Event]:
+    """Write pieces into a named pipe, in a thread that closes it at the end; the event is set when all are written."""
+    os.mkfifo(place)
+    written, over = threading.Event(), threading.Event()
+
+    def write() -> None:
+        with place.open("wb", buffering=0) as pipe:
+            for piece in pieces:
+                view = memoryview(piece)
+                while view:
+                    view = view[pipe.write(view) :]
+            written.set()
+            over.wait(30)
+
+    thread = threading.Thread(target=write, daemon=True)
+    thread.start()
+    try:
+        yield written
+    finally:
+        over.set()
+        thread.join(10)
+
+
+def numbers_of(pieces: list[bytes]) -> tuple[int, int, int, int]:
+    """Return the number of lines, of those that are no two numbers, of bytes in no line and of unfinished lines."""
+    *whole, last = b"".join(pieces).replace(b"\r", b"\n").split(b"\n")
+    lines = [line for line in whole if line.strip()]
+    beyond = sum(max(0, len(line) - LONGEST) for line in [*lines, last])
+    cut = [line for line in [*lines, last] if len(line) > LONGEST]
+    good = [line for line in lines if line not in cut and _is_pair(line)]
+    total = len([line for line in lines if line not in cut]) + len(cut)
+    return total, total - len(good), beyond, 0 if last in cut else len(last)
+
+
+def _is_pair(line: bytes) -> bool:
+    try:
+        return len([float(field) for field in line.decode().split(",")]) == 2
+    except ValueError:
+        return False
+
+
+LONG = b"7" * 300_000
+PIPES = {
+    "nothing but one line that does not end": [b"x" * 3_000_000],
+    "such a line, and then good ones": [b"x" * 3_000_000, b"\n1,2\n3,4\n"],
+    "garbage after good lines": [b"1,2\n3,4\n", bytes(range(256)) * 30, b"\n5,6\n"],
+    "a long line in the middle": [b"1,2\n", b"3,", LONG, b"\n5,6\n"],
+    "a long line that could be numbers": [b"1,2\n3,4", b" " * 100_000, b"\n5,6\n"],
+    "a last line without an end": [b"1,2\n3,4\n5,"],
+    "NUL bytes": [b"1,2\n\0\0\0,3\n3\0,4\n5,6\n"],
+    "no UTF-8": [b"1,2\n\xff\xfe,3\n5,6\n"],
+    "carriage returns alone": [b"1,2\r3,4\r5,6\r"],
+    "carriage returns and line feeds": [b"1,2\r\n3,4\r\n\r\n5,6\r\n"],
+    "a line of the longest length, and two bytes more": [b"9" * LONGEST, b"\n", b"9" * (LONGEST + 2), b"\n1,2\n"],
+}
+
+
+@pytest.mark.parametrize("name", PIPES)
+def test_each_byte_of_a_pipe_is_in_a_line_or_counted(tmp_path: Path, name: str) -> None:
+    pieces = PIPES[name]
+    lines, strange, beyond, unfinished = numbers_of(pieces)
+    path, place = tmp_path / "a.mcap", tmp_path / "pipe"
+    sources = {"imu": f"pipe:{place},columns=a:b"}
+    with writing(place, pieces) as written, Live(0, host=LOOPBACK, record=path, sources=sources) as live:
+        assert written.wait(20)
+        until(lambda: counts_of(live)["lines"] == lines and counts_of(live)["bytes_in_no_line"] == beyond)
+        summary = live.stop()
+    counts = summary.counters["sources"]["imu"]
+    assert (counts["lines"], counts["strange"]) == (lines, strange)
+    assert (counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (beyond, unfinished)
+    verdict = summary.verdict.parts["imu"]
+    assert verdict.lost == ({"bytes_in_no_line": beyond} if beyond else {})
+    assert verdict.damaged.get("lines_that_could_not_be_read", 0) == strange
+    assert verdict.noted.get("bytes_of_unfinished_lines", 0) == unfinished
+    assert (f"{beyond} bytes in no line of numbers" in verdict) == bool(beyond)
+    assert verdict.status == ("lost" if beyond else "damaged" if strange else "complete after arrival")
+    recording = taxel.open(path).sources["imu"]
+    assert recording.verdict.to_dict() == verdict.to_dict()
+    assert recording.counts["bytes_in_no_line"] == beyond
+    assert recording.counts["lines_that_could_not_be_read"] == strange
+    assert len(recording.frames()) == lines - strange
+    # What a line of 3 MB takes in the file is bounded, too.
+    assert path.stat().st_size < 1_500_000
+
+
+def counts_of(live: Live) -> dict[str, int]:
+    counts: dict[str, int] = live.counters["sources"]["imu"]
+    return counts
+
+
+@pytest.mark.parametrize("garbage", [b"x" * 5_000_000, b"\0\1\2\n" * 1000, b"\xff" * 70_000])
+def test_what_comes_before_the_first_line_is_counted_and_names_no_column(tmp_path: Path, capsys, garbage) -> None:
+    path, place = tmp_path / "a.mcap", tmp_path / "pipe"
+    with writing(place, [garbage, b"\n1,2\n3,4\n"]):
+        source = ("--source", f"imu=pipe:{place}", "--seconds", "1", "--json")
+        code, out, _ = call(capsys, "record", path, "--port", "0", "--host", LOOPBACK, *source)
+    summary = json.loads(out)
+    counts = summary["counters"]["sources"]["imu"]
+    assert (code, counts["lines"], counts["strange"]) == (3, 2, 0)
+    assert counts["bytes_in_no_line"] == len(garbage) - garbage.count(b"\n")
+    assert summary["verdict_details"]["parts"]["imu"]["lost"] == {"bytes_in_no_line": counts["bytes_in_no_line"]}
+    assert taxel.open(path).sources["imu"].columns == ["column_0", "column_1"]
+    code, out, _ = call(capsys, "info", path)
+    assert f"{counts['bytes_in_no_line']} bytes in no line of numbers" in out.replace("\n", " ")
+
+
+def test_without_a_first_line_the_error_says_how_much_came(tmp_path: Path) -> None:
+    place = tmp_path / "pipe"
+    with (
+        writing(place, [b"x" * 200_000]),
+        pytest.raises(taxel.ProblemError, match="no line in the 200000 bytes that came"),
+    ):
+        Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources={"imu": f"pipe:{place}"})
+
+
+def test_of_a_pipe_that_closes_at_once_nothing_arrived(tmp_path: Path) -> None:
+    place = tmp_path / "pipe"
+    sources = {"imu": f"pipe:{place},columns=a"}
+    with writing(place, []) as written, Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources=sources) as live:
+        assert written.wait(5)
+        summary = live.stop()
+    counts = summary.counters["sources"]["imu"]
+    assert (counts["lines"], counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (0, 0, 0)
+    assert (summary.verdict.parts["imu"], summary.verdict.parts["imu"].status) == ("nothing arrived", "nothing arrived")

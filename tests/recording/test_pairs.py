@@ -1,0 +1,148 @@
+"""From every reader to every writer: what a recording holds is there again, or listed as what the file cannot hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from formats import bags, making
+
+import taxel
+from taxel.formats import FORMATS
+from taxel.recording.contents import FIELDS, Contents
+from taxel.recording.fates import CHANGED, FATES, LINES
+
+from .making import some_frames
+from .test_fates import KINDS, write
+
+#: Fields of the table itself and of how it is stored: they have tests of their own.
+STORED = {
+    "path", "name", "kind", "label", "events", "frames", "stretch", "calibration", "clock", "datagrams", "payload",
+    "version_2", "differences", "origin_us", "unmarked", "samples", "sources", "lost",
+}  # fmt: skip
+
+
+def bag(folder: Path) -> taxel.Recording:
+    """A bag with a message of another length, and one whose stamp steps back."""
+    every = [
+        ("/hand", bags.HAND, 10.0 * k + 2, 10.0 * (k if k != 6 else -5), bags.hand([k, 1.0] + [5.0] * (k == 3), [2.0]))
+        for k in range(12)
+    ]
+    opened = taxel.open(
+        bags.write(folder / "grasp.bag", [*every, ("/other", bags.HAND, 5, 5, bags.hand([1], [2]))]),
+        topic="/hand",
+        field="thumb",
+    )
+    assert opened.counts["messages_of_another_length"] == 1
+    return opened
+
+
+def stream(folder: Path) -> taxel.Recording:
+    """A recording of lines of which one could not be read, and bytes that were in no line."""
+    lines = folder / "lines"
+    lines.write_bytes(b"1,2\n3,4\nnonsense\n" + b"7" * 100_000 + b"\n5,6\n7")
+    with taxel.live.Live(
+        0, host="127.0.0.1", record=folder / "lines.mcap", sources={"imu": f"pipe:{lines},columns=a:b"}
+    ) as live:
+        while live.counters["sources"]["imu"]["lines"] < 5:
+            live.next(0.01)
+        live.stop()
+    return taxel.open(folder / "lines.mcap").sources["imu"]
+
+
+def cut(folder: Path) -> taxel.Recording:
+    """A recording that was killed, and whose file is damaged."""
+    whole = write(folder / "whole.mcap").read_bytes()
+    (folder / "cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    return taxel.open(folder / "cut.mcap")
+
+
+def merged(folder: Path) -> taxel.Recording:
+    """Two recordings that differ in their counts."""
+    return taxel.merge([taxel.open(write(folder / f"{k}.mcap", k, 200 + k)) for k in range(2)], gap_us=1000)
+
+
+def converted(kind: str, frames: bool) -> Callable[[Path], taxel.Recording]:
+    def make(folder: Path) -> taxel.Recording:
+        of: Any = some_frames() if frames else taxel.open(write(folder / "of.mcap"))
+        taxel.convert(of, folder / f"from{kind}")
+        return taxel.open(folder / f"from{kind}")
+
+    return make
+
+
+def of_format(name: str) -> Callable[[Path], taxel.Recording]:
+    def make(folder: Path) -> taxel.Recording:
+        opened = taxel.open(getattr(making, f"write_{name}")(folder))
+        return opened if isinstance(opened, taxel.Recording) else next(iter(opened))
+
+    return make
+
+
+READERS: dict[str, Callable[[Path], taxel.Recording]] = {
+    "bag": bag,
+    "stream": stream,
+    "cut": cut,
+    "merged": merged,
+    "as recorded": lambda folder: taxel.open(write(folder / "of.mcap")),
+    "a part by time": lambda folder: taxel.open(write(folder / "of.mcap")).between(10_000, 200_000),
+    "on the host's clock": lambda folder: taxel.open(write(folder / "of.mcap")).on_clock("host"),
+    **{f"events{kind}": converted(kind, False) for kind in KINDS},
+    **{f"pictures{kind}": converted(kind, True) for kind in KINDS if kind != ".lsa"},
+    **{name: of_format(name) for name in FORMATS},
+}
+
+
+def same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return a is not None and b is not None and np.array_equal(a, b)
+    return bool(a == b)
+
+
+def unsaid(before: Contents, after: Contents, kind: str, said: list[str]) -> list[str]:
+    """Return the fields that are neither there again nor said to be lost."""
+    missing = []
+    for name in set(FIELDS) - STORED:
+        if not before.holds(name) or same(getattr(before, name), getattr(after, name)):
+            continue
+        line = LINES.get(name)
+        told = [] if line is None or FATES[kind][name] == CHANGED else line(before, kind)
+        told = [told] if isinstance(told, str) else told
+        if told and set(told) <= set(said):
+            continue
+        if name == "verdict" and "what was received and lost, by cause" in said:
+            continue
+        missing.append(name)
+    return sorted(missing)
+
+
+#: What a conversion sets anew, by kind: each is said in other words, or more is there than before.
+ANEW: dict[str, Callable[[Contents, Contents, list[str]], bool]] = {
+    "remarks": lambda before, after, _: set(before.remarks) <= set(after.remarks),
+    "array": lambda before, _, said: any(line.startswith(("the sensor", "the name of the sensor")) for line in said),
+    "truncated": lambda *_: "that its end is missing" in _[2],
+    "rebuilt": lambda *_: "what reading had to put up with" in _[2],
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("reader", READERS)
+def test_what_a_recording_holds_is_there_again_or_said(tmp_path: Path, reader: str, kind: str) -> None:
+    recording = READERS[reader](tmp_path)
+    if kind == ".lsa" and not recording.has_events:
+        with pytest.raises(taxel.ProblemError, match="holds events and no pictures"):
+            taxel.convert(recording, tmp_path / f"new{kind}")
+        return
+    said = taxel.convert(recording, tmp_path / f"new{kind}")
+    again = taxel.open(tmp_path / f"new{kind}")
+    before, after = recording._contents, again._contents
+    missing = unsaid(before, after, kind, said)
+    assert [name for name in missing if name not in ANEW or not ANEW[name](before, after, said)] == []
+    if kind in (".mcap", ".npz", ".h5"):
+        assert again.counts == (recording.counts or again.counts)
+        if before.verdict is not None:
+            assert again.verdict.to_dict() == recording.verdict.to_dict()
+        assert list(again.lost) == said
