@@ -295,7 +295,7 @@ NO_NUMBER = {
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.usefixtures("somewhere")
-@pytest.mark.parametrize("name", set(SOUND) - set(NO_NUMBER))
+@pytest.mark.parametrize("name", [name for name in SOUND if name not in NO_NUMBER])
 def test_numbers_give_numbers(name: str) -> None:
     """Finite arguments, however large or small, are refused or give a result without NaN, where the sound call has."""
     faults = []
