@@ -14,7 +14,7 @@ from taxel._base.documents import read_text
 from taxel._base.limits import TEXT, unpacked
 from taxel._core import FormatError
 
-__all__ = ["HeaderTable", "text_of"]
+__all__ = ["HeaderTable", "lines_of", "text_of"]
 
 #: The names of other separators than the comma, for errors.
 _PARTED = {";": "semicolons", "\t": "tabs"}
@@ -178,5 +178,9 @@ def text_of(path: Path) -> list[str]:
     """
     text = read_text(path, TEXT)
     unpacked(str(path), _OBJECTS * len(text))
-    # Other line ends than \n and \r, as U+2028, are part of a cell.
+    return lines_of(text)
+
+
+def lines_of(text: str) -> list[str]:
+    """Return the lines of a text with their ends, a line feed or a carriage return; others, as U+2028, are part of a cell."""
     return list(io.StringIO(text, newline=""))

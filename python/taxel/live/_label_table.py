@@ -29,7 +29,8 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base.files import try_whole, write_whole
-from taxel._core import FormatError, ProblemError
+from taxel._base.header_table import lines_of
+from taxel._core import FormatError, ProblemError, open_regular
 from taxel.labels import Note, rows_of, text_with
 from taxel.live._label_join import Acknowledged, Conflict, Edit, Joined, conflict_of, fold, join, minus, settled
 
@@ -93,7 +94,7 @@ class _File:
     def read(cls, place: Path, own: frozenset[str], *, final: bool) -> _File:
         """Read a table; `final` if it is not waited for any longer."""
         try:
-            descriptor = os.open(place, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+            descriptor = open_regular(place)
         except FileNotFoundError:
             return cls(place, own, None, None, (), ())
         try:
@@ -104,8 +105,6 @@ class _File:
 
     @classmethod
     def _of(cls, place: Path, own: frozenset[str], descriptor: int, *, final: bool) -> _File:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise FormatError(f"{place}: is no regular file")
         text = _bytes_of(descriptor)
         age_s = time.time() - os.fstat(descriptor).st_mtime
         try:
@@ -150,7 +149,7 @@ def _bytes_of(descriptor: int) -> bytes:
 
 def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
     try:
-        lines = text.decode("utf-8-sig").splitlines(keepends=True)
+        lines = lines_of(text.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise FormatError(f"{place}: not a table of text: {error}") from None
     rows, others = rows_of(place, lines)
@@ -267,12 +266,10 @@ def _acknowledged(place: Path, file: _File) -> Acknowledged:
     """
     beside = _state_place(place)
     try:
-        descriptor = os.open(beside, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = open_regular(beside)
     except FileNotFoundError:
         return Acknowledged()
     try:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise FormatError(f"{beside}: is no regular file")
         saved = json.loads(_bytes_of(descriptor))
         known = _from_json(saved["acknowledged"])
         if saved["next"] is None or _digest(file.text) == saved["before"]:
