@@ -182,5 +182,5 @@ def text_of(path: Path) -> list[str]:
 
 
 def lines_of(text: str) -> list[str]:
-    """Return the lines of a text with their ends, a line feed or a carriage return; others, as U+2028, are part of a cell."""
+    """Return lines with their ends, a line feed or a carriage return; U+2028 and others are part of a cell."""
     return list(io.StringIO(text, newline=""))
