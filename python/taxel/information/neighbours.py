@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import finite_numbers, whole
+from taxel._base.arguments import finite_numbers, numbers, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.dual import gram_matrix
@@ -78,10 +78,11 @@ class NearestNeighbours(Classifier):
         Parameters
         ----------
         distances : float64, shape (trials, training trials), in any unit
+            Infinity where a training trial is no neighbour of a trial, as of itself.
 
         Raises
         ------
-        ProblemError : not fitted, or another number of training trials
+        ProblemError : not fitted, another number of training trials, or NaN
 
         Examples
         --------
@@ -91,7 +92,8 @@ class NearestNeighbours(Classifier):
         ['b']
         """
         row = self._fitted("row_")
-        across = finite_numbers("distances", distances)
+        across = numbers("distances", distances, np.float64)
+        finite_numbers("distances", np.where(across == np.inf, 0.0, across))
         if across.ndim != 2 or across.shape[1] != len(row):
             raise ProblemError(f"distances has shape {across.shape}: must be (trials, {len(row)})")
         near = np.argsort(across, axis=1, kind="stable")[:, : self.neighbours]

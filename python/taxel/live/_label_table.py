@@ -162,7 +162,7 @@ def _digest(text: bytes | None) -> str:
 
 @contextlib.contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder's tables.
+    """Hold the lock of a folder's tables, which is made where there is none.
 
     Raises
     ------
@@ -354,9 +354,10 @@ class LabelTables:
         place = Path(os.path.realpath(table))
         for final in _attempts():
             with contextlib.ExitStack() as held:
-                # Where there can be no lock, no window writes.
-                with contextlib.suppress(OSError):
-                    held.enter_context(_locked(place.parent))
+                # Where there is no lock, no window has written; a folder that is only looked at gets none.
+                if (place.parent / _LOCK).exists():
+                    with contextlib.suppress(OSError):
+                        held.enter_context(_locked(place.parent))
                 try:
                     file = _File.read(place, own, final=final)
                 except _BeingWritten:
