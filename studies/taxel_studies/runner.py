@@ -11,6 +11,7 @@ import json
 import logging
 import os
 import signal
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -194,7 +195,7 @@ class Workers:
                 with _ray(self.jobs, self.scheduler) as jobs, joblib.parallel_config(backend="ray"):
                     yield joblib.Parallel(n_jobs=jobs, batch_size=1)
             else:
-                # Workers of Dask and Ray end with their parent by themselves.
+                # Workers of Dask and Ray end with their parent by themselves; helpers of a killed Ray may stay.
                 watch: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
                 try:
                     yield joblib.Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1, **watch)
@@ -254,23 +255,50 @@ def _dask(jobs: int, scheduler: str | None) -> Iterator[None]:
 
 
 @contextmanager
+def _in_folder(folder: str) -> Iterator[None]:
+    """Run a block in another current folder."""
+    here = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(here)
+
+
+@contextmanager
+def _with_handler(number: signal.Signals) -> Iterator[None]:
+    """Keep the handler of a signal, which Ray replaces."""
+    handler = signal.getsignal(number)
+    try:
+        yield
+    finally:
+        if handler is not None and threading.current_thread() is threading.main_thread():
+            signal.signal(number, handler)
+
+
+@contextmanager
 def _ray(jobs: int, scheduler: str | None) -> Iterator[int]:
+    # Else a call after its end, as after Ctrl-C, starts another Ray.
+    os.environ["RAY_ENABLE_AUTO_CONNECT"] = "0"
     import ray  # noqa: PLC0415  an extra
     from ray.util.joblib import register_ray  # noqa: PLC0415
 
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
-    try:
-        if scheduler is None:
-            ray.init(num_cpus=jobs, include_dashboard=False, _node_ip_address="127.0.0.1", **quiet)
-        else:
-            ray.init(address=scheduler, **quiet)
-    except (ConnectionError, ValueError, RuntimeError) as error:
-        raise DeviceError(f"Ray does not start: {' '.join(str(error).split())}") from None
-    try:
-        register_ray()  # type: ignore[no-untyped-call]
-        yield int(ray.cluster_resources().get("CPU", jobs))  # type: ignore[no-untyped-call]
-    finally:
-        ray.shutdown()
+    # Ray adds the current folder to the path of its workers, which run there, whatever the environment says.
+    with tempfile.TemporaryDirectory() as empty:
+        try:
+            with _in_folder(empty), _with_handler(signal.SIGTERM):
+                if scheduler is None:
+                    ray.init(num_cpus=jobs, include_dashboard=False, _node_ip_address="127.0.0.1", **quiet)
+                else:
+                    ray.init(address=scheduler, **quiet)
+        except (ConnectionError, ValueError, RuntimeError) as error:
+            raise DeviceError(f"Ray does not start: {' '.join(str(error).split())}") from None
+        try:
+            register_ray()  # type: ignore[no-untyped-call]
+            yield int(ray.cluster_resources().get("CPU", jobs))  # type: ignore[no-untyped-call]
+        finally:
+            ray.shutdown()
 
 
 #: This process alone.

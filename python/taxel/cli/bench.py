@@ -282,9 +282,11 @@ def _run(file: Path, *, quick: bool) -> dict[str, Any]:
 
 
 def _changed(folder: Path) -> list[str]:
-    """Return the files of the checkout that differ from its last commit, without the results."""
+    """Return the files of the folder's checkout that differ from its last commit, without the results."""
+    # A repository can name a program that git runs to watch files.
+    git = ["git", "-c", "core.fsmonitor=false", "-C", str(folder)]
     status = subprocess.run(
-        ["git", "status", "--porcelain", "--untracked-files=no", "--", ":/", f":!{folder}/results"],
+        [*git, "status", "--porcelain", "--untracked-files=no", "--", ":/", ":!./results"],
         capture_output=True,
         text=True,
         check=False,
