@@ -156,11 +156,14 @@ def test_opening_cutting_and_listing_read_no_datagram(tmp_path: Path, monkeypatc
     class Reader:
         """Reads as the compiled one does, and notes what."""
 
-        def __init__(self, of: Any) -> None:
-            self.of = of if isinstance(of, compiled) else compiled(of)
+        def __init__(self, of: Any, *limits: Any) -> None:
+            self.of = of if isinstance(of, compiled) else compiled(of, *limits)
 
         def of_source(self, name: str) -> Reader:
             return Reader(self.of.of_source(name))
+
+        def within(self, memory: int) -> Reader:
+            return Reader(self.of.within(memory))
 
         def __getattr__(self, name: str) -> Any:
             read.append(name)
