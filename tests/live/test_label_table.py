@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import json
 import os
 import random
 import threading
@@ -158,7 +160,6 @@ def test_a_line_that_is_being_written_is_waited_for(table: Path, tables) -> None
         (b"# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
         (b'label,t_us\n"heel,1\n', "a quote opens"),
         (b"\xff\xfe", "not a table of text"),
-        (b"", "it is empty"),
     ],
 )
 def test_a_table_that_cannot_be_read_is_not_written(text: bytes, said: str, table: Path, tables) -> None:
@@ -184,6 +185,8 @@ def test_a_table_that_cannot_be_read_is_not_written(text: bytes, said: str, tabl
         (b"t_us,label,comment\n1,heel,late\n1,heel,early\n", [("heel", 1), ("heel", 1)]),
         (b"recording,label,t_us\nwalk,heel,1\nrun,heel,1\n,heel,1\n", [("heel", 1), ("heel", 1), ("heel", 1)]),
         (b"label,t_us,comment\n", []),
+        (b"", []),
+        (b"\xef\xbb\xbf\n", []),
     ],
 )
 def test_any_table_that_can_be_read_keeps_its_rows(text: bytes, kept, table: Path, tables) -> None:
@@ -265,6 +268,7 @@ def test_a_window_killed_at_any_step_leaves_its_change_whole_or_none(
     if older:
         table.write_text("label,t_us\nheel,1\nhand,8\n")
     read = tables.read(table, OWN)
+    assert not [file for file in table.parent.iterdir() if file.suffix == ".new"]
     before = {("heel", 1), ("toe", 2)}
     after = {"mark": before | {("ball", 3)}, "move": {("heel", 1), ("toe", 5)}}.get(request_, {("heel", 1)})
     found = set(texts(read.rows))
@@ -336,5 +340,219 @@ def test_a_link_to_a_table_stays_one_and_its_permissions_stay(tmp_path: Path, ta
 
 def test_what_is_no_regular_file_is_refused_at_once(table: Path, tables) -> None:
     os.mkfifo(table)
-    with pytest.raises(ProblemError, match="is no regular file"):
+    with pytest.raises(ProblemError, match="a named pipe; must be a file"):
         mark(tables, table, "toe", 2)
+
+
+SAVED = ".walk.notes.csv.acknowledged"
+
+
+def no_space(*_args: object) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_change_that_is_in_the_table_is_done_although_the_disk_is_full_then(table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 1)
+    put = _label_table._put
+
+    def then_full(name: str, file) -> bool:
+        done = put(name, file)
+        monkeypatch.setattr(_label_table, "_save", no_space)
+        return done
+
+    monkeypatch.setattr(_label_table, "_put", then_full)
+    mark(tables, table, "toe", 2)
+    with pytest.raises(ProblemError, match=r"^walk.notes.csv cannot be saved: no space left on device$"):
+        mark(tables, table, "ball", 3)
+    monkeypatch.undo()
+    assert sorted(held(table)) == [("heel", 1), ("toe", 2)]
+    table.write_text("label,t_us\n")
+    assert texts(LabelTables().read(table, OWN).conflict.missing) == [("heel", 1), ("toe", 2)]
+
+
+def test_a_folder_that_cannot_be_written_is_named_with_its_reason(table: Path, monkeypatch) -> None:
+    real = os.open
+
+    def refused(place, flags, *more, **how):
+        if flags & os.O_CREAT:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(place))
+        return real(place, flags, *more, **how)
+
+    monkeypatch.setattr(os, "open", refused)
+    with pytest.raises(ProblemError, match=r"^walk.notes.csv cannot be saved: permission denied$"):
+        mark(LabelTables(), table, "heel", 1)
+
+
+@pytest.mark.parametrize("code", [errno.EPERM, errno.ENOTSUP, errno.EMLINK])
+def test_a_file_system_without_hard_links_gets_its_first_label(code: int, table: Path, tables, monkeypatch) -> None:
+    def link(*_args: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(os, "link", link)
+    assert texts(mark(tables, table, "heel", 1).rows) == [("heel", 1)]
+    assert sorted(held(table)) == [("heel", 1)]
+
+
+def test_a_late_line_in_a_table_that_was_replaced_is_taken_in(table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 1)
+    clock = time.monotonic
+    with table.open("a") as hand:
+        mark(tables, table, "toe", 3)
+        tables.stamp(table)
+        monkeypatch.setattr(time, "monotonic", lambda: clock() + 10_000)
+        tables.stamp(table)
+        hand.write("hand,2\n")
+        hand.flush()
+        tables.stamp(table)
+    assert sorted(held(table)) == [("hand", 2), ("heel", 1), ("toe", 3)]
+
+
+def test_watched_tables_are_bounded(table: Path, tables, monkeypatch) -> None:
+    monkeypatch.setattr(_label_table, "_MOST_WATCHED", 3)
+    for t in range(9):
+        mark(tables, table, "heel", t)
+        tables.stamp(table)
+    assert len(tables._watched) == 3
+
+
+def test_another_recording_has_none_of_the_labels_of_a_deleted_one(table: Path, tables) -> None:
+    recording = table.with_name("walk.mcap")
+    recording.write_bytes(b"first")
+    mark(tables, table, "heel", 1)
+    # It runs: it grows.
+    recording.write_bytes(b"first and more")
+    table.unlink()
+    assert texts(tables.read(table, OWN).conflict.missing) == [("heel", 1)]
+    recording.unlink()
+    assert texts(tables.read(table, OWN).conflict.missing) == [("heel", 1)]
+    recording.write_bytes(b"another")
+    assert not tables.read(table, OWN).conflict
+    read = mark(tables, table, "toe", 2)
+    assert texts(read.rows) == [("toe", 2)]
+    assert not read.conflict
+
+
+def test_a_lock_that_is_no_file_is_refused_at_once(table: Path, tables) -> None:
+    os.mkfifo(table.with_name(".taxel-labels.lock"))
+    with pytest.raises(ProblemError, match=r"taxel-labels.lock: is no regular file"):
+        mark(tables, table, "heel", 1)
+
+
+@pytest.mark.parametrize("new", [False, True])
+def test_what_was_acknowledged_is_readable_by_those_who_may_read_the_table(new: bool, table: Path, tables) -> None:
+    if new:
+        mark(tables, table, "toe", 1)
+    else:
+        table.write_text("label,t_us\nheel,1\n")
+    table.chmod(0o600)
+    mark(tables, table, "toe", 2)
+    assert table.with_name(SAVED).stat().st_mode & 0o777 == 0o600 == table.stat().st_mode & 0o777
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        ["x", 5, "", "", None, 10**30, []],
+        ["x", 5, "", "", None, -5, []],
+        ["x", 5, "", "", None, 1e30, []],
+        ["x", float("inf"), "", "", None, 0, []],
+        ["x", True, "", "", None, 0, []],
+        ["x", None, "", "", None, 0, []],
+        ["\ud800", 5, "", "", None, 0, []],
+        ["x" * 10**6, 5, "", "", None, 0, []],
+        [["x"], 5, "", "", None, 0, []],
+        ["x", 5, 7, "", None, 0, []],
+        ["x", 5],
+    ],
+    ids=range(11),
+)
+def test_what_no_table_has_was_not_acknowledged(row, table: Path, tables) -> None:
+    saved = {"acknowledged": {"labels": [row], "deleted": [], "table": None}, "next": None}
+    table.with_name(SAVED).write_text(json.dumps(saved))
+    with pytest.raises(FormatError, match="not what taxel saved of the labels"):
+        tables.read(table, OWN)
+    with pytest.raises(FormatError, match="not what taxel saved of the labels"):
+        mark(tables, table, "toe", 1)
+    assert not table.exists()
+
+
+def test_a_huge_file_beside_a_table_is_not_read(table: Path, tables) -> None:
+    with table.with_name(SAVED).open("wb") as file:
+        file.truncate(1 << 32)
+    with pytest.raises(FormatError, match="more than 67108864 bytes"):
+        tables.read(table, OWN)
+
+
+@pytest.mark.parametrize("label", [" x ", "", "\n"])
+def test_what_a_table_cannot_hold_is_not_restored(label: str, table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    before = table.read_text()
+    saved = {"acknowledged": {"labels": [[label, 5, "", "", None, 0, []]], "deleted": [], "table": None}, "next": None}
+    table.with_name(SAVED).write_text(json.dumps(saved))
+    conflict = tables.read(table, OWN).conflict
+    with pytest.raises(ProblemError, match="nothing was saved"):
+        tables.settle(table, OWN, conflict, restore=True)
+    assert table.read_text() == before
+
+
+@pytest.mark.parametrize("by_hand", [False, True])
+def test_what_came_out_for_a_table_when_its_writer_was_killed_is_kept(by_hand: bool, table: Path, tables) -> None:
+    """The text that came out is another program's, which was quicker, or that which was read."""
+    mark(tables, table, "heel", 1)
+    child = os.fork()
+    if not child:
+        exchange = _label_table._exchange
+
+        def late(one: str, other: Path) -> bool:
+            if by_hand:
+                new = table.with_name("editor")
+                new.write_text("label,t_us\nheel,1\nhand,9\n")
+                os.replace(new, table)
+            exchange(one, other)
+            os._exit(9)
+
+        _label_table._exchange = late
+        mark(LabelTables(), table, "toe", 2)
+    os.waitpid(child, 0)
+    assert [file for file in table.parent.iterdir() if file.suffix == ".new"]
+    read = tables.read(table, OWN)
+    assert ("hand", 9) in texts(read.rows) if by_hand else texts(read.rows) == [("heel", 1), ("toe", 2)]
+    assert {("heel", 1)} <= set(texts(read.rows))
+    assert not [file for file in table.parent.iterdir() if file.suffix == ".new"]
+
+
+def test_a_conflict_is_settled_once(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    table.write_text("label,t_us\n")
+    seen = tables.read(table, OWN).conflict
+    tables.settle(table, OWN, seen, restore=True)
+    with pytest.raises(ProblemError, match="this conflict is over"):
+        LabelTables().settle(table, OWN, seen, restore=False)
+    assert sorted(held(table)) == [("heel", 1)]
+
+
+def test_a_label_moved_or_renamed_onto_an_equal_one_is_one(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    mark(tables, table, "heel", 2)
+    mark(tables, table, "toe", 1)
+    for old in (Note("heel", 2), Note("toe", 1)):
+        tables.change(table, OWN, [[Edit(old, Note("heel", 1))]])
+    assert texts(tables.read(table, OWN).rows) == [("heel", 1)]
+    table.write_text("label,t_us\n")
+    assert texts(tables.read(table, OWN).conflict.missing) == [("heel", 1)]
+
+
+def test_a_table_of_the_future_is_not_waited_for(table: Path, tables) -> None:
+    table.write_text("label,t_us\nheel,1")
+    os.utime(table, (time.time() + 10**6,) * 2)
+    begun = time.monotonic()
+    assert texts(tables.read(table, OWN).rows) == [("heel", 1)]
+    assert time.monotonic() - begun < _label_table._WHOLE_WITHIN_S
+
+
+def test_deletions_are_remembered(table: Path, tables) -> None:
+    edits = [Edit(None, Note("heel", 0)), *(Edit(Note("heel", t), Note("heel", t + 1)) for t in range(2000))]
+    tables.change(table, OWN, [edits])
+    tables.change(table, OWN, [[Edit(Note("heel", 2000), None)]])
+    table.write_text("label,t_us\nheel,0\n")
+    assert texts(tables.read(table, OWN).conflict.returned) == [("heel", 0)]

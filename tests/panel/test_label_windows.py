@@ -111,7 +111,8 @@ class Window(threading.Thread):
             if kind != "mark" and mine[old]:
                 mine[old] -= 1
             if new is not None:
-                mine[new] = mine[new] + 1 if kind != "mark" else max(1, mine[new])
+                # A label that becomes equal to another is one with it.
+                mine[new] = max(1, mine[new])
 
 
 def write_by_hand(folder, names, choose, ends, *, older):
@@ -333,7 +334,10 @@ def test_several_marks_are_one_request_that_is_done_or_not(tmp_path):
         assert table.read_text() == (
             "label,t_us,source,replaces_us\nheel,10,left,10\ntoe,15,,\nheel,20,left,20\nheel,30,left,30\n"
         )
-        assert page.ask("marks", labels=[{"label": "ball", "t_us": list(range(5000))}])["type"] == "done"
+        # Long names make a request of more than 1 MB.
+        late = list(range(LAST_US - 5000, LAST_US))
+        each = [{"label": f"{k:0200}", "t_us": [t]} for k, t in enumerate(late)]
+        assert page.ask("marks", labels=each)["type"] == "done"
         assert sum(held(table).values()) == 5004
 
 
@@ -350,3 +354,27 @@ def test_a_table_that_cannot_be_read_refuses_marks_and_is_not_written(tmp_path):
         table.write_text("label,t_us\nheel,5\n")
         assert page.ask("mark", label="toe", t_us=7)["type"] == "done"
         assert labels_of(page, name)["conflict"] is None
+
+
+def test_more_marks_than_are_read_at_a_time_are_all_done(tmp_path):
+    (name,) = walks(tmp_path)
+    with server(tmp_path, name) as (_, where), Client(where) as page:
+        opened(page, name)
+        for k in range(3000):
+            page.send(type="mark", id=k, label="heel", t_us=k)
+        assert {page.until("done")["id"] for _ in range(3000)} == set(range(3000))
+        assert sum(held(table_of(tmp_path, name)).values()) == 3000
+
+
+def test_an_emptied_table_is_one_without_labels(tmp_path):
+    (name,) = walks(tmp_path)
+    table = table_of(tmp_path, name)
+    with server(tmp_path, name) as (_, where), Client(where) as page:
+        table.write_text("")
+        assert opened(page, name)["labels"] == []
+        page.ask("mark", label="heel", t_us=5)
+        table.write_text("")
+        assert page.until("labels", labels=[])["conflict"]["missing"][0]["label"] == "heel"
+        number = labels_of(page, name)["conflict"]["conflict_id"]
+        assert page.ask("settle", conflict_id=number, keep="acknowledged")["type"] == "done"
+        assert held(table) == {("heel", 5): 1}

@@ -219,6 +219,10 @@ def test_both_versions_of_labels_are_shown_until_one_is_chosen(
         shows(page, "label-conflict", "lacks 1 label that was set on the page")
         shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: it lacks 1 label")
         page.locator("#notice-offer").click()
+        bar = page.locator("footer").bounding_box()
+        for name in ("#conflict-restore", "#conflict-accept"):
+            button = page.locator(name).bounding_box()
+            assert width > 860 or button["y"] + button["height"] <= bar["y"], "it is above the bar"
         versions = page.locator("#conflict-rows tr").all_inner_texts()
         assert [version.split("\t") for version in versions] == [
             ["heel, 3.000 s", "missing"],
@@ -234,9 +238,13 @@ def test_both_versions_of_labels_are_shown_until_one_is_chosen(
         # It lasts over a reload, and a label that is set in the meantime.
         page.reload()
         shows(page, "label-conflict", "Two versions of the labels")
+        table.write_text(older + "toe,4000000\nball,5000000\n")
+        shows(page, "conflict-rows", "ball")
+        shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: it lacks 1 label")
         page.locator("#conflict-restore" if restore else "#conflict-accept").click()
         until(lambda: page.locator("#label-conflict").is_hidden(), "it is settled")
-        kept = [3_000_000, 4_000_000] if restore else [int(older.split(",")[-1]), 4_000_000]
+        assert page.locator("#notice").is_hidden()
+        kept = [*([3_000_000, 4_000_000] if restore else [int(older.split(",")[-1]), 4_000_000]), 5_000_000]
         assert [int(row["t_us"]) for row in rows(table)] == kept
 
 

@@ -1,7 +1,7 @@
 //! Limits of what a client may send.
 
-/// Maximum size of a message, bytes.
-pub(super) const MOST_BYTES: usize = 1 << 16;
+/// Maximum size of a message, bytes: [`MOST_MARKS`] labels with names of 200 letters.
+pub(super) const MOST_BYTES: usize = 1 << 22;
 
 /// Maximum number of labels that a request marks.
 pub(super) const MOST_MARKS: usize = 5000;

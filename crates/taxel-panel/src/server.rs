@@ -273,8 +273,8 @@ async fn socket(gate: &Arc<Gate>, host: &str, request: Request) -> Response {
             upgrade
                 .protocols([PROTOCOL])
                 // A message that is a little too long gets a close frame; a far longer one is not even read to its end.
-                .max_message_size(4 * MOST_BYTES)
-                .max_frame_size(4 * MOST_BYTES)
+                .max_message_size(2 * MOST_BYTES)
+                .max_frame_size(2 * MOST_BYTES)
                 .write_buffer_size(0)
                 .on_upgrade(move |socket| session::run(socket, hub, end, slot))
         }

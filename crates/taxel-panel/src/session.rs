@@ -93,7 +93,7 @@ impl Session {
                 // The labels after it are of what it shows.
                 let _ = self.handle_own(&what, &Request(&message)).await;
             } else if is_label_request(&what) {
-                self.pending.begin(&self.hub, Value::Null, what, message, self.viewport.shown());
+                self.pending.begin(&self.hub, Value::Null, what, message, text.len(), self.viewport.shown());
             }
         }
     }
@@ -123,7 +123,7 @@ impl Session {
                 }
                 incoming = self.connection.receive(), if self.pending.has_room() => match incoming? {
                     Incoming::Text(text) if text.len() > MOST_BYTES => {
-                        return Err(Closing::With(TOO_BIG, "a message of more than 65536 bytes"));
+                        return Err(Closing::With(TOO_BIG, "a message of more than 4 MiB"));
                     }
                     Incoming::Text(text) => self.handle(&text).await?,
                     Incoming::SignOfLife => {}
@@ -246,7 +246,7 @@ impl Session {
             Some(Err(refusal)) => self.refuse(&id, &what, refusal).await,
             None => {
                 let shown = self.viewport.shown();
-                if let Some(busy) = self.pending.begin(&self.hub, id, what, message, shown) {
+                if let Some(busy) = self.pending.begin(&self.hub, id, what, message, text.len(), shown) {
                     self.count_refusal();
                     self.connection.send_json(&busy).await?;
                 }

@@ -1,7 +1,7 @@
 // A table of labels that another program has saved without what was set on the page: both versions, and the choice between them.
 
 import { make, part, write } from "./dom.js";
-import { notify } from "./notice.js";
+import { notify, silence } from "./notice.js";
 import { counted, listedTime, seconds, timeUnit } from "./words.js";
 
 /** @typedef {import("./protocol.js").ConflictRow} ConflictRow */
@@ -29,6 +29,8 @@ export class LabelConflict {
     this.block = part("label-conflict", HTMLElement);
     /** The conflict that is shown. @type {number | null} */
     this.id = null;
+    /** What the notice said of it. */
+    this.said = "";
     this.buttons = [part("conflict-restore", HTMLButtonElement), part("conflict-accept", HTMLButtonElement)];
     this.buttons.forEach((button, i) => {
       button.onclick = () => {
@@ -44,7 +46,10 @@ export class LabelConflict {
     const conflict = message?.conflict ?? null;
     this.block.hidden = conflict === null;
     if (!message || conflict === null || conflict.conflict_id === this.id) {
-      if (conflict === null) this.id = null;
+      if (conflict === null && this.id !== null) {
+        this.id = null;
+        silence(this.said);
+      }
       return;
     }
     this.id = conflict.conflict_id;
@@ -61,6 +66,7 @@ export class LabelConflict {
       ...returned.map((row) => line("deleted or changed", described(row), "returned")),
       ...added.map((row) => line("–", `${described(row)} (new)`, "new")),
     );
+    this.said = what;
     notify(what, true, { text: "Look", action: () => this.look() });
   }
 

@@ -157,10 +157,17 @@ export class Labels {
     if (t_us !== null) this.add({ label, t_us });
   }
 
+  /** Asks for a change of labels; the tab says so until there is an answer. @param {{ type: string } & Record<string, unknown>} message */
+  save(message) {
+    const answer = this.server.request(message).finally(() => this.showPlace());
+    this.showPlace();
+    return answer;
+  }
+
   /** Makes a label and chooses it. @param {{ label: string, t_us: number, source?: string, replaces_us?: number | null }} label */
   add(label) {
     const before = new Set(this.labels.map(({ label_id }) => label_id));
-    this.server.request({ type: "mark", ...label }).then(() => {
+    this.save({ type: "mark", ...label }).then(() => {
       this.chosen = this.labels.find(({ label_id }) => !before.has(label_id))?.label_id ?? this.chosen;
       this.show();
     }, this.failed);
@@ -168,7 +175,7 @@ export class Labels {
 
   /** @param {number} label_id @param {number} t_us */
   move(label_id, t_us) {
-    this.server.request({ type: "move", label_id, t_us: Math.round(t_us) }).catch((error) => {
+    this.save({ type: "move", label_id, t_us: Math.round(t_us) }).catch((error) => {
       this.failed(error);
       this.show();
     });
@@ -180,7 +187,7 @@ export class Labels {
     if (!gone) return;
     const { label, t_us, source, replaces_us } = gone;
     const undo = () => this.add({ label, t_us, ...(source ? { source } : {}), replaces_us });
-    this.server.request({ type: "delete", label_id }).then(() => notify(`deleted ${label} at ${seconds(t_us)}`, false, { text: "Undo", action: undo }), this.failed);
+    this.save({ type: "delete", label_id }).then(() => notify(`deleted ${label} at ${seconds(t_us)}`, false, { text: "Undo", action: undo }), this.failed);
   }
 
   /** @param {number} by 1: the next label after the picture's time, -1: the one before */
@@ -203,12 +210,10 @@ export class Labels {
   show() {
     const { labels } = this;
     this.offerName();
-    const table = this.file ? this.files.get(this.file) : undefined;
-    this.conflict.show(table);
+    this.conflict.show(this.file ? this.files.get(this.file) : undefined);
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
     this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";
-    const place = table ? `${table.labels.length ? "Saved" : "To be saved"} in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
-    write(part("label-place", HTMLElement), place);
+    this.showPlace();
     part("train-line", HTMLElement).hidden = !labels.length;
     // Who has made labels knows how, and needs the room.
     part("label-how", HTMLElement).hidden = labels.length > 0;
@@ -224,6 +229,13 @@ export class Labels {
     }
     for (const row of rows) row.classList.toggle("chosen", row.dataset.id === String(this.chosen));
     this.place();
+  }
+
+  /** Says where the labels are saved, or that they are being saved. */
+  showPlace() {
+    const table = this.file ? this.files.get(this.file) : undefined;
+    const how = this.server.saves ? "Saving" : table?.labels.length ? "Saved" : "To be saved";
+    write(part("label-place", HTMLElement), table ? `${how} in ${table.path}` : "Open a recording, or start one, and mark what happens in it.");
   }
 
   /** @param {Label} label @returns {HTMLElement} */
@@ -255,7 +267,7 @@ export class Labels {
   /** Asks for what was typed. @param {HTMLInputElement} input @param {{ type: string, label_id: number } & Record<string, unknown>} message @param {() => string} held */
   async change(input, message, held) {
     try {
-      await this.server.request(message);
+      await this.save(message);
       if (input.hasAttribute("aria-invalid")) silence();
       this.holds(input, held());
     } catch (error) {

@@ -62,7 +62,7 @@ const raster = new Raster(part("raster", HTMLCanvasElement));
 const channels = new Channels(part("channels", HTMLCanvasElement));
 const lanes = new Lanes();
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
-const notes = new Notes(server, player, labels);
+const notes = new Notes(player, labels);
 const training = new Training(server, player);
 const layout = new Layout(arrangement, () => {
   lanes.fit();

@@ -1,23 +1,23 @@
 // The notes that a recording holds itself: listed, shown in time, and used as labels.
 
 import { make, part, write } from "./dom.js";
-import { failed } from "./notice.js";
+import { failed, notify } from "./notice.js";
 import { seconds } from "./words.js";
 
 /** @typedef {import("./labels.js").Labels} Labels */
 /** @typedef {import("./player.js").Player} Player */
 /** @typedef {import("./protocol.js").RecordedNote} RecordedNote */
-/** @typedef {import("./server.js").Server} Server */
+
+/** How many can become labels in one request. */
+const MOST_MARKS = 5000;
 
 /** The list of notes, and the button that makes labels of those with a time. */
 export class Notes {
   /**
-   * @param {Server} server
    * @param {Player} player
    * @param {Labels} labels
    */
-  constructor(server, player, labels) {
-    this.server = server;
+  constructor(player, labels) {
     this.player = player;
     this.labels = labels;
     /** @type {RecordedNote[]} */
@@ -64,17 +64,19 @@ export class Notes {
 
   /** Makes labels of all of them, or of none. */
   async use() {
+    const { unused } = this;
+    if (unused.length > MOST_MARKS) return notify(`${unused.length} notes are more than the ${MOST_MARKS} that can become labels at a time`, true);
     this.button.disabled = true;
     /** @type {Map<string, { label: string, source?: string, t_us: number[], replaces_us: number[] }>} */
     const groups = new Map();
-    for (const { t_us, text, source } of this.unused) {
+    for (const { t_us, text, source } of unused) {
       const key = JSON.stringify([text, source]);
       const group = groups.get(key) ?? { label: text, ...(source ? { source } : {}), t_us: [], replaces_us: [] };
       groups.set(key, group);
       group.t_us.push(t_us);
       group.replaces_us.push(t_us);
     }
-    await this.server.request({ type: "marks", labels: [...groups.values()] }).catch(failed);
+    await this.labels.save({ type: "marks", labels: [...groups.values()] }).catch(failed);
     this.button.disabled = false;
     this.show();
   }

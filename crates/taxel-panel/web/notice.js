@@ -28,11 +28,12 @@ export function notify(text, bad = false, offer) {
   clearTimeout(timer);
   // Lines to be copied stay until they are closed.
   if (text.includes("\n")) return;
-  timer = setTimeout(silence, SHOWN_MS);
+  timer = setTimeout(() => silence(), SHOWN_MS);
 }
 
-/** Takes the notice away. */
-export function silence() {
+/** Takes the notice away. @param {string} [said] only if it says this */
+export function silence(said) {
+  if (said !== undefined && part("notice-text", HTMLElement).textContent !== said) return;
   part("notice", HTMLElement).hidden = true;
   write(part("notice-text", HTMLElement), "");
 }
@@ -42,4 +43,4 @@ export function failed(error) {
   notify(error instanceof Error ? error.message : String(error), true);
 }
 
-part("notice-close", HTMLButtonElement).onclick = silence;
+part("notice-close", HTMLButtonElement).onclick = () => silence();

@@ -11,12 +11,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from taxel._core import ProblemError
 from taxel.labels import Note
 
 __all__ = ["Acknowledged", "Conflict", "Edit", "Joined", "conflict_of", "fold", "join", "minus", "settled"]
 
-#: Deletions that are remembered, the newest: a label moved by keys leaves one at every step.
-_MOST_DELETED = 1000
+#: Deletions that are remembered, the newest: a label moved by keys leaves one at every step, which was in the table.
+_MOST_DELETED = 100_000
 
 #: Label, time, source, recording, and the time of the note that it replaces.
 _Key = tuple[str, int | None, str, str, int | None]
@@ -176,25 +177,29 @@ class _State:
             assert new is not None
             for removal in self.rows.removals_beside(new):
                 self._delete(removal)
-            if not self.rows.count(new):
-                self._add(new)
-            if not self.labels.count(new):
-                self.labels.add(new)
+            self._set(new)
             return new
         if not self.rows.count(old):
             if new is not None and self.rows.count(new):
                 # The same request has been carried out before.
-                if not self.labels.count(new):
-                    self.labels.add(new)
+                self._set(new)
                 return new
             raise LookupError(f"{old.text} at {old.t} is no longer in the table: another window or program changed it")
         taken = self._delete(old)
         if new is None:
             return None
         new = replace(new, others=taken.others)
-        self._add(new)
-        self.labels.add(new)
+        # A label that is moved or renamed onto an equal one is one with it.
+        self._set(new, again=_key(new) == _key(old))
         return new
+
+    def _set(self, row: Note, *, again: bool = False) -> None:
+        """Add a row that a person set to the table and the labels, unless an equal one is there; `again`: also then."""
+        self.deleted.pop(_key(row), None)
+        if again or not self.rows.count(row):
+            self._add(row)
+        if again or not self.labels.count(row):
+            self.labels.add(row)
 
     def _delete(self, row: Note) -> Note:
         missing = max(0, self.labels.count(row) - self.rows.count(row))
@@ -271,9 +276,15 @@ def settled(base: Acknowledged, theirs: Sequence[Note], conflict: Conflict, *, r
     conflict : Conflict
     restore : bool
         Whether the table gets what was acknowledged; otherwise what it lacks is acknowledged no more.
+
+    Raises
+    ------
+    ProblemError : nothing is left of the conflict
     """
     now = conflict_of(base, theirs)
     missing, returned = _common(now.missing, conflict.missing), _common(now.returned, conflict.returned)
+    if conflict and not (missing or returned):
+        raise ProblemError("this conflict is over: another window settled it, or the file has changed since")
     rows, known = tuple(theirs), base
     if restore:
         rows = (*minus(rows, returned), *missing)

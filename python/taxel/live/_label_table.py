@@ -15,10 +15,12 @@ import contextlib
 import ctypes
 import errno
 import fcntl
+import functools
 import hashlib
 import json
 import os
 import random
+import re
 import secrets
 import stat
 import threading
@@ -28,11 +30,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from taxel._base.files import try_whole, write_whole
+from taxel._base.arguments import shown
+from taxel._base.files import try_whole
 from taxel._base.header_table import lines_of
 from taxel._core import FormatError, ProblemError, open_regular
 from taxel.labels import Note, rows_of, text_with
 from taxel.live._label_join import Acknowledged, Conflict, Edit, Joined, conflict_of, fold, join, minus, settled
+from taxel.live._label_state import (
+    MOST_SAVED,
+    NOT_SAVED,
+    bytes_of,
+    from_json,
+    not_saved,
+    saved_of,
+    state_place,
+    to_json,
+    whole,
+)
 
 __all__ = ["LabelTables", "TableRead"]
 
@@ -48,12 +62,18 @@ _WRITTEN_S = 2.0
 #: How long a table that is being written is waited for, s.
 _WHOLE_WITHIN_S = 6.0
 
-#: How long, and how many, replaced tables are watched for programs that still write to them, s.
-_WATCHED_S, _MOST_WATCHED = 60.0, 256
+#: How many replaced tables are watched for programs that still write to them, and how many bytes of text.
+_MOST_WATCHED, _MOST_WATCHED_BYTES = 256, 1 << 26
+
+#: The beginning of a recording by which it is told from another one of the same name, bytes.
+_BEGINNING = 1 << 16
 
 #: RENAME_EXCHANGE of Linux (renameat2(2)), AT_FDCWD, and the answers of file systems that cannot exchange.
 _EXCHANGE, _HERE = 2, -100
 _NO_EXCHANGE = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
+
+#: Those of file systems that have no hard links.
+_NO_LINK = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS)
 
 
 class _BeingWritten(Exception):  # noqa: N818  no error
@@ -85,42 +105,44 @@ class _File:
 
     place: Path
     own: frozenset[str]
+    recording: Path | None
     descriptor: int | None
     text: bytes | None
     rows: tuple[Note, ...]
     others: tuple[str, ...]
 
     @classmethod
-    def read(cls, place: Path, own: frozenset[str], *, final: bool) -> _File:
+    def read(cls, place: Path, own: frozenset[str], recording: Path | None, *, final: bool) -> _File:
         """Read a table; `final` if it is not waited for any longer."""
         try:
             descriptor = open_regular(place)
         except FileNotFoundError:
-            return cls(place, own, None, None, (), ())
+            return cls(place, own, recording, None, None, (), ())
         try:
-            return cls._of(place, own, descriptor, final=final)
+            return cls._of(place, own, recording, descriptor, final=final)
         except BaseException:
             os.close(descriptor)
             raise
 
     @classmethod
-    def _of(cls, place: Path, own: frozenset[str], descriptor: int, *, final: bool) -> _File:
-        text = _bytes_of(descriptor)
-        age_s = time.time() - os.fstat(descriptor).st_mtime
+    def _of(cls, place: Path, own: frozenset[str], recording: Path | None, descriptor: int, *, final: bool) -> _File:
+        text = bytes_of(descriptor)
+        # A time in the future is none at which it was written.
+        is_new = 0 <= time.time() - os.fstat(descriptor).st_mtime <= _WRITTEN_S
         try:
             rows, others = _parsed(place, own, text)
         except FormatError as error:
-            if final or age_s > _WRITTEN_S:
+            if final or not is_new:
                 raise
             raise _BeingWritten(error) from None
-        if not text.endswith((b"\n", b"\r")) and not final and age_s <= _WRITTEN_S:
+        if not text.endswith((b"\n", b"\r")) and not final and is_new:
             raise _BeingWritten(None)
-        return cls(place, own, descriptor, text, rows, others)
+        return cls(place, own, recording, descriptor, text, rows, others)
 
     def again(self, *, final: bool) -> _File:
         """Read the same file again, which may have been replaced by another."""
         assert self.descriptor is not None
-        return self._of(self.place, self.own, self.descriptor, final=final)
+        return self._of(self.place, self.own, self.recording, self.descriptor, final=final)
 
     def is_current(self) -> bool:
         """Return whether the table is still the file that was read, with the same text."""
@@ -132,28 +154,30 @@ class _File:
             return False
         here = os.fstat(self.descriptor)
         same = (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino)
-        return same and _bytes_of(self.descriptor) == self.text
+        return same and bytes_of(self.descriptor) == self.text
 
     def close(self) -> None:
         if self.descriptor is not None:
             os.close(self.descriptor)
 
 
-def _bytes_of(descriptor: int) -> bytes:
-    parts, at = [], 0
-    while part := os.pread(descriptor, 1 << 20, at):
-        parts.append(part)
-        at += len(part)
-    return b"".join(parts)
-
-
 def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
     try:
-        lines = lines_of(text.decode("utf-8-sig"))
+        decoded = text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FormatError(f"{place}: not a table of text: {error}") from None
+    if not decoded.strip():
+        # An editor empties the table before it writes it.
+        return (), ()
+    lines = lines_of(decoded)
     rows, others = rows_of(place, lines)
     return tuple(replace(row, recording="") if row.recording in own else row for row in rows), others
+
+
+def _recording_of(table: Path, own: frozenset[str]) -> Path | None:
+    """Return the recording beside a table, where it is a file."""
+    places = (table.with_name(name) for name in sorted(own, key=len, reverse=True) if name)
+    return next((place for place in places if place.is_file()), None)
 
 
 def _digest(text: bytes | None) -> str:
@@ -170,13 +194,19 @@ def _locked(folder: Path) -> Iterator[None]:
     OSError : the folder cannot be written, or its file system has no locks
     """
     place, until = folder / _LOCK, time.monotonic() + _LOCK_WITHIN_S
+    # A named pipe would be waited for.
+    how = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
     while True:
         try:
-            lock = os.open(place, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+            lock = os.open(place, os.O_RDWR | os.O_CREAT | how, 0o666)
         except PermissionError:
             # That of another user.
-            lock = os.open(place, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+            if not place.exists():
+                raise
+            lock = os.open(place, os.O_RDONLY | how)
         try:
+            if not stat.S_ISREG(os.fstat(lock).st_mode):
+                raise ProblemError(f"{place}: is no regular file, as the lock of tables must be; nothing was saved")
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -218,43 +248,35 @@ def _exchange(one: str, other: Path) -> bool:
 # ---------------------------------------------------------------------------------------------- what was acknowledged
 
 
-def _state_place(place: Path) -> Path:
-    return place.with_name(f".{place.name}.acknowledged")
+def _clean(place: Path) -> None:
+    """Remove the new files of a writer that was killed. Only who holds the lock makes such files.
+
+    What came out of the table for a new one may be the text of another program, which is put back.
+    """
+    beside = state_place(place)
+    names = re.compile(f"\\.({re.escape(beside.name)}|{re.escape(place.name)})\\.[0-9a-f]{{8}}\\.new")
+    for left, found in [(one, found) for one in os.listdir(place.parent) if (found := names.fullmatch(one))]:
+        path = place.with_name(left)
+        if found[1] == place.name:
+            saved = saved_of(place) or {}
+            now, out = _digest_at(place), _digest_at(path)
+            if now == saved.get("after") and out != saved.get("before"):
+                _exchange(str(path), place)
+            elif now not in (saved.get("before"), out) and out not in (saved.get("before"), saved.get("after")):
+                # Nothing tells whose text it is: a person may look at it.
+                continue
+        path.unlink(missing_ok=True)
 
 
-def _to_json(known: Acknowledged) -> dict[str, Any]:
-    def rows(notes: Sequence[Note] | None) -> list[Any] | None:
-        if notes is None:
-            return None
-        return [
-            [n.text, n.t, n.source, n.recording, n.replaces, n.at_ns, [list(one) for one in n.others]] for n in notes
-        ]
-
-    return {"labels": rows(known.labels), "deleted": rows(known.deleted), "table": rows(known.table)}
-
-
-def _time(t: object) -> int:
-    if not isinstance(t, int) or abs(t) > 2**52:
-        raise ValueError(f"{t!r} is no time")
-    return t
-
-
-def _from_json(saved: dict[str, Any]) -> Acknowledged:
-    def rows(name: str) -> tuple[Note, ...]:
-        return tuple(
-            Note(
-                str(text),
-                _time(t),
-                int(at_ns),
-                str(recording),
-                str(source),
-                None if replaces is None else _time(replaces),
-                tuple((str(name), str(cell)) for name, cell in others),
-            )
-            for text, t, source, recording, replaces, at_ns, others in saved[name] or ()
-        )
-
-    return Acknowledged(rows("labels"), rows("deleted"), None if saved["table"] is None else rows("table"))
+def _digest_at(path: Path) -> str:
+    try:
+        descriptor = open_regular(path)
+    except FileNotFoundError:
+        return ""
+    try:
+        return _digest(bytes_of(descriptor))
+    finally:
+        os.close(descriptor)
 
 
 def _acknowledged(place: Path, file: _File) -> Acknowledged:
@@ -264,23 +286,23 @@ def _acknowledged(place: Path, file: _File) -> Acknowledged:
     ------
     FormatError : what was saved cannot be read
     """
-    beside = _state_place(place)
-    try:
-        descriptor = open_regular(beside)
-    except FileNotFoundError:
+    saved = saved_of(place)
+    if saved is None:
         return Acknowledged()
     try:
-        saved = json.loads(_bytes_of(descriptor))
-        known = _from_json(saved["acknowledged"])
+        known = from_json(saved["acknowledged"])
+        recording = saved.get("recording")
+        # Where the table and its recording were deleted, another recording of that name has none of its labels. A
+        # recording that runs keeps its beginning, and so does a copy, whatever its times.
+        if file.descriptor is None and recording is not None:
+            now = _beginning(file.recording, whole(recording[0], 0, _BEGINNING))
+            if now not in (None, recording):
+                return Acknowledged()
         if saved["next"] is None or _digest(file.text) == saved["before"]:
             return known
-        after = _from_json(saved["next"])
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise FormatError(
-            f"{beside}: not what taxel saved of the labels that it acknowledged ({error}); delete it to go on without"
-        ) from None
-    finally:
-        os.close(descriptor)
+        after = from_json(saved["next"])
+    except NOT_SAVED as error:
+        raise not_saved(place, error) from None
     if _digest(file.text) == saved["after"]:
         return after
     # The writer was killed, and another program has written the table since: what either text may lack is in conflict,
@@ -289,9 +311,34 @@ def _acknowledged(place: Path, file: _File) -> Acknowledged:
     return replace(after, labels=(*after.labels, *minus(gone, minus(gone, file.rows))), deleted=known.deleted)
 
 
-def _save(place: Path, saved: dict[str, Any]) -> None:
-    text = json.dumps({"about": "labels that taxel has acknowledged (docs/files.md)", **saved}, ensure_ascii=False)
-    write_whole(_state_place(place), lambda file: file.write(text.encode()), overwrite=True)
+def _save(file: _File, saved: dict[str, Any]) -> None:
+    about = {"about": "labels that taxel has acknowledged (docs/files.md)", "recording": _beginning(file.recording)}
+    text = json.dumps({**about, **saved}, ensure_ascii=False).encode()
+    if len(text) > MOST_SAVED:
+        raise ProblemError(f"{file.place}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
+    beside = state_place(file.place)
+    with _new_file(beside, _mode(file), text) as (_, name):
+        os.replace(name, beside)
+
+
+def _mode(file: _File) -> int | None:
+    """Return who may read a table, which holds for what is saved beside it too; None where neither is there."""
+    for place in (file.place, state_place(file.place)):
+        with contextlib.suppress(FileNotFoundError):
+            return stat.S_IMODE(os.stat(place).st_mode)
+    return None
+
+
+def _beginning(recording: Path | None, size: int = _BEGINNING) -> list[Any] | None:
+    """Return how many bytes at the beginning of a recording have which digest; None where there is no file."""
+    if recording is None:
+        return None
+    try:
+        with open(open_regular(recording), "rb") as file:
+            part = file.read(size)
+    except (FormatError, OSError):
+        return None
+    return [len(part), hashlib.sha256(part).hexdigest()]
 
 
 # ---------------------------------------------------------------------------------------------- reading and writing
@@ -302,10 +349,9 @@ _Action = Callable[[Acknowledged, tuple[Note, ...]], Joined]
 
 @dataclass(frozen=True, eq=False)
 class _Watched:
-    """Hold a table that was replaced, to which a program may still write."""
+    """Hold a table that was replaced, to which a program may still write; its rows are not held."""
 
     file: _File
-    until: float
     seen: tuple[int, int]
 
 
@@ -329,7 +375,7 @@ class LabelTables:
         place = Path(os.path.realpath(table))
         self._take_in(place)
         parts = []
-        for one in (place, _state_place(place)):
+        for one in (place, state_place(place)):
             try:
                 about = os.stat(one)
                 parts.append(f"{about.st_ino}.{about.st_size}.{about.st_mtime_ns}.{about.st_ctime_ns}")
@@ -358,8 +404,9 @@ class LabelTables:
                 if (place.parent / _LOCK).exists():
                     with contextlib.suppress(OSError):
                         held.enter_context(_locked(place.parent))
+                        _clean(place)
                 try:
-                    file = _File.read(place, own, final=final)
+                    file = _File.read(place, own, _recording_of(table, own), final=final)
                 except _BeingWritten:
                     continue
                 try:
@@ -377,8 +424,7 @@ class LabelTables:
 
         Raises
         ------
-        ProblemError : the table is no table of labels, or another program holds the lock; nothing is written
-        OSError : it cannot be written
+        ProblemError : the table is no table of labels or cannot be written, or another program holds the lock
         """
         joined = self._write(table, own, lambda known, theirs: join(known, theirs, requests))
         return joined.outcomes, TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
@@ -388,17 +434,27 @@ class LabelTables:
 
         Raises
         ------
-        As `change`.
+        ProblemError : as of `change`, or nothing is left of the conflict
         """
         joined = self._write(table, own, lambda known, theirs: settled(known, theirs, conflict, restore=restore))
         return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
     def _write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
         place = Path(os.path.realpath(table))
+        try:
+            return self._written(place, own, _recording_of(table, own), action)
+        except OSError as error:
+            reason = (error.strerror or str(error)).removeprefix("is ").lower()
+            beside = state_place(place)
+            where = f"{beside.name}: " if error.filename == str(beside) else ""
+            raise ProblemError(f"{place.name} cannot be saved: {where}{reason}") from error
+
+    def _written(self, place: Path, own: frozenset[str], recording: Path | None, action: _Action) -> Joined:
         for final in _attempts():
             with _locked(place.parent):
+                _clean(place)
                 try:
-                    file = _File.read(place, own, final=final)
+                    file = _File.read(place, own, recording, final=final)
                 except _BeingWritten:
                     continue
                 except FormatError as error:
@@ -414,7 +470,9 @@ class LabelTables:
                     elif file.descriptor is not None:
                         os.fsync(file.descriptor)
                     if joined.acknowledged != known or kept:
-                        _save(place, {"acknowledged": _to_json(joined.acknowledged), "next": None})
+                        # Of a table that was replaced, what was saved before tells the same.
+                        with contextlib.suppress(OSError) if kept else contextlib.nullcontext():
+                            _save(file, {"acknowledged": to_json(joined.acknowledged), "next": None})
                     _sync_folder(place.parent)
                     return joined
                 finally:
@@ -427,11 +485,17 @@ class LabelTables:
         place = file.place
         try_whole(place, overwrite=True)
         text = text_with(joined.rows, file.others).encode()
-        states = {"acknowledged": _to_json(known), "next": _to_json(joined.acknowledged)}
-        _save(place, {**states, "before": _digest(file.text), "after": _digest(text)})
+        try:
+            again, _ = _parsed(place, file.own, text)
+        except FormatError as error:
+            raise ProblemError(f"{error}; nothing was saved") from None
+        if unlike := minus(joined.rows, again):
+            raise ProblemError(f"{place}: a table cannot hold {shown(unlike[0].text)} as it is; nothing was saved")
+        states = {"acknowledged": to_json(known), "next": to_json(joined.acknowledged)}
+        _save(file, {**states, "before": _digest(file.text), "after": _digest(text)})
         replaced = False
         try:
-            with _new_file(file, text) as (descriptor, name):
+            with _new_file(place, None if file.descriptor is None else _mode(file), text) as (descriptor, name):
                 replaced = file.is_current() and _put(name, file)
                 if replaced and not _is_old(name, file):
                     # Another program was quicker: its file comes back. It may have written to ours in the meantime.
@@ -441,13 +505,13 @@ class LabelTables:
         finally:
             if not replaced:
                 with contextlib.suppress(OSError):
-                    _save(place, {**states, "next": None})
+                    _save(file, {**states, "next": None})
         if replaced and file.descriptor is not None:
             self._watch(file)
         return replaced
 
     def _watch(self, file: _File) -> None:
-        one = _Watched(file, time.monotonic() + _WATCHED_S, (-1, 0))
+        one = _Watched(replace(file, rows=()), (-1, 0))
         with self._watched_lock:
             self._watched.append(one)
 
@@ -455,12 +519,13 @@ class LabelTables:
         """Take in what programs wrote to a table that they had opened before it was replaced; `None`: to any table."""
         with self._watched_lock:
             mine = [one for one in self._watched if place in (None, one.file.place)]
-            too_many = len(self._watched) - _MOST_WATCHED
+            count, size = len(self._watched), sum(len(one.file.text or b"") for one in self._watched)
             self._watched = [one for one in self._watched if one not in mine]
         left = []
-        for k, one in enumerate(mine):
+        for one in mine:
             now = self._taken_in(one)
-            if time.monotonic() > now.until or k < too_many:
+            if count > _MOST_WATCHED or size > _MOST_WATCHED_BYTES:
+                count, size = count - 1, size - len(now.file.text or b"")
                 now.file.close()
             else:
                 left.append(now)
@@ -474,21 +539,22 @@ class LabelTables:
         seen = about.st_size, about.st_mtime_ns
         if seen == one.seen:
             return one
-        until = time.monotonic() + _WATCHED_S
         try:
-            now = file if _bytes_of(file.descriptor) == file.text else file.again(final=False)
+            now = file if bytes_of(file.descriptor) == file.text else file.again(final=False)
         except _BeingWritten:
-            return replace(one, until=until)
+            return one
         except FormatError:
             # A text that is being written becomes one that can be read.
             return replace(one, seen=seen)
         if now is file:
             return replace(one, seen=seen)
         try:
-            self._write(file.place, file.own, lambda known, theirs: fold(known, theirs, file.rows, now.rows))
-        except (ProblemError, OSError):
+            before, _ = _parsed(file.place, file.own, file.text or b"")
+            action = functools.partial(fold, before=before, after=now.rows)
+            self._written(file.place, file.own, file.recording, action)
+        except (FormatError, ProblemError, OSError):
             return one
-        return _Watched(now, until, seen)
+        return _Watched(replace(now, rows=()), seen)
 
 
 def _attempts() -> Iterator[bool]:
@@ -510,27 +576,28 @@ def _is_old(name: str, file: _File) -> bool:
     except FileNotFoundError:
         # The file system could not exchange the two.
         return True
-    return os.path.samestat(there, os.fstat(file.descriptor)) and _bytes_of(file.descriptor) == file.text
+    return os.path.samestat(there, os.fstat(file.descriptor)) and bytes_of(file.descriptor) == file.text
 
 
 @contextlib.contextmanager
-def _new_file(file: _File, text: bytes) -> Iterator[tuple[int, str]]:
-    """Write the new text of a table to a file beside it, on the disk; remove what is there afterwards."""
-    name = str(file.place.with_name(f".{file.place.name}.{secrets.token_hex(4)}"))
+def _new_file(place: Path, mode: int | None, text: bytes) -> Iterator[tuple[int, str]]:
+    """Write a new text to a file beside that which it will replace, on the disk; remove what is there afterwards."""
+    name = str(place.with_name(f".{place.name}.{secrets.token_hex(4)}.new"))
     try:
-        descriptor = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        how = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+        descriptor = os.open(name, how, 0o666 if mode is None else mode & 0o600)
         try:
+            if mode is not None:
+                os.fchmod(descriptor, mode)
             with open(descriptor, "wb", closefd=False) as part:
                 part.write(text)
-            if file.descriptor is not None:
-                os.fchmod(descriptor, stat.S_IMODE(os.fstat(file.descriptor).st_mode))
             os.fsync(descriptor)
             yield descriptor, name
         finally:
             os.close(descriptor)
             Path(name).unlink(missing_ok=True)
     except OSError as error:
-        error.filename, error.filename2 = str(file.place), None
+        error.filename, error.filename2 = None, None
         raise
 
 
@@ -541,6 +608,14 @@ def _put(name: str, file: _File) -> bool:
             os.link(name, file.place)
         except FileExistsError:
             return False
+        except OSError as error:
+            if error.errno not in _NO_LINK:
+                raise
+            try:
+                os.close(os.open(file.place, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666))
+            except FileExistsError:
+                return False
+            os.replace(name, file.place)
     elif not _exchange(name, file.place):
         os.replace(name, file.place)
     return True

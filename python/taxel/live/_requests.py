@@ -124,7 +124,7 @@ def _own_names(recording: str) -> frozenset[str]:
 def _to_note(row: _LabelRow, unit_us: float) -> Note:
     label, t, source, trial, replaces, host_ns = row
     replaced = None if replaces is None else round(replaces / unit_us)
-    return Note(label, round(t / unit_us), host_ns or 0, trial, source, replaced)
+    return Note(label.strip(), round(t / unit_us), host_ns or 0, trial, source, replaced)
 
 
 def _to_row(note: Note, unit_us: float) -> _LabelRow:

@@ -1,20 +1,26 @@
 //! Requests of a client that take long: they are carried out beside the pictures, a bounded number at a time.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use serde_json::{Map, Value, json};
 use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
 use crate::label_requests::is_label_request;
+use crate::limits::MOST_BYTES;
 use crate::request::{Refusal, Request};
 use crate::requests::{Shown, carry_out};
 
 /// Maximum number of pending requests, but for those that change labels: a person's work is not refused.
 const MOST_PENDING: usize = 8;
 
-/// Maximum number of pending requests that change labels. A client with so many is not read until some are answered.
+/// Maximum number of pending requests that change labels; a long one counts for each [`PART`] of it. A client with so many is not
+/// read until half of them are answered: those that are read together are written together.
 const MOST_LABEL_REQUESTS: usize = 1000;
+
+/// See [`MOST_LABEL_REQUESTS`], bytes.
+const PART: usize = 1 << 16;
 
 /// Answers that may wait to be sent.
 const MOST_ANSWERS: usize = 64;
@@ -24,6 +30,8 @@ pub(super) struct PendingRequests {
     answers: mpsc::Sender<Value>,
     permits: Arc<Semaphore>,
     label_permits: Arc<Semaphore>,
+    /// Whether there were too many requests that change labels, and more than half of them still wait.
+    is_full: AtomicBool,
 }
 
 impl PendingRequests {
@@ -31,15 +39,19 @@ impl PendingRequests {
     pub(super) fn new() -> (Self, mpsc::Receiver<Value>) {
         let (answers, receiver) = mpsc::channel(MOST_ANSWERS);
         let permits = |most| Arc::new(Semaphore::new(most));
-        (Self { answers, permits: permits(MOST_PENDING), label_permits: permits(MOST_LABEL_REQUESTS) }, receiver)
+        let (permits, label_permits) = (permits(MOST_PENDING), permits(MOST_LABEL_REQUESTS));
+        (Self { answers, permits, label_permits, is_full: AtomicBool::new(false) }, receiver)
     }
 
     /// Whether the client's next message may be read.
     pub(super) fn has_room(&self) -> bool {
-        self.label_permits.available_permits() > 0
+        let enough = if self.is_full.load(Relaxed) { MOST_LABEL_REQUESTS / 2 } else { MOST_BYTES / PART };
+        let is_full = self.label_permits.available_permits() < enough;
+        self.is_full.store(is_full, Relaxed);
+        !is_full
     }
 
-    /// Begins to carry out a request; `shown` is the recording that the client shows. Where too many are pending it is refused, with
+    /// Begins to carry out a request of `bytes`; `shown` is the recording that the client shows. Where too many are pending it is refused, with
     /// the message that is returned.
     pub(super) fn begin(
         &self,
@@ -47,10 +59,14 @@ impl PendingRequests {
         id: Value,
         what: String,
         message: Map<String, Value>,
+        bytes: usize,
         shown: Option<Shown>,
     ) -> Option<Value> {
-        let permits = if is_label_request(&what) { &self.label_permits } else { &self.permits };
-        let Ok(permit) = Arc::clone(permits).try_acquire_owned() else {
+        let (permits, count) = match is_label_request(&what) {
+            true => (&self.label_permits, bytes.div_ceil(PART).clamp(1, MOST_BYTES / PART)),
+            false => (&self.permits, 1),
+        };
+        let Ok(permit) = Arc::clone(permits).try_acquire_many_owned(count as u32) else {
             let refusal = Refusal::from("too many requests at a time: wait for their answers");
             return Some(refusal.message(&id, &what));
         };

@@ -1,0 +1,115 @@
+"""The file beside a table of labels that holds what taxel acknowledged of it: its place, and how it is read."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from taxel._core import FormatError, open_regular
+from taxel.labels import Note
+from taxel.live._label_join import Acknowledged
+
+__all__ = [
+    "MOST_SAVED",
+    "NOT_SAVED",
+    "bytes_of",
+    "from_json",
+    "not_saved",
+    "saved_of",
+    "state_place",
+    "to_json",
+    "whole",
+]
+
+#: The size of the file of what was acknowledged, bytes.
+MOST_SAVED = 1 << 26
+
+#: Errors of reading a file that taxel did not save.
+NOT_SAVED = (ValueError, TypeError, KeyError, IndexError, RecursionError)
+
+
+def bytes_of(descriptor: int) -> bytes:
+    parts, at = [], 0
+    while part := os.pread(descriptor, 1 << 20, at):
+        parts.append(part)
+        at += len(part)
+    return b"".join(parts)
+
+
+def state_place(place: Path) -> Path:
+    return place.with_name(f".{place.name}.acknowledged")
+
+
+def to_json(known: Acknowledged) -> dict[str, Any]:
+    def rows(notes: Sequence[Note] | None) -> list[Any] | None:
+        if notes is None:
+            return None
+        return [
+            [n.text, n.t, n.source, n.recording, n.replaces, n.at_ns, [list(one) for one in n.others]] for n in notes
+        ]
+
+    return {"labels": rows(known.labels), "deleted": rows(known.deleted), "table": rows(known.table)}
+
+
+def whole(value: object, least: int, most: int) -> int:
+    if type(value) is not int or not least <= value <= most:
+        raise ValueError("a time that no table has")
+    return value
+
+
+def _time(t: object) -> int:
+    return whole(t, -(2**52), 2**52)
+
+
+def _text(text: object) -> str:
+    if not isinstance(text, str) or len(text) > csv.field_size_limit():
+        raise ValueError("a text that no table has")
+    # Half of a pair of UTF-16 is no character.
+    text.encode()
+    return text
+
+
+def from_json(saved: dict[str, Any]) -> Acknowledged:
+    def rows(name: str) -> tuple[Note, ...]:
+        return tuple(
+            Note(
+                _text(text),
+                _time(t),
+                whole(at_ns, 0, 2**63 - 1),
+                _text(recording),
+                _text(source),
+                None if replaces is None else _time(replaces),
+                tuple((_text(name), _text(cell)) for name, cell in others),
+            )
+            for text, t, source, recording, replaces, at_ns, others in saved[name] or ()
+        )
+
+    return Acknowledged(rows("labels"), rows("deleted"), None if saved["table"] is None else rows("table"))
+
+
+def not_saved(place: Path, error: Exception) -> FormatError:
+    reason = f"not what taxel saved of the labels that it acknowledged ({error})"
+    return FormatError(f"{state_place(place)}: {reason}; delete it to go on without")
+
+
+def saved_of(place: Path) -> dict[str, Any] | None:
+    """Return what was saved beside a table; None if nothing was."""
+    try:
+        descriptor = open_regular(state_place(place))
+    except FileNotFoundError:
+        return None
+    try:
+        if os.fstat(descriptor).st_size > MOST_SAVED:
+            raise ValueError(f"more than {MOST_SAVED} bytes")
+        saved = json.loads(bytes_of(descriptor))
+        if not isinstance(saved, dict):
+            raise TypeError("no object")
+    except NOT_SAVED as error:
+        raise not_saved(place, error) from None
+    finally:
+        os.close(descriptor)
+    return saved
