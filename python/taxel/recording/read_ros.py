@@ -146,5 +146,5 @@ def _told(one: Read) -> Iterator[str]:
     if one.by_the_bag:
         yield (
             f"{one.by_the_bag} of {counted(len(one.t), 'message')} at the bag's time, as stamps are 0, do not ascend, "
-            "or are more than a day from it"
+            "or are far from it"
         )

@@ -151,10 +151,11 @@ impl Registers {
         // Rule 7, with a ramp of 16 ticks.
         let least = f64::from(steps * (u32::from(CHANNELS) + 10));
         if !(line >= least && line <= 4e9) {
-            let most = 1e8 / (least * f64::from(array.columns));
+            let [slowest, most] = [4e9, least].map(|line| 1e8 / (line * f64::from(array.columns)));
+            let (slowest, most) = ((slowest * 1e6).ceil() / 1e6, most.floor());
             let (rows, columns) = (array.rows, array.columns);
             return Err(problem!(
-                "rate is {rate_hz} frames/s: of {rows} x {columns} taxels it must be above 0 and at most {most:.0}"
+                "rate is {rate_hz} frames/s: of {rows} x {columns} taxels it must be {slowest} to {most}"
             ));
         }
         let line_period = line.round() as u32;

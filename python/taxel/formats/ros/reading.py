@@ -28,6 +28,9 @@ __all__ = ["Chosen", "Read", "read"]
 #: A stamp that is further from the bag's time of its message is wrong, ns.
 _DAY_NS = 86_400 * 10**9
 
+#: Nor is a first or last one sound that is further off the others' median delay, ns.
+_SECOND_NS = 10**9
+
 
 @dataclass(frozen=True)
 class Chosen:
@@ -255,13 +258,21 @@ def _there(message: Any) -> str:
 def _times(stamps: NDArray[np.int64], bag: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     """Return times in ns, which never fall, by the headers' stamps; and how many are the bag's instead.
 
-    Sound stamps are above 0, within a day of the bag's time of their message, and ascend. Where less than half are
-    sound, all messages have the bag's times, else those whose stamp is wrong. The bag's time is later than the stamp by
-    the time that the message was under way: where it would come after the next message's, it is used less the median of
-    that delay, and at most that next time.
+    Sound stamps are above 0, within a day of the bag's time of their message, and ascend. The first and the last are
+    not sound if their delay from the bag's time is off the median delay by more than a second, and
+    by ten times as much as any other. Where less than half are sound, all messages have the bag's times, else those whose stamp is wrong. The bag's
+    time is later than the stamp by the time that the message was under way: where it would come after the next
+    message's, it is used less the median of that delay, and at most that next time.
     """
     near = np.flatnonzero((stamps > 0) & (np.abs(bag.astype(np.float64) - stamps) <= _DAY_NS))
     sound = near[_ascending(stamps[near].tolist())]
+    # No stamp beside a first or last one bounds it: it is compared with the delays of the others.
+    for end, rest in ((0, slice(1, None)), (-1, slice(-1))):
+        delays = (bag - stamps)[sound].astype(np.float64)
+        off = np.abs(delays - np.median(delays)) if len(sound) > 2 else np.zeros(3)
+        if off[end] > max(_SECOND_NS, 10 * off[rest].max()):
+            near = near[near != sound[end]]
+            sound = near[_ascending(stamps[near].tolist())]
     if 2 * len(sound) < len(stamps):
         return bag, len(bag)
     t, late = stamps.copy(), int(np.median((bag - stamps)[sound]))
@@ -276,7 +287,7 @@ def _times(stamps: NDArray[np.int64], bag: NDArray[np.int64]) -> tuple[NDArray[n
 
 
 def _ascending(times: Sequence[int]) -> list[int]:
-    """Return the places of the most times that ascend; of several such choices the one of the earliest times."""
+    """Return the places of the most times that ascend; of several such choices the one of the latest times."""
     # From the end, as in patience sorting: for each length the place where the best choice of that length begins.
     begins: list[int] = []
     falling: list[int] = []

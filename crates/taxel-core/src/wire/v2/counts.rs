@@ -27,7 +27,8 @@ pub struct Counts {
     pub datagrams: u64,
     /// Number of datagrams that were decoded.
     pub intact: u64,
-    /// Datagrams received before, with the same contents; not decoded again.
+    /// Datagrams whose number was received before, with the same contents, or in a session that began again before this was
+    /// recognised; not decoded.
     pub repeated: u64,
     /// Datagrams more than 65 536 numbers late, for which it is unknown whether they were received before; not decoded.
     pub old: u64,

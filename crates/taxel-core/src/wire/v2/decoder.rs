@@ -24,7 +24,7 @@ use session::{Noted, Session, WINDOW};
 use taken::Taken;
 pub use words::stream_rows;
 
-/// Number of repeated datagrams in turn after which a session has begun again.
+/// Number of repeated datagrams in turn, or of ones with other contents, after which a session has begun again.
 const IN_TURN: u32 = 32;
 
 /// A board that was reset was silent for at least so long before, us, where the host's clock is known. While a board sends,
@@ -133,7 +133,10 @@ impl Decoder {
 
     /// Notes that a recording begins: what is missing so far is not missing in it, nor found again where it comes late.
     pub fn begin_recording(&mut self) {
-        self.sessions.iter_mut().for_each(|session| session.from = session.highest + 1);
+        for session in &mut self.sessions {
+            // Those that differ and came before it are counted before it.
+            (session.from, session.unlike) = (session.highest + 1, 0);
+        }
         // What the board dropped since its last totals may have been before.
         self.dropped_before = None;
     }
@@ -233,14 +236,16 @@ impl Decoder {
         if *self.board.get_or_insert(header.board) != header.board {
             return self.other_board();
         }
+        let sum = split(datagram).1;
         let (which, reset) = match self.sessions.last() {
             // The usual case.
-            Some(last) if last.is_next(header) => (self.sessions.len() - 1, false),
-            _ => self.session(header, arrived),
+            Some(last) if last.is_next(header) && last.unlike == 0 => (self.sessions.len() - 1, false),
+            _ => self.session(header, sum, arrived),
         };
         let session = &mut self.sessions[which];
         let number = session.number_of(header.sequence);
-        match session.note(number, split(datagram).1) {
+        let ahead = number > session.highest;
+        match session.note(number, sum) {
             Noted::Old => {
                 self.counts.old += 1;
                 return Outcome::Repeated;
@@ -249,12 +254,16 @@ impl Decoder {
                 let in_turn = if number == self.again.0 { self.again.1 + 1 } else { 1 };
                 self.again = (number + 1, in_turn);
                 if noted == Noted::Unlike {
+                    session.unlike += 1;
                     return self.other_board();
                 }
                 self.counts.repeated += 1;
                 return Outcome::Repeated;
             }
             Noted::New => self.again.1 = 0,
+        }
+        if ahead {
+            session.unlike = 0;
         }
         session.latest = session.latest.max(header.base);
         let (base, missing) = (session.offset + header.base as i64, session.missing());
@@ -300,6 +309,7 @@ impl Decoder {
         if self.instructions >= Instructions::Avx2
             && let (Some(first), Some(board), Some(session)) =
                 (datagrams.clone().next(), self.board, self.sessions.last_mut())
+            && session.unlike == 0
             && let Self { held, counts, latest, again, .. } = self
             && let Some((mut run, value)) = Run::new(first, board, session, held, latest, counts)
             && (value == 0 || out.paired())
@@ -321,27 +331,19 @@ impl Decoder {
         Taken::default()
     }
 
-    /// The session of a datagram, and whether the datagram begins it.
-    fn session(&mut self, header: &Header, arrived: Option<i64>) -> (usize, bool) {
+    /// The session of a datagram with this sum, and whether the datagram begins it.
+    fn session(&mut self, header: &Header, sum: u32, arrived: Option<i64>) -> (usize, bool) {
         // The latest session with this number, in case two resets drew the same one.
         if let Some(which) = self.sessions.iter().rposition(|session| session.number == header.session) {
-            let session = &self.sessions[which];
-            // Two successive resets drew the same number: the session begins again. Its first datagrams are told from ones
-            // that a network repeats by their number, or as so many of them come in turn long after those; and one of which the
-            // number never came from one that was delayed, as it is farther behind than the network reorders.
-            let number = session.number_of(header.sequence);
-            let behind = session.highest - number;
-            let in_turn = self.again.0 == number && self.again.1 >= IN_TURN;
-            let silent = arrived.zip(self.last_arrival).is_none_or(|(now, (then, _))| silence(then, now) >= SILENT_US);
-            let far = session.latest.saturating_sub(header.base) > FARTHEST_BACK_US.unsigned_abs();
-            let again = (behind >= WINDOW as i64
-                || (in_turn && behind >= 8 * i64::from(IN_TURN))
-                || (behind > 0 && far && silent && !session.has(number)))
-                && header.sequence < 1024
-                && header.base < session.latest;
-            if !again {
+            if !self.begins_again(&self.sessions[which], header, sum, arrived) {
                 return (which, false);
             }
+            // What was refused since the last new datagram is this board's: its numbers are missing in the session that
+            // begins.
+            let unlike = u64::from(std::mem::take(&mut self.sessions[which].unlike));
+            self.counts.foreign -= unlike;
+            self.counts.other_board -= unlike;
+            self.counts.repeated += unlike;
         }
         self.again.1 = 0;
         let began = self.sessions.is_empty();
@@ -370,6 +372,28 @@ impl Decoder {
         }
         self.sessions.push(Session::new(header, offset, !began));
         (self.sessions.len() - 1, !began)
+    }
+    /// Whether a datagram of a session's number begins another session, as two successive resets drew the same number.
+    fn begins_again(&self, session: &Session, header: &Header, sum: u32, arrived: Option<i64>) -> bool {
+        let number = session.number_of(header.sequence);
+        let behind = session.highest - number;
+        let known = arrived.zip(self.last_arrival).map(|(now, (then, _))| silence(then, now) >= SILENT_US);
+        // A network repeats single datagrams, and not so many in turn long after those, or while the board is silent.
+        let in_turn = self.again.0 == number && self.again.1 >= IN_TURN;
+        let repeats = in_turn && (behind >= 8 * i64::from(IN_TURN) || known == Some(true));
+        // One whose number never came was delayed, unless it is farther behind than the network reorders.
+        let far = session.latest.saturating_sub(header.base) > FARTHEST_BACK_US.unsigned_abs();
+        let delayed = behind > 0 && far && known != Some(false) && !session.has(number);
+        // No network changes contents: a board that goes on was not reset, else many differ, or all that came. While
+        // nothing new comes, the first number does, or a second one, as a single one may be of another board.
+        let contradicts = if behind < 0 {
+            session.is_contradicted()
+        } else {
+            session.differs(number, sum)
+                && (session.unlike >= IN_TURN || (known == Some(true) && (header.sequence == 0 || session.unlike > 0)))
+        };
+        let earlier = header.base < session.latest && (behind >= WINDOW as i64 || repeats || delayed);
+        header.sequence < 1024 && (earlier || contradicts)
     }
 }
 

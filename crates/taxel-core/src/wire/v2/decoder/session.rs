@@ -38,6 +38,8 @@ pub(super) struct Session {
     pub(super) offset: i64,
     /// The latest base time.
     pub(super) latest: u64,
+    /// Number of datagrams whose contents differ from those that came before, since the last one that was ahead.
+    pub(super) unlike: u32,
 }
 
 impl Session {
@@ -58,6 +60,7 @@ impl Session {
             first,
             offset,
             latest: header.base,
+            unlike: 0,
         }
     }
 
@@ -75,6 +78,17 @@ impl Session {
     pub(super) fn has(&self, number: i64) -> bool {
         let (word, bit) = place(number);
         self.seen[word] & bit != 0
+    }
+
+    /// Whether a number came before, with other contents.
+    pub(super) fn differs(&self, number: i64, sum: u32) -> bool {
+        let within = (self.highest - WINDOW as i64 + 1..=self.highest).contains(&number);
+        within && self.has(number) && self.sums.get(self.place_of_sum(number)) != Some(&(sum as u16))
+    }
+
+    /// Whether as many datagrams differ as came at all, and more than a single one.
+    pub(super) fn is_contradicted(&self) -> bool {
+        self.unlike > 1 && u64::from(self.unlike) >= self.received
     }
 
     #[inline]
@@ -120,11 +134,10 @@ impl Session {
         }
         let missing = self.missing();
         self.lowest = self.lowest.min(number);
-        let (word, bit) = place(number);
-        if self.seen[word] & bit != 0 {
-            let same = self.sums.get(self.place_of_sum(number)) == Some(&(sum as u16));
-            return if same { Noted::Again } else { Noted::Unlike };
+        if self.has(number) {
+            return if self.differs(number, sum) { Noted::Unlike } else { Noted::Again };
         }
+        let (word, bit) = place(number);
         self.store(number, sum);
         self.seen[word] |= bit;
         self.received += 1;

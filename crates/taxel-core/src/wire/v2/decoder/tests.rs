@@ -158,3 +158,78 @@ fn a_board_that_begins_again_with_the_same_session_is_not_taken_for_repetition()
     }
     assert_eq!((decoder.counts().resets, decoder.counts().missing, decoder.counts().intact), (0, 0, 2000));
 }
+
+#[test]
+fn a_board_that_begins_again_with_the_same_session_is_no_other_board_however_short_its_first_life_was() {
+    let life = |life: u8, n: u32| {
+        (0..n).map(move |k| datagram(Kind::Small, 7, k, u64::from(k) * 192, &[life, 0, k as u8 % 60 + 1, 0x80]))
+    };
+    for first in (1..=70).chain((80..3000).step_by(97)).chain([255, 256, 257, 1023, 1024, 3000]) {
+        for silent in [None, Some(0), Some(300_000)] {
+            let (mut decoder, mut events) = (Decoder::new(Array::thesis()), Events::empty(Array::thesis()));
+            let mut now = 0;
+            for (k, bytes) in life(1, first).chain(life(2, 3000)).enumerate() {
+                // Without a clock no silence is known.
+                now += 192 + if k == first as usize { silent.unwrap_or(0) } else { 0 };
+                decoder.push(&bytes, silent.map(|_| now), &mut events);
+            }
+            let (counts, case) = (decoder.counts(), format!("{first} datagrams, {silent:?}"));
+            if first == 1 && silent != Some(300_000) {
+                // It may as well be a datagram of another board between those of one.
+                assert_eq!((counts.resets, counts.other_board, counts.missing), (0, 1, 0), "{case}");
+                continue;
+            }
+            let lost = if silent == Some(300_000) { 0 } else { first.min(IN_TURN) };
+            assert_eq!((counts.resets, counts.other_board, counts.foreign), (1, 0, 0), "{case}");
+            assert_eq!((counts.missing, counts.repeated), (lost.into(), lost.into()), "{case}");
+            assert_eq!(counts.intact + counts.repeated, u64::from(first) + 3000, "{case}");
+            assert!(events.t.is_sorted(), "{case}");
+        }
+    }
+}
+
+#[test]
+fn a_single_datagram_of_another_board_is_no_reset_whenever_it_comes() {
+    for at in 1..300_u32 {
+        for silent in [0, 300_000] {
+            let (mut decoder, mut events) = (Decoder::new(Array::thesis()), Events::empty(Array::thesis()));
+            let mut now = 0;
+            for k in 0..400 {
+                if k == at {
+                    now += silent;
+                    // Number 0 after a silence is what a board sends at its reset.
+                    let other = if silent == 0 { at / 2 } else { (at / 2).max(1).min(at - 1) };
+                    if silent == 0 || other > 0 {
+                        let bytes = datagram(Kind::Small, 7, other, u64::from(other) * 192, &[9, 0x80]);
+                        decoder.push(&bytes, Some(now), &mut events);
+                    }
+                }
+                now += 192;
+                let bytes = datagram(Kind::Small, 7, k, u64::from(k) * 192, &[5, 0x80]);
+                decoder.push(&bytes, Some(now), &mut events);
+            }
+            let counts = decoder.counts();
+            let others = u64::from(silent == 0 || at > 1);
+            assert_eq!((counts.resets, counts.missing, counts.other_board), (0, 0, others), "{at}, {silent} us");
+        }
+    }
+}
+
+#[test]
+fn a_recording_that_began_while_a_session_was_to_begin_again_counts_no_other_board() {
+    for begins in 0..IN_TURN {
+        let (mut decoder, mut events) = (Decoder::new(Array::thesis()), Events::empty(Array::thesis()));
+        let mut then = decoder.counts();
+        for (life, n) in [(1, 200), (2, 600)] {
+            for k in 0..n {
+                if (life, k) == (2, begins) {
+                    then = decoder.counts();
+                    decoder.begin_recording();
+                }
+                decoder.push(&datagram(Kind::Small, 7, k, u64::from(k) * 192, &[life, 0x80]), None, &mut events);
+            }
+        }
+        let since = decoder.counts().since(&then);
+        assert_eq!((since.resets, since.other_board, since.foreign), (1, 0, 0), "from number {begins} on");
+    }
+}
