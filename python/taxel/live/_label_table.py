@@ -530,7 +530,9 @@ def _new_file(file: _File, text: bytes) -> Iterator[tuple[int, str]]:
             os.close(descriptor)
             Path(name).unlink(missing_ok=True)
     except OSError as error:
-        error.filename, error.filename2 = str(file.place), None
+        error.filename = str(file.place)
+        # Python shows a second name also where it is None.
+        del error.filename2
         raise
 
 
