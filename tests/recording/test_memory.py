@@ -12,6 +12,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from formats import bags
@@ -180,6 +181,169 @@ def test_large_pictures_of_one_value_open_whatever_they_are_packed_to(tmp_path: 
     taxel.convert(frames, path, compression="zstd")
     assert 2 * frames.values.size > 1000 * path.stat().st_size
     assert taxel.open(path).frames() == frames
+
+
+def pictures(dtype: str, size: int, order: Any = "C") -> np.ndarray[Any, Any]:
+    """Return pictures that take so many bytes as float32."""
+    return np.ones((size // 4 // 4096, 64, 64), dtype, order)
+
+
+def of_anybody(folder: Path, size: int, kind: str, dtype: str) -> Path:
+    """Write pictures as people save them, of any dtype and order."""
+    values = pictures(dtype.removesuffix(" F"), size, "F" if dtype.endswith("F") else "C")
+    t = np.arange(len(values))
+    path = folder / f"a.{kind.split()[0]}"
+    if kind == "h5":
+        with h5py.File(path, "w") as h5:
+            h5.attrs["taxel"] = 1
+            h5.create_dataset("values", data=values, compression="gzip", compression_opts=1)
+            h5["t"] = t
+    elif kind == "npz":
+        np.savez_compressed(path, values=values, t=t)
+    else:
+        falls = "falls = 9" if kind.endswith("falls") else ""
+        of_array = "" if path.suffix == ".npy" else '[data]\narray = "a"\ntime = "s"\n'
+        rate = "rate_hz = 100" if path.suffix == ".npy" else ""
+        (folder / "layout.toml").write_text(f"rows = 64\ncolumns = 64\n{rate}\n{falls}\n{of_array}")
+        if path.suffix == ".npy":
+            np.save(path, values)
+        else:
+            np.savez(path, a=values, s=t / 100)
+    return path
+
+
+@pytest.mark.parametrize("dtype", ["u1", "?", "f8", ">f4", ">i2", "f4 F", "f8 F"])
+@pytest.mark.parametrize("kind", ["npz", "h5", "npy layout", "npz layout", "npy layout falls"])
+def test_pictures_of_every_dtype_are_in_memory_once(kind: str, dtype: str, tmp_path: Path) -> None:
+    sizes = {}
+    for size in (MIB, 24 * MIB):
+        (folder := tmp_path / str(size)).mkdir()
+        sizes[size] = opened(of_anybody(folder, size, kind, dtype))
+    small, whole = sizes.values()
+    assert whole["arrays"] > 20 * MIB
+    assert whole["peak"] - small["peak"] <= 1.4 * whole["arrays"] + 4 * MIB
+
+
+def test_a_column_of_times_is_in_memory_once(tmp_path: Path) -> None:
+    (tmp_path / "layout.toml").write_text('[data]\narray = "a"\ntime = "s"\n')
+    peaks = {}
+    for n in (1000, 4_000_000):
+        np.savez(tmp_path / "a.npz", a=np.ones((n, 1), "u1"), s=np.arange(n) / 1000)
+        peaks[n] = opened(tmp_path / "a.npz")
+    small, whole = peaks.values()
+    assert whole["peak"] - small["peak"] <= 1.4 * whole["arrays"] + 4 * MIB
+
+
+def as_events(**more: Any) -> dict[str, Any]:
+    few = np.zeros(3, np.uint16)
+    return {"t": np.arange(3), "x": few, "y": few, "p": few.astype(bool)} | more
+
+
+#: What a small file may claim, and what the line says; each took gigabytes.
+STRANGE: dict[str, tuple[dict[str, Any], str]] = {
+    "markers": (as_events(markers=np.zeros((4_000_000, 2), np.int64)), "at most 262144 markers"),
+    "lists": (as_events(about=np.array('{"notes":[' + "[]," * 5_000_000 + "[]]}")), "--limit BYTES"),
+    "a long about": (as_events(about=np.array('{"a":"' + "x" * 40_000_000 + '"}')), "--limit BYTES"),
+    "a unit": ({"values": np.ones((3, 2, 2)), "t": np.arange(3), "unit": np.array("N" * 40_000_000)}, "--limit BYTES"),
+    "times": ({"values": np.ones((3, 2, 2)), "t": np.zeros(40_000_000, np.int64)}, "a time for each of 3 pictures"),
+    "held": (as_events(held=np.zeros((9000, 9000), np.uint16)), "at most 4194304"),
+    "columns": (as_events(x=np.zeros(40_000_000)), "as many as t has"),
+    "complex pictures": ({"values": np.zeros((40_000, 8, 64), "c16"), "t": np.arange(40_000)}, "complex128"),
+}
+
+
+@pytest.mark.parametrize("strange", STRANGE)
+@pytest.mark.parametrize("kind", ["npz", "h5"])
+def test_columns_that_do_not_fit_are_refused_before_they_are_read(kind: str, strange: str, tmp_path: Path) -> None:
+    columns, why = STRANGE[strange]
+    path = tmp_path / f"a.{kind}"
+    if kind == "npz":
+        np.savez_compressed(path, **columns)
+    else:
+        with h5py.File(path, "w") as h5:
+            h5.attrs["taxel"] = 1
+            for name, column in columns.items():
+                is_text = column.dtype.kind == "U"
+                h5.create_dataset(
+                    name, data=str(column) if is_text else column, compression="gzip" if column.ndim else None
+                )
+    said = opened(path)
+    assert why in said["refused"]
+    assert said["peak"] < 192 * MIB
+
+
+def test_entries_that_taxel_does_not_know_are_not_read(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as h5:
+        h5.attrs["taxel"] = 1
+        for name, column in as_events().items():
+            h5[name] = column
+        for k in range(4):
+            h5.create_dataset(f"e{k}", (20_000_000,), "f4", chunks=(100_000,))
+    assert opened(tmp_path / "a.h5")["peak"] < 192 * MIB
+
+
+def test_times_that_do_not_fit_are_refused_before_they_are_read(tmp_path: Path) -> None:
+    (tmp_path / "layout.toml").write_text('[data]\narray = "p"\ntime = "t"\n')
+    with h5py.File(tmp_path / "a.h5", "w") as h5:
+        h5.create_dataset("p", (100, 8), "i1")
+        h5.create_dataset("t", (400_000_000,), "i1", chunks=(1_000_000,))
+    said = opened(tmp_path / "a.h5")
+    assert "400000000 times for 100 pictures" in said["refused"]
+    assert said["peak"] < 192 * MIB
+
+
+@pytest.mark.parametrize("name", ["a.npy", "a.npz"])
+def test_a_long_description_of_an_array_is_not_read(name: str, tmp_path: Path) -> None:
+    told = b"\x93NUMPY\x02\x00" + (200_000_000).to_bytes(4, "little") + b"{" + b" " * 200_000_000
+    (tmp_path / "layout.toml").write_text("rate_hz = 100\n")
+    if name == "a.npy":
+        (tmp_path / name).write_bytes(told)
+    else:
+        with zipfile.ZipFile(tmp_path / name, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            archive.writestr("t.npy", told)
+    said = opened(tmp_path / name)
+    assert "a description of 200000000 bytes; at most 65536 are read" in said["refused"]
+    assert said["peak"] < 192 * MIB
+
+
+def test_what_taxel_would_not_read_again_it_does_not_write(tmp_path: Path) -> None:
+    few = np.zeros(3, np.uint16)
+    markers = [(k, True) for k in range((1 << 18) + 1)]
+    for name in ("a.npz", "a.h5"):
+        with refused("262145 markers; a .npz and a .h5 hold at most 262144"):
+            taxel.convert(taxel.Events([0, 1, 2], few, few, few.astype(bool), markers=markers), tmp_path / name)
+        with refused("a unit of 257 characters"):
+            taxel.convert(taxel.Frames(np.zeros((1, 2, 2)), [0], unit="N" * 257), tmp_path / name)
+        assert not (tmp_path / name).exists()
+        most = taxel.Events([0, 1, 2], few, few, few.astype(bool), markers=markers[1:])
+        taxel.convert(most, tmp_path / name)
+        assert taxel.open(tmp_path / name).events == most
+
+
+def test_the_largest_sensor_with_a_mask_opens_again(tmp_path: Path) -> None:
+    """The description says of each taxel whether it exists."""
+    mask = np.ones((2048, 2048), bool)
+    mask[:, ::3] = False
+    frames = taxel.Frames(np.zeros((1, 2048, 2048)), [0], array=taxel.Array(2048, 2048, exists=mask))
+    taxel.convert(frames, tmp_path / "a.npz")
+    said = opened(tmp_path / "a.npz")
+    assert said["peak"] <= 1.5 * said["arrays"] + 256 * MIB + 64 * MIB
+
+
+def test_the_memory_of_a_conversion_counts(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "a.npz", values=np.zeros((1000, 32, 32), bool), t=np.arange(1000))
+    with refused(r"claims 41\d{5} bytes, unpacked; at most 3000000 are read: --limit BYTES", FormatError):
+        taxel.open(tmp_path / "a.npz", limit=3_000_000)
+
+
+def test_memory_that_is_missing_is_said_with_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise MemoryError
+
+    taxel.convert(some_events(), tmp_path / "a.npz")
+    monkeypatch.setattr("taxel.recording.npz.read_arrays", fail)
+    with refused(r"a.npz: needs more memory than there is \(\d+ bytes are available\): --limit BYTES", FormatError):
+        taxel.open(tmp_path / "a.npz")
 
 
 # what is available

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from taxel._base.files import open_file
-from taxel._base.limits import DESCRIPTION, UNPACKED, unpacked
+from taxel._base.limits import UNPACKED, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError
 
 __all__ = ["read_array", "read_arrays", "shapes", "stored_names"]
+
+#: Bytes of the description of an array: NumPy writes at most 64 KiB where it needs no more.
+_HEADER = 1 << 16
+#: Bytes that are converted at once.
+_PIECE = 1 << 20
 
 
 def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -72,8 +78,14 @@ def shapes(path: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
             raise FormatError(f"{path}: no whole {Path(path).suffix} ({first_line(error)}); write it again") from None
 
 
-def read_array(path: str | os.PathLike[str]) -> NDArray[Any]:
+def read_array(path: str | os.PathLike[str], dtype: DTypeLike | None = None) -> NDArray[Any]:
     """Read the one array of a .npy.
+
+    Parameters
+    ----------
+    path : path
+    dtype : dtype, optional
+        What numbers are converted to, piece by piece, as by `read_arrays`.
 
     Raises
     ------
@@ -91,15 +103,17 @@ def read_array(path: str | os.PathLike[str]) -> NDArray[Any]:
     """
     with open_file(path) as file:
         try:
-            shape, dtype = _described(file)
-            size, stored = math.prod(shape) * dtype.itemsize, os.fstat(file.fileno()).st_size - file.tell()
-            if dtype.hasobject:
+            shape, _, own = _described(file)
+            size, stored = math.prod(shape) * own.itemsize, os.fstat(file.fileno()).st_size - file.tell()
+            if own.hasobject:
                 raise FormatError(f"{path}: holds Python objects; must be a NumPy array of numbers")
+            if dtype is not None and own.kind not in "biuf":
+                raise FormatError(f"{path}: {own} of shape {shape}; must be a NumPy array of numbers")
             if size > stored:
-                raise FormatError(f"{path}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
-            unpacked(str(path), size)
+                raise FormatError(f"{path}: says that it holds {size} bytes ({shape}, {own}); there are {stored}")
+            unpacked(str(path), _kept(shape, own, dtype))
             file.seek(0)
-            return np.lib.format.read_array(file, allow_pickle=False)
+            return _read(file, dtype)
         except (FormatError, MemoryError):
             raise
         # As in `read_arrays`.
@@ -108,7 +122,12 @@ def read_array(path: str | os.PathLike[str]) -> NDArray[Any]:
 
 
 def read_arrays(
-    path: str | os.PathLike[str], names: Iterable[str], *, texts: Iterable[str] = ()
+    path: str | os.PathLike[str],
+    names: Iterable[str],
+    *,
+    texts: Mapping[str, int] | None = None,
+    dtypes: Mapping[str, DTypeLike] | None = None,
+    chosen: Callable[[Mapping[str, tuple[int, ...]]], Collection[str]] = tuple,
 ) -> dict[str, NDArray[Any]]:
     """Read those of the wanted arrays that a .npz has.
 
@@ -116,7 +135,12 @@ def read_arrays(
     ----------
     path : path
     wanted : names of arrays; others are ignored
-    texts : names of those that hold one text: at most 64 Mi characters each
+    texts : dict from the names of those that hold one text to how many characters it may have
+    dtypes : dict from name to dtype
+        What numbers are converted to, piece by piece as they are read. What it cannot hold becomes infinite or wraps
+        around.
+    chosen : function of a dict from name to shape
+        Which of those that there are are read; it may refuse them by their shapes before any is read.
 
     Returns
     -------
@@ -138,7 +162,7 @@ def read_arrays(
     """
     with open_file(path) as file:
         try:
-            return _arrays(Path(path), file, tuple(names), frozenset(texts))
+            return _arrays(Path(path), file, tuple(names), texts or {}, dtypes or {}, chosen)
         except (FormatError, MemoryError):
             raise
         # NumPy and zipfile raise many kinds of errors on damage: zlib.error, NotImplementedError, TokenError,
@@ -147,41 +171,82 @@ def read_arrays(
             raise FormatError(f"{path}: a .npz that cannot be unpacked ({first_line(error)}); write it again") from None
 
 
-def _arrays(path: Path, file: IO[bytes], names: tuple[str, ...], texts: frozenset[str]) -> dict[str, NDArray[Any]]:
+def _arrays(
+    path: Path,
+    file: IO[bytes],
+    names: tuple[str, ...],
+    texts: Mapping[str, int],
+    dtypes: Mapping[str, DTypeLike],
+    chosen: Callable[[Mapping[str, tuple[int, ...]]], Collection[str]],
+) -> dict[str, NDArray[Any]]:
     """Read the arrays after the sizes of all of them have been checked."""
     columns = {}
     with zipfile.ZipFile(file) as archive:
         members = {name.removesuffix(".npy"): name for name in archive.namelist()}
-        there = [name for name in names if name in members]
+        described = {}
+        for name in (name for name in names if name in members):
+            with archive.open(members[name]) as array:
+                described[name] = (*_described(array), array.tell())
+        there = chosen({name: shape for name, (shape, *_) in described.items()})
         total = 0
         for name in there:
-            with archive.open(members[name]) as array:
-                shape, dtype = _described(array)
-                begin = array.tell()
+            shape, _, dtype, begin = described[name]
             place = f"{path}, array {name}"
             if dtype.hasobject:
                 raise FormatError(f"{place}: holds Python objects; must be numbers or text")
+            if name in dtypes and dtype.kind not in "biuf":
+                raise FormatError(f"{place}: holds {dtype}; must hold numbers")
             size = math.prod(shape) * dtype.itemsize
-            total += size
-            # Python stores a character in up to 4 bytes.
-            unpacked(place, size, 4 * DESCRIPTION if name in texts else UNPACKED)
+            kept = _kept(shape, dtype, dtypes.get(name))
+            total += kept
+            # NumPy stores a character in 4 bytes.
+            unpacked(place, kept, 4 * texts[name] if name in texts else UNPACKED)
             unpacked(place, total)
             stored = archive.getinfo(members[name]).file_size - begin
             if size != stored:
                 raise FormatError(f"{place}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
         for name in there:
             with archive.open(members[name]) as array:
-                columns[name] = np.lib.format.read_array(array, allow_pickle=False)
+                columns[name] = _read(array, dtypes.get(name))
     return columns
 
 
-def _described(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Read the shape and the dtype from the header of an array."""
-    read = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}
+def _described(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Read the shape, whether its first axis is the fastest, and the dtype from the header of an array."""
+    read = {1: (np.lib.format.read_array_header_1_0, 2), 2: (np.lib.format.read_array_header_2_0, 4)}
     version = np.lib.format.read_magic(file)
     if version[0] not in read:
         raise ValueError(f"version {version[0]} of the description; there are 1 and 2")
-    shape, _, dtype = read[version[0]](file)
+    parse, width = read[version[0]]
+    field = file.read(width)
+    if (length := int.from_bytes(field, "little")) > _HEADER:
+        raise ValueError(f"a description of {length} bytes; at most {_HEADER} are read")
+    shape, fortran, dtype = parse(io.BytesIO(field + file.read(length)))
     if any(isinstance(n, bool) or n < 0 for n in shape):
         raise ValueError(f"shape {shape}")
-    return shape, dtype
+    return shape, fortran, dtype
+
+
+def _kept(shape: tuple[int, ...], stored: np.dtype[Any], dtype: DTypeLike | None) -> int:
+    """Return the bytes that an array takes in memory, converted or as it is stored."""
+    return math.prod(shape) * (np.dtype(dtype) if dtype is not None and stored.kind in "biuf" else stored).itemsize
+
+
+def _read(file: IO[bytes], dtype: DTypeLike | None) -> NDArray[Any]:
+    """Read an array whose size was checked; numbers are converted piece by piece, into the order of C."""
+    begin = file.tell()
+    shape, fortran, stored = _described(file)
+    if dtype is None or stored.kind not in "biuf" or 0 in shape:
+        file.seek(begin)
+        return np.lib.format.read_array(file, allow_pickle=False)
+    array = np.empty(shape, dtype)
+    flat: Any = array.T.flat if fortran else array.reshape(-1)
+    step = _PIECE // stored.itemsize
+    for start in range(0, array.size, step):
+        count = min(step, array.size - start)
+        piece = np.frombuffer(file.read(count * stored.itemsize), stored)
+        if len(piece) < count:
+            raise ValueError(f"ends after {start + len(piece)} of {array.size} values")
+        with np.errstate(over="ignore", invalid="ignore"):
+            flat[start : start + count] = piece.astype(dtype)
+    return array

@@ -48,6 +48,8 @@ T = TypeVar("T")
 _SHOWN = 60
 #: The most values that a parameter may hold.
 _MOST = 10_000_000
+#: How many values are compared at once with what they were converted to.
+_COMPARED = 1 << 20
 #: The most entries that are read of an iterator, which may be infinite.
 _MOST_ENTRIES = 1_000_000
 #: The most values to which an array that NumPy repeats (`np.broadcast_to`) is copied.
@@ -317,13 +319,8 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
     except (TypeError, ValueError, OverflowError) as error:
         raise ProblemError(f"{name}: {error}") from None
     if received.dtype != array.dtype:
-        if array.dtype.kind == "f":
-            # A float may be rounded (to float32) but must not become infinite.
-            changed = np.isinf(array) & ~np.isinf(received.astype(np.float64))
-        else:
-            changed = np.asarray(received != array)
-        if changed.any():
-            place = tuple(int(k[0]) for k in np.nonzero(np.atleast_1d(changed)))
+        place = _first_changed(np.atleast_1d(received), np.atleast_1d(array))
+        if place is not None:
             where = f"[{', '.join(map(str, place))}]" if received.ndim else ""
             value = shown(np.atleast_1d(received).astype(object)[place])
             expected = {"b": "True or False", "f": "a number that fits"}.get(
@@ -332,6 +329,26 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
             fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
             raise ProblemError(f"{name}{where} is {value}: must be {expected}{fits}" + f", in {unit}" * bool(unit))
     return array
+
+
+def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ...] | None:
+    """Return the place of the first value that a conversion changed; None if there is none.
+
+    A float may be rounded (to float32) but must not become infinite.
+    """
+    to_float = array.dtype.kind == "f"
+    from_float = received.dtype.kind == "f" and received.dtype.itemsize > array.dtype.itemsize
+    # Whole numbers of 64 bits fit a float of 32.
+    if not array.size or (to_float and not from_float and received.dtype != object and array.dtype.itemsize >= 4):
+        return None
+    step = max(1, _COMPARED // array[:1].size)
+    for begin in range(0, len(array), step):
+        before, after = received[begin : begin + step], array[begin : begin + step]
+        changed = np.isinf(after) & ~np.isinf(before.astype(np.float64)) if to_float else np.asarray(before != after)
+        if changed.any():
+            first, *rest = np.unravel_index(int(np.argmax(changed)), changed.shape)
+            return (begin + int(first), *map(int, rest))
+    return None
 
 
 def _refuse_others(name: str, values: NDArray[Any]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from typing import Any, NoReturn
 
 from taxel._base.arguments import shown
 from taxel._base.files import open_file
-from taxel._base.limits import unpacked
+from taxel._base.limits import UNPACKED, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError
 
@@ -20,6 +21,7 @@ __all__ = [
     "BY_HAND",
     "BY_TAXEL",
     "NotTomlError",
+    "memory_of_json",
     "of_json",
     "of_toml",
     "read_json",
@@ -36,8 +38,9 @@ BY_TAXEL = 1 << 28
 _DOTS = 100
 #: Tables or lists within each other.
 _DEPTH = 64
-#: Bytes in memory of a value, or of a list or an object, at most.
-_VALUE = 100
+#: Bytes in memory, at most: of a place in a list; of a number; of a text, beside its characters; of a list; of an
+#: object; of a name in an object, with its place.
+_PLACE, _NUMBER, _TEXT, _LIST, _OBJECT, _NAME = 9, 32, 60, 100, 250, 100
 #: Where a string or a comment of TOML begins, and what ends a key.
 _MARKS = re.compile(r"[\"'#\n,=\[\]{}]")
 
@@ -102,14 +105,29 @@ def of_toml(place: str, text: str) -> dict[str, Any]:
         values = tomllib.loads(text)
     except RecursionError:
         raise _too_deep(place) from None
-    # A whole number of more digits than Python reads is a ValueError too.
     except ValueError as error:
-        raise NotTomlError(f"{place}: not TOML: {first_line(error)}") from None
+        raise NotTomlError(f"{place}: not TOML: {_why(error)}") from None
     _check_depth(place, values)
     return values
 
 
-def of_json(place: str, text: str, most: int = BY_HAND, *, with_nan: bool = False) -> Any:
+def memory_of_json(text: str) -> int:
+    """Return how many bytes a text in JSON and its values take in memory, about and at most.
+
+    Examples
+    --------
+    >>> memory_of_json("[]"), memory_of_json('["a", 1, true]')
+    (110, 348)
+    """
+    # A text of other than Latin letters has 4 bytes a character, as NumPy's always have; a part of it is in a value.
+    characters = len(text) * (6 if text.isascii() else 12)
+    values = text.count(",")
+    numbers = max(0, values - text.count("true") - text.count("false"))
+    parts = _LIST * text.count("[") + _OBJECT * text.count("{") + _NAME * text.count(":") + _TEXT * text.count('"') // 2
+    return characters + _PLACE * values + _NUMBER * numbers + parts
+
+
+def of_json(place: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED, with_nan: bool = False) -> Any:
     """Return the value of a text in JSON.
 
     Parameters
@@ -118,6 +136,8 @@ def of_json(place: str, text: str, most: int = BY_HAND, *, with_nan: bool = Fals
         For errors.
     text : str
     most : int, characters
+    room : int, bytes
+        How much the text and its values may take in memory, where the caller of an opening gave no limit.
     with_nan : bool
         Whether NaN and Infinity, which are not JSON, are read, as earlier versions of taxel wrote them.
 
@@ -127,7 +147,7 @@ def of_json(place: str, text: str, most: int = BY_HAND, *, with_nan: bool = Fals
         deeply
     """
     _check_length(place, text, most)
-    unpacked(place, len(text) + _VALUE * sum(map(text.count, ",[{:")))
+    unpacked(place, memory_of_json(text), room)
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         values = dict(pairs)
@@ -143,9 +163,8 @@ def of_json(place: str, text: str, most: int = BY_HAND, *, with_nan: bool = Fals
         value = json.loads(text, object_pairs_hook=once, parse_constant=None if with_nan else refuse)
     except RecursionError:
         raise _too_deep(place) from None
-    # A whole number of more digits than Python reads is a ValueError too.
     except ValueError as error:
-        raise FormatError(f"{place}: not JSON: {first_line(error)}") from None
+        raise FormatError(f"{place}: not JSON: {_why(error)}") from None
     _check_depth(place, value)
     return value
 
@@ -153,6 +172,13 @@ def of_json(place: str, text: str, most: int = BY_HAND, *, with_nan: bool = Fals
 def _check_length(place: str, text: str, most: int) -> None:
     if len(text) > most:
         raise FormatError(f"{place}: {len(text)} characters; must be at most {most}")
+
+
+def _why(error: ValueError) -> str:
+    """Return in plain words why a text is not read: Python's words for a long number name a function to call."""
+    if "set_int_max_str_digits" in str(error):
+        return f"a whole number of more than {sys.get_int_max_str_digits()} digits"
+    return first_line(error)
 
 
 def _too_deep(place: str) -> FormatError:

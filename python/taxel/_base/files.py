@@ -111,7 +111,9 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     except BaseException as error:
         Path(name).unlink(missing_ok=True)
         if isinstance(error, OSError):
-            error.filename, error.filename2 = str(place), None
+            error.filename = str(place)
+            # Python shows a second name also where it is None.
+            del error.filename2
         raise
 
 

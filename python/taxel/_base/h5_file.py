@@ -7,7 +7,7 @@ import math
 import os
 import selectors
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -117,8 +117,8 @@ class H5File:
         value: int | str | None = self._answer(PATIENCE_S)["done"]
         return value
 
-    def text(self, name: str) -> str:
-        """Return a data set that is one text.
+    def text(self, name: str, most: int = DESCRIPTION) -> str:
+        """Return a data set that is one text of at most so many bytes.
 
         Raises
         ------
@@ -126,10 +126,10 @@ class H5File:
         """
         if self.entries[name] != Entry("text", ()):
             raise FormatError(f"{self._place(name)}: must be a text")
-        return str(self.texts(name)[()])
+        return str(self.texts(name, most)[()])
 
-    def texts(self, name: str) -> NDArray[np.object_]:
-        """Return a data set of texts.
+    def texts(self, name: str, most: int = DESCRIPTION) -> NDArray[np.object_]:
+        """Return a data set of texts, which take at most so many bytes.
 
         Raises
         ------
@@ -139,26 +139,28 @@ class H5File:
         if entry.dtype != "text":
             raise FormatError(f"{self._place(name)}: must hold texts")
         size = _TEXT_BYTES * (math.prod(entry.shape) - 1)
-        unpacked(self._place(name), size, DESCRIPTION)
+        unpacked(self._place(name), size, most)
         read: list[str] = []
         self._order({"name": name, "text": True})
         while "done" not in (answer := self._answer(PATIENCE_S)):
             size += sum(answer["lengths"])
-            unpacked(self._place(name), size, DESCRIPTION)
+            unpacked(self._place(name), size, most)
             read += [bytes(self._bytes(length)).decode() for length in answer["lengths"]]
         texts = np.empty(len(read), object)
         texts[:] = read
         return texts.reshape(entry.shape)
 
-    def check_size(self, names: Iterable[str]) -> None:
+    def check_size(self, names: Iterable[str], dtypes: Mapping[str, DTypeLike]) -> None:
         """Refuse data sets of numbers that have more bytes together than a file may hold, before one is read.
+
+        `dtypes` are those that data sets will be converted to, by name.
 
         Raises
         ------
         FormatError : more bytes than a file may hold
         """
-        entries = (self.entries[name] for name in names)
-        sizes = (math.prod(one.shape) * np.dtype(one.dtype).itemsize for one in entries if one.is_numbers)
+        there = {name: one for name in names if (one := self.entries[name]).is_numbers}
+        sizes = (math.prod(one.shape) * np.dtype(dtypes.get(name, one.dtype)).itemsize for name, one in there.items())
         unpacked(str(self.path), sum(sizes))
 
     def numbers(self, name: str, dtype: DTypeLike | None = None) -> NDArray[Any]:

@@ -18,13 +18,16 @@ import numpy as np
 from taxel._core import FormatError
 
 __all__ = [
+    "ABOUT",
     "CHUNK",
     "COLUMNS",
     "DESCRIPTION",
     "LINE",
+    "MARKERS",
     "TAXELS",
     "TEXT",
     "TIME_US",
+    "UNIT",
     "UNPACKED",
     "VALUE",
     "available",
@@ -49,6 +52,12 @@ TEXT = 1 << 30
 CHUNK = 1 << 26
 #: Bytes of a description in JSON: 64 MiB.
 DESCRIPTION = 1 << 26
+#: Bytes that the description of a recording takes, read: 192 MiB.
+ABOUT = 192 << 20
+#: Characters of a unit.
+UNIT = 256
+#: Markers of a recording, each of which is a tuple.
+MARKERS = 1 << 18
 #: The largest value of a picture, which has 32 bits.
 VALUE = float(np.finfo(np.float32).max)
 #: The largest absolute time, us: 142 years, so that it also fits in 64 bits as ns.

@@ -40,6 +40,8 @@ __all__ = [
 _CELLS, _LINES = 1 << 17, 4096
 #: Bytes of a text that are read at once.
 _PIECE = 1 << 20
+#: Lines of a text with nothing in them, which take time and say nothing.
+_EMPTY = 10_000_000
 #: Bytes in memory of a line of text, beside its characters.
 _PER_LINE = 64
 #: The most bytes that a byte of a gzip file unpacks to.
@@ -77,7 +79,7 @@ def stream(path: Path) -> Iterator[str]:
     ------
     FormatError : as of `lines`, or a line of more than 4 MiB
     """
-    rest, number, begin = b"", 1, 0
+    rest, number, begin, empty = b"", 1, 0, 0
     for piece in _pieces(path):
         if not begin and not rest and piece.startswith(_UTF_8):
             piece, begin = piece[len(_UTF_8) :], len(_UTF_8)  # noqa: PLW2901
@@ -87,6 +89,9 @@ def stream(path: Path) -> Iterator[str]:
         if len(data) - end > LINE:
             raise FormatError(f"{path.name}, line {number}: more than {LINE} bytes; at most that are read")
         found = _lines(path, data[:end], begin)
+        empty += found.count("") + sum(map(str.isspace, found))
+        if empty > _EMPTY:
+            raise FormatError(f"{path.name}, line {number}: {empty} empty lines up to here; at most {_EMPTY} are read")
         yield from found
         rest, number, begin = data[end:], number + len(found), begin + end
     yield from _lines(path, rest, begin)

@@ -10,7 +10,7 @@ import numpy as np
 
 from taxel._base import limits
 from taxel._base.arguments import flag, number, text, whole
-from taxel._base.documents import of_json
+from taxel._base.documents import memory_of_json, of_json
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -29,7 +29,12 @@ __all__ = [
 
 
 def json_of(contents: Contents) -> str:
-    """Return all fields that are not columns of the table, as the JSON in files."""
+    """Return all fields that are not columns of the table, as the JSON in files.
+
+    Raises
+    ------
+    ProblemError : a description that would not be read again, as it takes too much memory
+    """
     registers = contents.registers
     changes = contents.register_changes
     driven = registers.array if registers is not None else changes[0][1].array if changes else contents.array
@@ -56,7 +61,13 @@ def json_of(contents: Contents) -> str:
         "rebuilt": dict(contents.rebuilt),
         "lost": contents.lost,
     }
-    return json.dumps({name: value for name, value in document.items() if value})
+    described = json.dumps({name: value for name, value in document.items() if value})
+    if (size := memory_of_json(described)) > limits.ABOUT:
+        raise ProblemError(
+            f"{contents.name}: its description (sensor, notes, registers, detections) takes {size} bytes of memory; a "
+            f".npz and a .h5 hold at most {limits.ABOUT}"
+        )
+    return described
 
 
 def about_of(place: str, document: str) -> dict[str, Any]:
@@ -69,7 +80,7 @@ def about_of(place: str, document: str) -> dict[str, Any]:
     entry = "the whole"
     fields: dict[str, Any] = {}
     try:
-        about = of_json(place, document, limits.DESCRIPTION, with_nan=True)
+        about = of_json(place, document, limits.ABOUT, room=limits.ABOUT, with_nan=True)
         if not isinstance(about, dict):
             raise ProblemError("no object")
         for entry, read in _ENTRIES.items():

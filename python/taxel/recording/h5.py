@@ -25,7 +25,7 @@ from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.recording.contents import Contents
-from taxel.recording.npz import TEXTS, columns_of, contents_of
+from taxel.recording.npz import DTYPES, TEXTS, chosen, columns_of, contents_of
 
 __all__ = ["is_ours", "read_h5", "write_h5"]
 
@@ -126,6 +126,10 @@ def read_h5(path: Path, array: Array | None) -> Contents:
             )
         if version != _VERSION:
             raise FormatError(f"{path}: layout {shown(version)}; this version reads {_VERSION}")
-        h5.check_size(h5.entries)
-        columns = {name: np.array(h5.text(name)) if name in TEXTS else h5.numbers(name) for name in h5.entries}
+        names = chosen(path, {name: entry.shape for name, entry in h5.entries.items()})
+        h5.check_size(names, DTYPES)
+        columns = {
+            name: np.array(h5.text(name, TEXTS[name])) if name in TEXTS else h5.numbers(name, DTYPES.get(name))
+            for name in names
+        } or {name: np.empty(0) for name in list(h5.entries)[:8]}
     return contents_of(path, "h5", columns, array)

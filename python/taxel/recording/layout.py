@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
+from taxel._base.columns import frozen_whole
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -78,7 +81,9 @@ def laid_out(of: Contents, layout: Layout) -> Contents:
         raise FormatError(f"{layout.place}: {of.name} holds events; falls, unit and rate_hz are of pictures")
     if not same.has_events and same.frames is not None:
         # Read at once, so that a layout that contradicts the file is refused where the file is opened.
-        same = same.but(frames=_read(same.frames, layout, of.name))
+        # Those of another program were read a moment ago, and nobody else has them.
+        is_ours = of.kind in ("table", "arrays")
+        same = same.but(frames=_read(same.frames, layout, of.name, is_ours=is_ours))
     untimed = same.untimed and layout.rate_hz is None
     return same.but(side=of.side or layout.side, heel=layout.heel or of.heel, untimed=untimed)
 
@@ -108,8 +113,8 @@ def _places_along(of: Contents) -> object:
     return packaged(of.kind).array(of.array.columns, of.array, of.side).places
 
 
-def _read(own: Frames, layout: Layout, name: str) -> Frames:
-    """Return pictures in the unit, at the rate and in the direction that a layout says."""
+def _read(own: Frames, layout: Layout, name: str, *, is_ours: bool) -> Frames:
+    """Return pictures in the unit, at the rate and in the direction that a layout says; `is_ours`: `own` may change."""
     unit, t, values = own.unit, own.t, own.values
     if layout.unit is not None:
         if unit not in (*_UNSAID, layout.unit):
@@ -126,15 +131,36 @@ def _read(own: Frames, layout: Layout, name: str) -> Frames:
             raise FormatError(f"{layout.place}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
     if layout.falls is not False:
         full = 0.0 if layout.falls is True else layout.falls
-        with np.errstate(over="ignore"):
-            values = np.float32(full) - values
-        if (large := np.isinf(values)).any():
-            raise FormatError(
-                f"{layout.place}: falls is {layout.falls}; {name} reads {shown(own.values[large][0].item())}, and the "
-                "difference does not fit 32 bits"
-            )
+        values = _writable(values) if is_ours else values.copy()
+        step = max(1, _PIECE // max(1, values[:1].size))
+        for begin in range(0, len(values), step):
+            part = values[begin : begin + step]
+            with np.errstate(over="ignore"):
+                risen = np.float32(full) - part
+            if (large := np.isinf(risen)).any():
+                raise FormatError(
+                    f"{layout.place}: falls is {layout.falls}; {name} reads {shown(part[large][0].item())}, and the "
+                    "difference does not fit 32 bits"
+                )
+            part[...] = risen
+        frozen_whole(values)
     return Frames(values, t, unit=unit, array=own.array)
 
 
+def _writable(array: NDArray[Any]) -> NDArray[Any]:
+    """Return an array that nobody else has, made writable again; a copy if its memory is not NumPy's."""
+    parts, part = list[NDArray[Any]](), array.base
+    while isinstance(part, np.ndarray):
+        parts.append(part)
+        part = part.base
+    if part is not None:
+        return array.copy()
+    for one in (*reversed(parts), array):
+        one.setflags(write=True)
+    return array
+
+
+#: Values that are turned at once.
+_PIECE = 1 << 20
 #: The share by which a rate that a layout says may differ from that of a file's own times.
 _SLACK = 0.05

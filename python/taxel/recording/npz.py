@@ -9,6 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -17,7 +20,8 @@ from numpy.typing import NDArray
 
 from taxel._base.archive import read_arrays, stored_names
 from taxel._base.columns import frozen_whole
-from taxel._base.messages import first_line
+from taxel._base.limits import ABOUT, MARKERS, TAXELS, UNIT
+from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -27,12 +31,16 @@ from taxel.recording.contents import Contents
 from taxel.recording.description import about_of, json_of
 from taxel.recording.layout import check_size
 
-__all__ = ["TEXTS", "around", "columns_of", "contents_of", "read_npz", "write_npz"]
+__all__ = ["DTYPES", "TEXTS", "around", "chosen", "columns_of", "contents_of", "read_npz", "write_npz"]
 
 _EVENTS = ("t", "x", "y", "p")
 _COLUMNS = (*_EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
-#: The columns that are a single text.
-TEXTS = ("about", "unit")
+#: Columns of events, one entry each.
+_OF_EVENTS = (*_EVENTS, "intensity", "present", "repaired")
+#: The columns that are a single text, and how many characters they may have; NumPy's have 4 bytes.
+TEXTS = {"about": ABOUT // 6, "unit": UNIT}
+#: The columns that are converted as they are read.
+DTYPES = {"values": np.float32}
 #: The entry with the checksum over all columns; earlier versions wrote none, and ignore it.
 _DIGEST = "digest"
 #: Bytes of a column that are taken into the checksum at once.
@@ -40,10 +48,17 @@ _PIECE_BYTES = 1 << 20
 
 
 def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
-    """Return a recording as columns by name, with their checksum."""
+    """Return a recording as columns by name, with their checksum.
+
+    Raises
+    ------
+    ProblemError : more markers, or a longer description, than are read again
+    """
     table = contents.table
     columns: dict[str, Any]
     if isinstance(table, Frames):
+        if (count := len(table.unit)) > UNIT:
+            raise ProblemError(f"{contents.name}: a unit of {count} characters; a .npz and a .h5 hold at most {UNIT}")
         columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
     else:
         columns = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
@@ -51,6 +66,10 @@ def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
             columns |= {"intensity": table.intensity, "present": table.present}
         if table.repaired is not None:
             columns["repaired"] = table.repaired
+        if len(table.markers) > MARKERS:
+            raise ProblemError(
+                f"{contents.name}: {len(table.markers)} markers; a .npz and a .h5 hold at most {MARKERS}"
+            )
         columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
     if contents.held is not None:
         columns["held"] = contents.held
@@ -69,11 +88,49 @@ def _digest_of(columns: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
         little = column.dtype.newbyteorder("<")
         digest.update(json.dumps([name, little.str, column.shape]).encode() + b"\n")
         rows = np.atleast_1d(column)
+        if rows.dtype.kind == "U" and rows.nbytes:
+            little = np.dtype("<u4")
+            rows = rows.view(rows.dtype.str[0] + "u4")
         step = max(1, _PIECE_BYTES // max(1, rows[:1].nbytes))
         # A shape of many rows without bytes would take for ever.
         for k in range(0, len(rows) if column.nbytes else 0, step):
             digest.update(rows[k : k + step].astype(little, copy=False).tobytes())
     return np.frombuffer(digest.digest(), np.uint8)
+
+
+def chosen(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
+    """Return the columns of a file that are read, by the shapes of all that it has; other entries are not.
+
+    Raises
+    ------
+    FormatError : columns that do not fit each other, or too many markers
+    """
+    others = (*_OF_EVENTS[1:], "markers") if {"values", "t"} <= shapes.keys() else ("values", "unit")
+    there = {name: shapes[name] for name in (*_COLUMNS, _DIGEST) if name in shapes and name not in others}
+    for name, shape in there.items():
+        if (right := _wrong_shape(name, there)) is not None:
+            found = " x ".join(map(str, shape)) or "one value"
+            raise FormatError(f"{path}, {name}: {found}; must be {right}")
+    return list(there)
+
+
+def _wrong_shape(name: str, there: Mapping[str, tuple[int, ...]]) -> str | None:
+    """Return what the shape of a column must be, if it is another; None if it is right."""
+    shape, pictures = there[name], there.get("values")
+    if name in TEXTS:
+        return "one text" if shape else None
+    if name == _DIGEST:
+        return "16 bytes" if shape != (16,) else None
+    if name == "markers":
+        is_right = len(shape) == 2 and shape[0] <= MARKERS and shape[1] == 2
+        return None if is_right else f"a time and whether it is a start, of at most {MARKERS} markers"
+    if name == "held":
+        return f"a value a taxel, at most {TAXELS}" if math.prod(shape) > TAXELS else None
+    if pictures is not None:
+        is_right = name == "values" or shape == pictures[:1]
+        return None if is_right else f"a time for each of {counted(math.prod(pictures[:1]), 'picture')}"
+    is_right = len(shape) == 1 and shape == there.get("t", shape)
+    return None if is_right else "one value an event, as many as t has"
 
 
 def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Contents:
@@ -151,7 +208,8 @@ def read_npz(path: Path, array: Array | None) -> Contents:
     FormatError : damage, or no such columns
     """
     # Other columns are not read, but the error for a missing column lists them.
-    columns = read_arrays(path, (*_COLUMNS, _DIGEST), texts=TEXTS) or {
+    of_file = partial(chosen, path)
+    columns = read_arrays(path, (*_COLUMNS, _DIGEST), texts=TEXTS, dtypes=DTYPES, chosen=of_file) or {
         name: np.empty(0) for name in stored_names(path)[:8]
     }
     return contents_of(path, "npz", columns, array)

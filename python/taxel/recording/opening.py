@@ -220,8 +220,11 @@ def _open_one(place: Path, how: How) -> Recording:
             own = None if how.array is None else instance("array", how.array, Array)
             contents = _read(place, kind, own, how.pairing, how.differences)
         return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
-    except MemoryError as error:
-        raise FormatError(f"{place}: needs more memory than there is ({error})") from None
+    except MemoryError:
+        raise FormatError(
+            f"{place}: needs more memory than there is ({limits.available()} bytes are available): --limit BYTES "
+            "(limit=) says how many may be read"
+        ) from None
 
 
 def _on_given(of: Contents, array: Array) -> Contents:

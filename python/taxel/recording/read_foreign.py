@@ -58,6 +58,10 @@ ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
 
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
 _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
+#: Characters of the name of an array that errors show; a path in a .h5 may have thousands.
+_NAME = 60
+#: Bytes of pictures that are compared at once, and times that are converted at once.
+_PIECE, _TIMES_AT_ONCE = 1 << 22, 1 << 16
 #: Cells that tables hold where a value is missing.
 MISSING = ("", "nan", "NaN", "NA", "-", "null")
 
@@ -155,8 +159,13 @@ def unit_of(name: str) -> str | None:
 def listed(there: Mapping[str, tuple[int, ...]]) -> str:
     """Return the names and shapes of the first arrays, those that could hold pictures before the others."""
     first = sorted(there.items(), key=lambda one: len(one[1]) not in (2, 3))[:8]
-    shown = [f"{name or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
-    return (", ".join(shown) or "no numbers") + " ..." * (len(there) > 8)
+    said = [f"{_short(name) or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
+    return (", ".join(said) or "no numbers") + " ..." * (len(there) > 8)
+
+
+def _short(name: str) -> str:
+    """Return the name of an array, or the end of a long one."""
+    return name if len(name) <= _NAME else f"...{name[3 - _NAME :]}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -366,7 +375,7 @@ def _data(path: Path, how: Data) -> _Read:
             size = as_size(getattr(how, key))
             right = f"a size is said by {size}" if size else "leave it out"
             raise FormatError(f"{path}: one array without a name; the layout says [data] {key}: {right}")
-        arrays = {"": read_array(path)}
+        arrays = {"": read_array(path, np.float32)}
         there: list[str] = [""]
         wanted = there
     else:
@@ -384,6 +393,9 @@ def _data(path: Path, how: Data) -> _Read:
             size = as_size(missing)
             hint = f"; a size is said by {size}" if size else ""
             raise FormatError(f"{path}: holds no array {missing}; there are {listed(every)}{hint}")
+        if len(wanted) > 1 and every[wanted[1]] != every[wanted[0]][:1]:
+            count, pictures = math.prod(every[wanted[1]]), math.prod(every[wanted[0]][:1])
+            raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(pictures, 'picture')}")
         arrays = arrays_of(path, wanted, pictures=wanted[0])
     values, unread = arrays[wanted[0]], ", ".join(name for name in there if name not in wanted)
     lost = (f"other arrays of the file: {unread}",) if unread else ()
@@ -406,19 +418,27 @@ def _data(path: Path, how: Data) -> _Read:
     times = arrays[wanted[1]]
     if times.dtype.kind not in "uif":
         raise FormatError(f"{path}, {wanted[1]}: {times.dtype}; must be times as numbers")
-    times = times.astype(np.float64)
-    if times.shape != values.shape[:1]:
-        raise FormatError(f"{path}, {wanted[1]}: {counted(times.size, 'time')} for {counted(len(values), 'picture')}")
-    return _Read(values, whole_us(path.name, times * UNITS_US[how.time_unit] / 1e6, 0), lost=lost)
+    # Nobody else has the times, which take more memory than the readings of a single taxel.
+    t = (
+        times.view(np.int64)
+        if times.dtype.itemsize == 8 and times.flags.c_contiguous
+        else np.empty(len(times), np.int64)
+    )
+    for begin in range(0, len(times), _TIMES_AT_ONCE):
+        part = slice(begin, begin + _TIMES_AT_ONCE)
+        t[part] = whole_us(path.name, times[part].astype(np.float64) * UNITS_US[how.time_unit] / 1e6, begin)
+    return _Read(values, t, lost=lost)
 
 
 def _too_large(values: NDArray[Any]) -> tuple[int, ...] | None:
     """Return the place of the first value that 32 bits do not hold; None if there is none."""
-    for k, picture in enumerate(values):
+    step = max(1, _PIECE // values[:1].nbytes)
+    for begin in range(0, len(values), step):
         # VALUE is no number of 16 bits.
-        large = np.argwhere(np.abs(picture) > np.float64(VALUE))
-        if len(large):
-            return (k, *map(int, large[0]))
+        large = np.abs(values[begin : begin + step]) > np.float64(VALUE)
+        if large.any():
+            first, *rest = np.unravel_index(int(np.argmax(large)), large.shape)
+            return (begin + int(first), *map(int, rest))
     return None
 
 
@@ -441,6 +461,6 @@ def _left_out_of(path: Path) -> dict[str, str]:
 def arrays_of(path: Path, names: Sequence[str], pictures: str | None = None) -> dict[str, NDArray[Any]]:
     """Read the arrays of these names of a .npz or .h5; of a .h5 that of the pictures as float32, without a copy."""
     if path.suffix.lower() == ".npz":
-        return read_arrays(path, names)
+        return read_arrays(path, names, dtypes={} if pictures is None else {pictures: np.float32})
     with H5File(path) as h5:
         return {name: h5.numbers(name, np.float32 if name == pictures else None) for name in names}

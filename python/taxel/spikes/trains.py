@@ -18,6 +18,7 @@ from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
 from taxel._base.files import write_whole
+from taxel._base.limits import UNIT
 from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.spikes.exchange import Kind, read_nwb, write_nwb
@@ -560,7 +561,7 @@ class SpikeTrains(Columns):
         """
         place = checked_path("path", path)
         try:
-            held = read_arrays(place, ("times", "offsets", "start", "stop", "values", "kind"), texts=("kind",))
+            held = read_arrays(place, ("times", "offsets", "start", "stop", "values", "kind"), texts={"kind": UNIT})
             kind = held["kind"].item() if "kind" in held else None
             start, stop = held["start"].item(), held["stop"].item()
             return cls(held["times"], held["offsets"], start, stop, held.get("values"), kind=kind)
