@@ -259,8 +259,8 @@ def _times(stamps: NDArray[np.int64], bag: NDArray[np.int64]) -> tuple[NDArray[n
     """Return times in ns, which never fall, by the headers' stamps; and how many are the bag's instead.
 
     Sound stamps are above 0, within a day of the bag's time of their message, and ascend. The first and the last are
-    not sound if their delay from the bag's time is off the median delay by more than a second, and
-    by ten times as much as any other. Where less than half are sound, all messages have the bag's times, else those whose stamp is wrong. The bag's
+    not sound if their delay is off the median delay by more than a second, and by ten times as much as any other.
+    Where less than half are sound, all messages have the bag's times, else those whose stamp is wrong. The bag's
     time is later than the stamp by the time that the message was under way: where it would come after the next
     message's, it is used less the median of that delay, and at most that next time.
     """
