@@ -150,7 +150,7 @@ class H5File:
         texts[:] = read
         return texts.reshape(entry.shape)
 
-    def check_size(self, names: Iterable[str], dtypes: Mapping[str, DTypeLike]) -> None:
+    def check_size(self, names: Iterable[str], dtypes: Mapping[str, DTypeLike] | None = None) -> None:
         """Refuse data sets of numbers that have more bytes together than a file may hold, before one is read.
 
         `dtypes` are those that data sets will be converted to, by name.
@@ -160,7 +160,9 @@ class H5File:
         FormatError : more bytes than a file may hold
         """
         there = {name: one for name in names if (one := self.entries[name]).is_numbers}
-        sizes = (math.prod(one.shape) * np.dtype(dtypes.get(name, one.dtype)).itemsize for name, one in there.items())
+        sizes = (
+            math.prod(one.shape) * np.dtype((dtypes or {}).get(name, one.dtype)).itemsize for name, one in there.items()
+        )
         unpacked(str(self.path), sum(sizes))
 
     def numbers(self, name: str, dtype: DTypeLike | None = None) -> NDArray[Any]:

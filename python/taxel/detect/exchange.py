@@ -181,7 +181,7 @@ def _tree(place: str | os.PathLike[str]) -> dict[str, Any]:
     root: dict[str, Any] = {}
     with H5File(place) as h5:
         paths = [path for path in h5.entries if path.split("/", maxsplit=1)[0] == "node"]
-        h5.check_size(paths, {})
+        h5.check_size(paths)
         for path in paths:
             entry, (*groups, name) = h5.entries[path], path.split("/")
             inner = root
