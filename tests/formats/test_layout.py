@@ -418,7 +418,7 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
             r"holds a \(2 x 6\), b \(3\); say which in the layout",
         ),
         (lambda place: np.savez(place, a=np.zeros(6)), "must be numbers of shape pictures x rows x columns"),
-        (lambda place: np.savez(place, a=np.array([["x"] * 6])), "must be numbers"),
+        (lambda place: np.savez(place, a=np.array([["x"] * 6])), "must hold numbers"),
         (lambda place: np.savez(place, a=np.zeros((2, 5))), "says 2 x 3 taxels"),
     ],
 )

@@ -130,7 +130,7 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
             taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
         )
         pictures = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
-        frames = Frames(frozen_whole(pictures), t, array=array)
+        frames = Frames(frozen_whole(pictures), frozen_whole(t), array=array)
     except ProblemError as error:
         raise FormatError(f"{layout.place}: {first_line(error)}") from None
     limited(path, frames)
