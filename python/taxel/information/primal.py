@@ -15,6 +15,8 @@ __all__ = ["ClassMoments", "Primal", "blocks", "feature_table", "is_exact", "sol
 
 #: Rows that are turned into floats at a time.
 _ROWS = 2048
+#: The largest feature, from 0: sums of squares of larger ones overflow.
+_LARGEST = 1e100
 #: Whole numbers up to this size are exact in float32.
 _EXACT = 2**24
 #: A feature with a smaller share of variance of its own counts as dependent on the others: the scatter is singular.
@@ -301,7 +303,9 @@ def feature_table(x: ArrayLike) -> NDArray[Any]:
         raise ProblemError(f"x has shape {table.shape}: must be (trials, features)")
     if table.dtype.kind == "f":
         for first in range(0, len(table), _ROWS):
-            wrong = np.argwhere(~np.isfinite(table[first : first + _ROWS]))
+            wrong = np.argwhere(~(np.abs(table[first : first + _ROWS]) <= _LARGEST))
             if len(wrong):
-                raise ProblemError(f"x[{first + wrong[0][0]}, {wrong[0][1]}] is not finite")
+                place = first + wrong[0][0], wrong[0][1]
+                fault = f"beyond {_LARGEST:g}" if np.isfinite(table[place]) else "not finite"
+                raise ProblemError(f"x[{place[0]}, {place[1]}] is {fault}")
     return table

@@ -15,6 +15,8 @@ __all__ = ["Pipe"]
 
 #: Largest length of the first line, bytes.
 _LONGEST_LINE = 1 << 16
+#: The first line, for errors.
+_EXPECTED = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
 
 
 class Pipe:
@@ -47,10 +49,11 @@ class Pipe:
         try:
             header = of_json("standard input, line 1", line.decode())
             rows, columns, rate, bits = (header[name] for name in ("rows", "columns", "rate", "bits"))
-        except (FormatError, ValueError, TypeError, KeyError) as error:
-            expected = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
+        except FormatError as error:
+            raise FormatError(f"{error}; must be like {_EXPECTED}") from None
+        except (ValueError, TypeError, KeyError) as error:
             begin = line[:60].decode("utf-8", "replace")
-            raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {expected}") from None
+            raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be like {_EXPECTED}") from None
         self.array = Array(rows, columns, pitch_mm=header.get("pitch_mm"), name=header.get("name", "pipe"))
         self.rate_hz, floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
         try:
