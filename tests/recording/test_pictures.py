@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from taxel.recording.contents import Contents, several
 from taxel.recording.opening import joined, open_joined
 
 WHOLE = st.integers(0, 65_535).map(float)
-ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True), st.sampled_from([-0.0, 65_536.0, float("inf")]))
+ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True, allow_infinity=False), st.sampled_from([-0.0, 65_536.0]))
 
 
 @st.composite
@@ -257,8 +258,9 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
         sources[foot] = Contents(tmp_path / "a.asc", f"a {foot}", "pedar", array, label=foot, frames=frames)
     [both] = joined([taxel.Recording(one) for one in sources.values()])
     taxel.convert(both, tmp_path / "a.mcap")
-    with pytest.warns(UserWarning, match=r"--tare 0\.5: the beginning of .*a\.mcap right is not quiet but holds"):
-        assert call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")[0] == 0
+    code, _, errors = call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")
+    assert code == 0
+    assert re.search(r"warning: --tare 0\.5: the beginning of .*a\.mcap right is not quiet but holds", errors)
 
 
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ SOUND: dict[str, Sound] = {
         field=None,
         types=None,
         ros=None,
+        limit=1 << 30,
     ),
     "taxel.Recording.at_rate": plain(
         lambda **given: taxel.Recording(NUMBERED).at_rate(**given).frames(),

@@ -65,7 +65,7 @@ impl Range {
         Self { most, most_in: false, ..self }
     }
 
-    /// Whether a value is in the range; NaN never is, nor, where 0 is not, what is nearer to it than [`LEAST`].
+    /// Whether a value is in the range; NaN never is, nor, where 0 is not, what is nearer to it than `LEAST`.
     #[must_use]
     pub fn holds(&self, value: f64) -> bool {
         self.spans(value) && (value.abs() >= LEAST || self.spans(0.0))

@@ -117,7 +117,7 @@ def memory_of_json(text: str) -> int:
     Examples
     --------
     >>> memory_of_json("[]"), memory_of_json('["a", 1, true]')
-    (110, 348)
+    (112, 294)
     """
     # A text of other than Latin letters has 4 bytes a character, as NumPy's always have; a part of it is in a value.
     characters = len(text) * (6 if text.isascii() else 12)

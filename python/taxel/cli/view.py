@@ -124,7 +124,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
     first = every[0]
     bag = is_bag(first)
     if bag and not files.names_topic(first):
-        raise ProblemError(listed(first, topics(first, files.types, files.ros), as_json=False))
+        raise ProblemError(*listed(first, topics(first, files.types, files.ros), as_json=False))
     if not files.words() and calibration is None and not bag:
         return None
 

@@ -5,6 +5,9 @@ use crate::wire::v2::Header;
 /// How far a datagram may be behind the highest sequence number and still be distinguished from a repeated one.
 pub(super) const WINDOW: usize = 65_536;
 
+/// How many datagrams with other contents, as many as came at all, show that a session begins again.
+pub(super) const LEAST_UNLIKE: u32 = 8;
+
 /// How a number follows those that came before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Noted {
@@ -86,9 +89,9 @@ impl Session {
         within && self.has(number) && self.sums.get(self.place_of_sum(number)) != Some(&(sum as u16))
     }
 
-    /// Whether as many datagrams differ as came at all, and more than a single one.
+    /// Whether as many datagrams differ as came at all, and more than another board sends by chance in that order.
     pub(super) fn is_contradicted(&self) -> bool {
-        self.unlike > 1 && u64::from(self.unlike) >= self.received
+        self.unlike >= LEAST_UNLIKE && u64::from(self.unlike) >= self.received
     }
 
     #[inline]
