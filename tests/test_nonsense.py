@@ -8,6 +8,7 @@ import inspect
 import json
 import math
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -169,28 +170,37 @@ def write_clock(path: Path) -> None:
     writer.finish("{}")
 
 
-@pytest.fixture
-def somewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    FOUND.to_csv("here.csv")
-    TRAINS.save("here.npz")
-    TARE.save("here_tare.json")
-    CALIBRATION.save("here_calibration.json")
-    TICKS.save("here_events.calibration.json")
-    READOUT.save("here_readout.json")
-    RULE.save("here_rule.json")
-    READOUT.to_nir("here.nir")
-    TRAINS.to_nwb("here.nwb")
-    taxel.convert(EVENTS, "here_events.npz")
-    (tmp_path / "here.toml").write_text('[encoder]\nname = "fa1"\n')
-    taxel.convert(EVENTS, tmp_path / "here_panel.mcap")
-    write_clock(tmp_path / "here_clock.mcap")
-    (tmp_path / "here_scene.toml").write_text(SCENE_FILE)
-    (tmp_path / "here_labels.csv").write_text("label,t_us\na,5\n")
-    (tmp_path / "here_trials.csv").write_text("recording,t_us,label\nhere_events,0,a\n")
-    (tmp_path / "pdb").mkdir()
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that sound calls read."""
+    folder = tmp_path_factory.mktemp("made")
+    FOUND.to_csv(folder / "here.csv")
+    TRAINS.save(folder / "here.npz")
+    TARE.save(folder / "here_tare.json")
+    CALIBRATION.save(folder / "here_calibration.json")
+    TICKS.save(folder / "here_events.calibration.json")
+    READOUT.save(folder / "here_readout.json")
+    RULE.save(folder / "here_rule.json")
+    READOUT.to_nir(folder / "here.nir")
+    TRAINS.to_nwb(folder / "here.nwb")
+    taxel.convert(EVENTS, folder / "here_events.npz")
+    (folder / "here.toml").write_text('[encoder]\nname = "fa1"\n')
+    taxel.convert(EVENTS, folder / "here_panel.mcap")
+    write_clock(folder / "here_clock.mcap")
+    (folder / "here_scene.toml").write_text(SCENE_FILE)
+    (folder / "here_labels.csv").write_text("label,t_us\na,5\n")
+    (folder / "here_trials.csv").write_text("recording,t_us,label\nhere_events,0,a\n")
+    (folder / "pdb").mkdir()
     row = "\t".join(["0"] * 18)
-    (tmp_path / "pdb" / "GaCo01_01.txt").write_text("\n".join(f"{k / 100}\t{row}" for k in range(50)) + "\n")
+    (folder / "pdb" / "GaCo01_01.txt").write_text("\n".join(f"{k / 100}\t{row}" for k in range(50)) + "\n")
+    return folder
+
+
+@pytest.fixture
+def somewhere(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of that folder as the current one."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 

@@ -29,7 +29,14 @@ ENDS = {
     "closed terminal": lambda one: one.close_terminal(),
 }
 #: The leader of a session takes the terminal for its own: when that closes, the kernel sends SIGHUP.
-_BEGIN = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execv(sys.argv[1], sys.argv[1:])"
+#: It heeds all signals, also where these tests run under nohup.
+_BEGIN = """
+import fcntl, os, signal, sys, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+for number in (signal.SIGHUP, signal.SIGINT):
+    signal.signal(number, signal.SIG_DFL)
+os.execv(sys.argv[1], sys.argv[1:])
+"""
 _numbers = itertools.count()
 
 

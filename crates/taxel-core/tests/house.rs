@@ -34,7 +34,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
         "taxel-live",
         &[
             &["error", "latency", "locked"],
-            &["clock", "host_clock"],
+            &["clock", "host_clock", "regular_file"],
             &["address", "bridged", "ports"],
             &["recording"],
             &["capture"],
@@ -57,6 +57,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["folder"],
             &["hub"],
             &["opening", "recording_session", "registers"],
+            &["label_requests"],
             &["requests"],
             &["session"],
             &["server"],

@@ -29,14 +29,14 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
 pub(crate) use damage::{ADDRESS, EMPTY, REFUSED, add_order};
-pub use damage::{Found, damage, damage_of_version_1};
+pub use damage::{Found, LeftOut, damage, damage_of_version_1};
 pub use event_pictures::EventPictures;
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Message, Numbers, Place, Reader, Remarks, Unread, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
 pub use pictures::{Encoding, PictureSource, Pictures};
-pub use stream::{Faults, LeftOut, Samples, Stream, fields};
+pub use stream::{Faults, Samples, Stream, fields};
 pub use topic::Topic;
 pub(crate) use verdict::JUMPED_BEFORE;
 pub use verdict::{Basis, Condition, Counts, Ending, NOTHING_LOST, Rebuilt, Status, Verdict};

@@ -21,6 +21,15 @@ pub(super) enum Indexed {
     Pictures(Arc<PictureIndex>),
 }
 
+/// The recording that a client shows.
+#[derive(Debug, Clone)]
+pub(super) struct Shown {
+    pub(super) name: String,
+    /// Its trial, where the file holds several.
+    pub(super) trial: Option<String>,
+    pub(super) indexed: Indexed,
+}
+
 impl Indexed {
     pub(super) fn index(&self) -> Arc<dyn KeyframeIndex> {
         match self {

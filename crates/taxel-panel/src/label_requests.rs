@@ -10,11 +10,11 @@ use tokio::sync::oneshot;
 use super::clients::Broadcast;
 use super::handler::{EditOutcome, LabelRow, LabelTable};
 use super::hub::Hub;
+use super::indexed::Shown;
 use super::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
 use super::limits::MOST_MARKS;
 use super::messages::warning;
 use super::request::{Answer, Refusal, Request};
-use super::requests::Shown;
 
 /// How often the tables that were opened are checked for changes of other programs.
 const FOLLOW_EVERY: Duration = Duration::from_millis(300);

@@ -12,20 +12,11 @@ use taxel_live::ports::ports;
 use super::clients::Broadcast;
 use super::handler::{Cut, Detected, UnhealthyTaxels};
 use super::hub::Hub;
-use super::indexed::Indexed;
+use super::indexed::{Indexed, Shown};
 use super::live_source::LiveSource;
 use super::recorder::{RecordingFormat, RecordingPlan};
 use super::request::{Answer, Refusal, Request};
 use super::{label_requests, recording_session, registers};
-
-/// The recording that a client shows.
-#[derive(Debug, Clone)]
-pub(super) struct Shown {
-    pub(super) name: String,
-    /// Its trial, where the file holds several.
-    pub(super) trial: Option<String>,
-    pub(super) indexed: Indexed,
-}
 
 /// Carries out a request; `shown` is the recording that the client shows. Returns the message for that client alone.
 ///

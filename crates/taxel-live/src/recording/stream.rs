@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
-use super::damage::{Found, IN_NO_LINE, MISSING, STRANGE, UNFINISHED_LINES};
+use super::damage::{Found, IN_NO_LINE, LeftOut, MISSING, STRANGE, UNFINISHED_LINES};
 use super::limits;
 use clock::StreamClock;
 
@@ -236,15 +236,6 @@ impl Faults {
         found.damage.extend(counts.map(|(cause, n)| (cause.to_owned(), n)));
         found
     }
-}
-
-/// Number of bytes that arrived from a source of lines and that are in no line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct LeftOut {
-    /// Those that cannot be part of a line of numbers.
-    pub in_no_line: u64,
-    /// Those of lines whose end did not arrive, or whose beginning did not.
-    pub unfinished: u64,
 }
 
 #[cfg(test)]

@@ -7,10 +7,11 @@ use serde_json::{Map, Value, json};
 use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
+use crate::indexed::Shown;
 use crate::label_requests::is_label_request;
 use crate::limits::MOST_BYTES;
 use crate::request::{Refusal, Request};
-use crate::requests::{Shown, carry_out};
+use crate::requests::carry_out;
 
 /// Maximum number of pending requests, but for those that change labels: a person's work is not refused.
 const MOST_PENDING: usize = 8;

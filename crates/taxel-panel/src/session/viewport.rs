@@ -13,6 +13,7 @@ use super::playback::Playback;
 use crate::encoded_spikes::EncodedSpikes;
 use crate::folder::size;
 use crate::hub::Hub;
+use crate::indexed::Shown;
 use crate::keyframe_index::KeyframeIndex;
 use crate::label_requests;
 use crate::live_source::LiveSource;
@@ -21,7 +22,6 @@ use crate::opening;
 use crate::picture::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::player::{Player, ViewOptions};
 use crate::request::{Answer, Refusal, Request, taxel};
-use crate::requests::Shown;
 use crate::requests::readout_of;
 use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
 

@@ -446,11 +446,11 @@ impl Exact {
             *w = w.clamp(l, u);
         }
         let unmet = match self.raised(&weights)? {
-            Some(raised) if self.unmet(&raised)?.is_none() => {
+            Some(raised) => {
                 weights = raised;
                 None
             }
-            _ => self.unmet(&weights)?,
+            None => self.unmet(&weights)?,
         };
         let parts = self.parts(&weights);
         let objective = parts.sum();

@@ -4,21 +4,66 @@
 //! fires shortly afterwards, because the potential still rises, unless an inhibitory input ends the rise first. There the
 //! row is raised by its largest rounding error, so that the exact sum of kernels reaches the threshold.
 
-use super::exact::Exact;
+use super::exact::{Exact, KEPT_SHARE};
 use crate::learn::engines::{HardRows, nearest};
 use crate::learn::statement::{Bounds, Row, until};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
+/// A target's row that is to be raised: its place among the targets, the potential wanted there, and the rise to it, mV.
+struct Raise {
+    target: usize,
+    wanted: f64,
+    rise: f64,
+}
+
+/// Rows that the weights meet and must go on meeting: coefficients, one row after the other, and limits.
+#[derive(Default)]
+struct Kept {
+    below: Vec<f64>,
+    limit: Vec<f64>,
+}
+
 impl Exact {
-    /// The nearest weights of the same signs with these rows raised; `None` if no row needs it, or none can be raised.
+    /// The nearest weights of the same signs with these rows raised, which are a solution; `None` if no row needs it, or
+    /// none can be raised.
     ///
     /// A row is left as it is if the neuron, with the row raised, might fire before the end of silence, 1e-6 ms before
-    /// the target.
+    /// the target. Where all rows together give no solution, they are raised one after the other, that of the smallest
+    /// rise first, and those that give none are left out.
     pub(super) fn raised(&self, weights: &[f64]) -> Result<Option<Vec<f64>>> {
+        let mut wanted = self.to_be_raised(weights)?;
+        if wanted.is_empty() {
+            return Ok(None);
+        }
+        let all = self.solution_with(weights, &wanted, &Kept::default())?;
+        // Weights that are no solution themselves would need more than a rise by a rounding error.
+        if all.is_some() || self.unmet(weights)?.is_some() {
+            return Ok(all);
+        }
+        let kept = self.kept(weights)?;
+        let all = self.solution_with(weights, &wanted, &kept)?;
+        if all.is_some() || wanted.len() == 1 {
+            return Ok(all);
+        }
+        wanted.sort_by(|a, b| a.rise.total_cmp(&b.rise));
+        let (mut raised, mut best) = (vec![], None);
+        for row in wanted {
+            raised.push(row);
+            match self.solution_with(weights, &raised, &kept)? {
+                Some(found) => best = Some(found),
+                None => drop(raised.pop()),
+            }
+        }
+        Ok(best)
+    }
+
+    /// The rows whose potential may lie below the threshold by a rounding error that no rise makes up for.
+    fn to_be_raised(&self, weights: &[f64]) -> Result<Vec<Raise>> {
         let statement = &self.statement;
-        let (mut below, mut limit, mut silent) = (vec![], vec![], vec![0.0; weights.len()]);
-        for ((row, &name), &t) in self.targets.iter().zip(&self.targets.names).zip(&self.targets.times) {
+        let (mut found, mut silent) = (vec![], vec![0.0; weights.len()]);
+        let targets = self.targets.iter().zip(&self.targets.names).zip(&self.targets.times);
+        for (target, ((row, &name), &t)) in targets.enumerate() {
             if self.is_grid() || !statement.is_turned_down(name, weights) {
                 continue;
             }
@@ -36,18 +81,47 @@ impl Exact {
                     continue;
                 }
             }
-            below.extend(row.at.iter().map(|a| -a));
+            found.push(Raise { target, wanted, rise });
+        }
+        Ok(found)
+    }
+
+    /// The rows of all targets, and of the ends of silence before them with the margin that a solution must keep.
+    fn kept(&self, weights: &[f64]) -> Result<Kept> {
+        let (mut kept, mut silent) = (Kept::default(), vec![0.0; weights.len()]);
+        for ((row, name), &t) in self.targets.iter().zip(&self.targets.names).zip(&self.targets.times) {
+            kept.below.extend(row.at.iter().map(|a| -a));
+            kept.limit.push(-row.threshold.min(dot(row.at, weights)));
+            let end = Row::Silence { pattern: name.0, t: until(t) };
+            if self.statement.is_asked(name.0, until(t)) {
+                let limit = self.statement.state_into(end, &mut silent)?;
+                let limit = limit + (1.0 - KEPT_SHARE) * self.statement.margin_of(end);
+                kept.limit.push(limit.max(dot(&silent, weights)));
+                kept.below.extend(&silent);
+            }
+        }
+        Ok(kept)
+    }
+
+    /// The nearest weights with these rows raised and those kept, if they are a solution.
+    fn solution_with(&self, weights: &[f64], raise: &[Raise], kept: &Kept) -> Result<Option<Vec<f64>>> {
+        let (mut below, mut limit) = (vec![], vec![]);
+        for Raise { target, wanted, .. } in raise {
+            below.extend(self.targets.row(*target).at.iter().map(|a| -a));
             limit.push(-wanted);
         }
-        if limit.is_empty() {
-            return Ok(None);
-        }
+        below.extend(&kept.below);
+        limit.extend(&kept.limit);
         let Bounds { lower, upper } = &self.objective.bounds;
         // An input that has no effect, or an excitatory one, must not become inhibitory.
         let lower: Vec<f64> = lower.iter().zip(weights).map(|(l, w)| if *w >= 0.0 { l.max(0.0) } else { *l }).collect();
         let upper: Vec<f64> = upper.iter().zip(weights).map(|(u, w)| if *w <= 0.0 { u.min(0.0) } else { *u }).collect();
         let rows = HardRows { below: &below, limit: &limit, ..HardRows::default() };
-        nearest(weights, &rows, &lower, &upper, Stop::never())
+        let found = nearest(weights, &rows, &lower, &upper, Stop::never())?;
+        Ok(match found {
+            Some(found) if self.unmet(&found)?.is_none() => Some(found),
+            _ => None,
+        })
     }
 }
 
