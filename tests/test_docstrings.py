@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from sound import SOUND
-from test_nonsense import modules, public, somewhere, takes  # noqa: F401  the fixture is used by name
+from test_nonsense import made, modules, public, somewhere, takes  # noqa: F401  fixtures are used by name
 
 import taxel
 
