@@ -220,8 +220,9 @@ def _of_groups(root: Path) -> Iterator[int]:
         group = top / path.lstrip("/")
         for folder in (group, *group.parents):
             with suppress(OSError, ValueError):
+                # Most groups have no limit: "max" is no number.
+                most = int((folder / limit).read_text())
                 stat = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
-                used = int((folder / usage).read_text()) - int(stat.get(files, 0))
-                yield int((folder / limit).read_text()) - used
+                yield most - int((folder / usage).read_text()) + int(stat.get(files, 0))
             if folder == top:
                 break
