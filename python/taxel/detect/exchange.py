@@ -166,13 +166,18 @@ def _read_graph(place: str | os.PathLike[str]) -> NIRGraph:
     import nir  # noqa: PLC0415  an extra
 
     try:
-        graph = nir.dict2NIRNode(_tree(place)["node"])
+        tree = _tree(place)
+        if "node" not in tree:
+            raise FormatError(f"{place}: holds no group 'node'; must be a file that nir.write has made")
+        graph = nir.dict2NIRNode(tree["node"])
         if not isinstance(graph, nir.NIRGraph) or not isinstance(graph.metadata, dict):
             raise FormatError(f"{place}: a {type(graph).__name__}; must be a NIRGraph with its metadata")
     except (FormatError, MemoryError, OSError):
         raise
     except Exception as error:  # nir raises errors of many kinds for a graph that is none
-        raise FormatError(f"{place}: no NIR graph that can be read: {shown(str(error))}") from None
+        raise FormatError(
+            f"{place}: no NIR graph that can be read: {type(error).__name__} {shown(str(error))}"
+        ) from None
     return graph
 
 

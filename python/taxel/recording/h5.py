@@ -125,7 +125,9 @@ def read_h5(path: Path, array: Array | None) -> Contents:
                 "read by taxel.open and taxel.formats.trials"
             )
         if version != _VERSION:
-            raise FormatError(f"{path}: layout {shown(version)}; this version reads {_VERSION}")
+            raise FormatError(
+                f"{path}: its attribute taxel is {shown(version)}; this version of taxel reads {_VERSION}"
+            )
         names = chosen(path, {name: entry.shape for name, entry in h5.entries.items()})
         h5.check_size(names, DTYPES)
         columns = {
