@@ -125,9 +125,8 @@ def read_h5(path: Path, array: Array | None) -> Contents:
                 "read by taxel.open and taxel.formats.trials"
             )
         if version != _VERSION:
-            raise FormatError(
-                f"{path}: its attribute taxel is {shown(version)}; this version of taxel reads {_VERSION}"
-            )
+            number = "no whole number" if isinstance(version, str) else version
+            raise FormatError(f"{path}: its attribute taxel is {number}; this version of taxel reads {_VERSION}")
         names = chosen(path, {name: entry.shape for name, entry in h5.entries.items()})
         h5.check_size(names, DTYPES)
         columns = {
