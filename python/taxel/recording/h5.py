@@ -19,7 +19,6 @@ from typing import BinaryIO
 import numpy as np
 
 from taxel._base import h5_writing
-from taxel._base.arguments import shown
 from taxel._base.files import open_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
