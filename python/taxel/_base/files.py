@@ -81,12 +81,15 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     ------
     FileExistsError : the file is there already and `overwrite` is false
     PermissionError : the file is there already and write-protected
-    OSError : the folder is missing, the disk is full ...
+    OSError : a folder, a device or a pipe has that name, the folder is missing, the disk is full ...
     """
     place = Path(checked_path("path", path))
     overwrite = flag("overwrite", overwrite)
     if not overwrite and os.path.lexists(place):
         raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
+    # A rename would replace a device by a file: /dev/null for all programs, where a superuser asks for it.
+    if place.exists() and not place.is_file():
+        raise OSError(errno.EINVAL, "is no regular file, and is not replaced", str(place))
     # A rename checks the permissions of the folder only; a write-protected file is refused here, also for the
     # superuser.
     if place.exists() and not (place.stat().st_mode & 0o222 and os.access(place, os.W_OK)):

@@ -133,7 +133,7 @@ def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:
         ("time", f"{trains.start:g} to {trains.stop:g} ms ({seconds:.3f} s)"),
         ("spikes", f"{spikes}{rate}"),
     ]
-    return [f"{file}: spike trains", *(f"  {name:<20}{value}" for name, value in rows)]
+    return [f"{file}: spike trains", *(f"  {name:<19} {value}" for name, value in rows)]
 
 
 def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest] | None, overwrite: bool) -> None:
@@ -237,7 +237,7 @@ def _page(facts: dict[str, Any]) -> list[str]:
     left = [("left behind", line) for line in facts["lost"]]
     # What was left out of a bag, or has other times, concerns all that follows.
     rows = [*left, *rows] if facts["kind"] == "ros" else [*rows, *left]
-    lines = [head, *(f"  {name:<20}{value}" for name, value in rows)]
+    lines = [head, *(f"  {name:<19} {value}" for name, value in rows)]
     return [*lines, *(f"{what} written to {facts[what]}" for what in ("picture", "table") if what in facts)]
 
 

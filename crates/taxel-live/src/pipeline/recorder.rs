@@ -205,7 +205,7 @@ impl Recorder {
         true
     }
 
-    /// Whether any source passed data, or a note was written.
+    /// Whether any source passed data, or bytes that are in no line, or a note was written.
     pub(super) fn holds_anything(&self) -> bool {
         let others = matches!(self.file.get(), Some(RecordingFile::Mcap(writer)) if writer.holds_anything());
         others || self.has_data.load(Ordering::Relaxed) || self.has_notes.load(Ordering::Relaxed)

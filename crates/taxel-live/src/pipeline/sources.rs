@@ -103,6 +103,9 @@ impl Numbers {
         }
         current.faults.left_out(bytes);
         current.all.left_out(bytes);
+        if let Some(track) = &current.track {
+            track.left_out();
+        }
         if current.counted.is_some_and(|counted| counted.elapsed() < COUNTS_EVERY) {
             return Ok(());
         }

@@ -125,10 +125,10 @@ impl Writer {
         Ok(Track::new(Arc::clone(&self.track.queue), k, source))
     }
 
-    /// Whether any source has passed data.
+    /// Whether any source has passed data, or bytes that are in no line.
     #[must_use]
     pub fn holds_anything(&self) -> bool {
-        self.track.queue.lock().written.iter().any(|written| written.data > 0)
+        self.track.queue.lock().written.iter().any(|written| written.data > 0 || written.left_out)
     }
 
     /// Ends the recording with the counts of the first source and the verdict; returns the final counts. The other
@@ -211,6 +211,11 @@ impl Track {
     /// As [`Track::datagram`].
     pub fn strange_line(&self, arrived_ns: i64, number: u64, line: &str) -> Result<()> {
         self.push(Topic::Samples, arrived_ns, number, json!({ "line": line }).to_string().as_bytes())
+    }
+
+    /// States that bytes arrived that are in no line; a recording with nothing else is kept, for their count.
+    pub fn left_out(&self) {
+        self.queue.lock().written[self.source].left_out = true;
     }
 
     /// Ends this source with the counts of what was received and lost; it must not be used afterwards.

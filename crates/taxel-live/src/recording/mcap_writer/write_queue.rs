@@ -80,6 +80,8 @@ pub(super) struct Written {
     others: BTreeMap<Topic, u64>,
     /// Sum of the checksums of the datagrams and lines.
     sum: u32,
+    /// Whether bytes arrived that are in no line.
+    pub(super) left_out: bool,
 }
 
 impl Written {
