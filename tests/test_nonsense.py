@@ -9,6 +9,7 @@ import json
 import math
 import re
 import shutil
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,10 @@ NONSENSE: dict[str, Any] = {
     "text with a zero": "\0",
     "a number in text": "1_000",
     "a number in Arabic digits": "\u0663",
+    "a number in text in an array": np.array("5"),
+    "None in an array": np.array(None, dtype=object),
+    "a signalling NaN": Decimal("sNaN"),
+    "a signalling NaN in a list": [Decimal("sNaN")],
     "this folder": ".",
     "the folder above": "..",
     "the root folder": "/",

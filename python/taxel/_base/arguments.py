@@ -8,6 +8,7 @@ import operator
 import os
 import sys
 from collections.abc import Collection, Mapping
+from decimal import Decimal
 from itertools import chain, islice
 from typing import Any, SupportsIndex, TypeVar
 
@@ -344,7 +345,11 @@ def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ..
     step = max(1, _COMPARED // array[:1].size)
     for begin in range(0, len(array), step):
         before, after = received[begin : begin + step], array[begin : begin + step]
-        changed = np.isinf(after) & ~np.isinf(before.astype(np.float64)) if to_float else np.asarray(before != after)
+        try:
+            unlike = np.isinf(after) & ~np.isinf(before.astype(np.float64)) if to_float else before != after
+        except ArithmeticError:  # a signalling NaN cannot be compared
+            unlike = np.frompyfunc(lambda value: isinstance(value, Decimal) and value.is_snan(), 1, 1)(before)
+        changed = np.asarray(unlike, np.bool_)
         if changed.any():
             first, *rest = np.unravel_index(int(np.argmax(changed)), changed.shape)
             return (begin + int(first), *map(int, rest))

@@ -126,7 +126,7 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
     touch, exponentials = _TOUCH * cone.neuron_.theta_0, _EXPONENTIALS
     for p, rows in enumerate(all_rows):
         exact = ExactPotential(rows, w, exponentials)
-        least = _on_grid(rows, w, exact, touch) if rows.on_grid else _room(rows, w, exact)
+        least = _on_grid(rows, w, exact, touch) if rows.on_grid else _room(rows, w, exact, touch)
         room = min(room, least.room)
         if least.silent is False:
             wrong.append(
@@ -263,7 +263,7 @@ def _on_grid(rows: PatternRows, w: _Floats, exact: ExactPotential, touch: float)
     return least
 
 
-def _room(rows: PatternRows, w: _Floats, exact: ExactPotential) -> _Least:
+def _room(rows: PatternRows, w: _Floats, exact: ExactPotential, touch: float) -> _Least:
     """Return the least distance below the threshold that is proven, or one found that is not above 0, and its time.
 
     Within 1 ms before a target the distance is divided by the ms left.
@@ -283,7 +283,7 @@ def _room(rows: PatternRows, w: _Floats, exact: ExactPotential) -> _Least:
     least, found = _Least(np.inf, rows.start, True), np.inf
     for first in range(0, len(begin), BLOCK):
         here = slice(first, first + BLOCK)
-        one, found = _Curves(rows, w, exact, begin[here], end[here]).least(found)
+        one, found = _Curves(rows, w, exact, begin[here], end[here]).least(found, touch)
         if one.silent is False:
             return one
         if least.silent and (one.silent is None or one.room < least.room):
@@ -323,10 +323,12 @@ class _Curves:
                 excess[j], rounding[j] = found
         return np.array([excess, rounding])
 
-    def least(self, found: float) -> tuple[_Least, float]:
+    def least(self, found: float, touch: float) -> tuple[_Least, float]:
         """Return the least room in these intervals that is proven, or one not above 0; the least found here and before.
 
-        Intervals are halved until what is proven of each is near the least room found here and before.
+        Intervals are halved until what is proven of each is near the least room found here and before. Where the neuron
+        may fire although the potential stays below its threshold, silence is not proven; in the last millisecond before
+        a target it may come that near.
         """
         k, least, intervals = np.arange(len(self.begin)), _Least(np.inf, self.rows.start, True), 0
         low, high = np.zeros(len(k)), self.end - self.begin
@@ -344,9 +346,12 @@ class _Curves:
             bound /= left
             kept = (bound >= _PROVEN * found) | settled
             if kept.any():
-                j = int(np.flatnonzero(kept)[bound[kept].argmin()])
-                if bound[j] < least.room:
-                    least = _Least(float(bound[j]), float(begin[j] + low[j]), True if bound[j] > 0 else None)
+                near = kept & (bound <= np.where(left < 1.0, 0.0, touch))
+                of = near if near.any() else kept
+                j = int(np.flatnonzero(of)[bound[of].argmin()])
+                if bound[j] < least.room or (near.any() and least.silent):
+                    silent = None if near.any() else least.silent
+                    least = _Least(min(least.room, float(bound[j])), float(begin[j] + low[j]), silent)
             k, low, high, at_low, at_high = k[~kept], low[~kept], high[~kept], at_low[:, ~kept], at_high[:, ~kept]
             intervals += len(k)
             if not len(k) or intervals > _INTERVALS:

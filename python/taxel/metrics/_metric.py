@@ -42,7 +42,9 @@ def _plain(metric: str, name: str, value: Any) -> Any:
         cost = number(name, value, known["unit"])
         return cost if math.isfinite(cost) else str(cost)
     plain = bare(name, value, known.get("unit") or None)
-    return float(plain) if isinstance(plain, np.ndarray) and plain.ndim == 0 else plain
+    if isinstance(plain, np.ndarray) and plain.ndim == 0:
+        return number(name, plain[()], known.get("unit") or None)
+    return plain
 
 
 def distance(metric: str, a: Pattern, b: Pattern, options: Mapping[str, Any]) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -99,7 +100,7 @@ def convert(
     match kind:
         case ".lsa":
             assert written.payload is not None  # `stored` sets it
-            _core.write_lsa(place, written.payload.tobytes(), overwrite)
+            _write_lsa(place, written.payload.tobytes(), overwrite)
         case ".npz":
             write_whole(place, lambda file: write_npz(file, written), overwrite=overwrite)
         case ".csv":
@@ -114,6 +115,21 @@ def convert(
                 write_mcap(part, written, compression, {name: _counts(*both) for name, both in sources.items()})
                 lost += _read_otherwise(part, whole)
     return lost
+
+
+def _write_lsa(place: Path, payload: bytes, overwrite: bool) -> None:
+    """Write a `.lsa` and its `.lss` whole; until then an older pair stays as it is."""
+    done = place.with_suffix(".lss")
+    if not overwrite and os.path.lexists(done):
+        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(done))
+    with (
+        whole_file(place, overwrite=overwrite) as part,
+        tempfile.TemporaryDirectory(dir=place.parent, prefix=f".{place.name}.") as folder,
+    ):
+        made = Path(folder) / "made.lsa"
+        _core.write_lsa(made, payload, False)
+        os.replace(made, part)
+    write_whole(done, lambda _: None, overwrite=True)
 
 
 def _contents(source: object) -> Contents:

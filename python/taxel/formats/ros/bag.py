@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+import errno
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -144,10 +145,13 @@ def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
     # Damaged files raise errors of rosbags' parts: of struct, of SQLite, of YAML, of bz2, of zstd; and a damaged size
     # asks for more memory than there is.
     except Exception as error:
-        if isinstance(error, OSError) and error.errno is not None:
+        # A damaged position is one that no file has.
+        if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
             error.filename = error.filename or str(path)
             raise
         why = "more memory than there is" if isinstance(error, MemoryError) else first_line(error)
+        if isinstance(error, OSError | OverflowError):
+            why = "its header is damaged"
         if "index" in why.lower() and path.suffix == ".bag":
             why = "its index is missing or damaged, as of a recording that was cut off; rosbag reindex makes it anew"
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):

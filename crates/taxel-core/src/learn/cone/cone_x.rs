@@ -407,11 +407,11 @@ impl Exact {
             End::Infeasible(certificate) => self.refuted(certificate, rounds),
             End::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
                 let best = self.mix(best, start, progress, stop)?;
-                self.report(best, stop.asked().then_some(ASKED))?
+                self.report(best, stop.asked().then_some(ASKED), stop)?
             }
-            End::Met => self.report(best, None)?,
-            End::Stopped if stop.asked() => self.report(best, Some(ASKED))?,
-            End::Stopped => self.report(best, Some(UNDECIDED))?,
+            End::Met => self.report(best, None, stop)?,
+            End::Stopped if stop.asked() => self.report(best, Some(ASKED), stop)?,
+            End::Stopped => self.report(best, Some(UNDECIDED), stop)?,
         })
     }
 
@@ -438,14 +438,14 @@ impl Exact {
     }
 
     /// Evaluates the weights over all rows, whichever engine found them.
-    fn report(&self, best: Best, cut_short: Option<&str>) -> Result<ConeXFit> {
+    fn report(&self, best: Best, cut_short: Option<&str>, stop: Stop<'_>) -> Result<ConeXFit> {
         let Best { mut weights, least, proof, held, engine, rounds } = best;
         let Bounds { lower, upper } = &self.objective.bounds;
         // Rounding can move a weight across its bound.
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {
             *w = w.clamp(l, u);
         }
-        let unmet = match self.raised(&weights)? {
+        let unmet = match self.raised(&weights, stop)? {
             Some(raised) => {
                 weights = raised;
                 None

@@ -10,6 +10,10 @@ use crate::learn::statement::{Bounds, Row, until};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
+/// The largest number of parts of the rows that are tried: each takes as long as a round of the fit. One row among 200 that
+/// cannot be raised takes 16.
+const MOST_PARTS: usize = 16;
+
 /// A target's row that is to be raised: its place among the targets, the potential wanted there, and the rise to it, mV.
 struct Raise {
     target: usize,
@@ -29,30 +33,37 @@ impl Exact {
     /// none can be raised.
     ///
     /// A row is left as it is if the neuron, with the row raised, might fire before the end of silence, 1e-6 ms before
-    /// the target. Where all rows together give no solution, they are raised one after the other, that of the smallest
-    /// rise first, and those that give none are left out.
-    pub(super) fn raised(&self, weights: &[f64]) -> Result<Option<Vec<f64>>> {
+    /// the target. Where all rows together give no solution, those of smaller and of larger rises are raised apart, and
+    /// so on by halves, and those that give none are left out.
+    pub(super) fn raised(&self, weights: &[f64], stop: Stop<'_>) -> Result<Option<Vec<f64>>> {
         let mut wanted = self.to_be_raised(weights)?;
         if wanted.is_empty() {
             return Ok(None);
         }
-        let all = self.solution_with(weights, &wanted, &Kept::default())?;
+        wanted.sort_by(|a, b| a.rise.total_cmp(&b.rise));
+        let every: Vec<&Raise> = wanted.iter().collect();
+        let all = self.solution_with(weights, &every, &Kept::default())?;
         // Weights that are no solution themselves would need more than a rise by a rounding error.
         if all.is_some() || self.unmet(weights)?.is_some() {
             return Ok(all);
         }
         let kept = self.kept(weights)?;
-        let all = self.solution_with(weights, &wanted, &kept)?;
-        if all.is_some() || wanted.len() == 1 {
+        let all = self.solution_with(weights, &every, &kept)?;
+        if all.is_some() || every.len() == 1 {
             return Ok(all);
         }
-        wanted.sort_by(|a, b| a.rise.total_cmp(&b.rise));
-        let (mut raised, mut best) = (vec![], None);
-        for row in wanted {
-            raised.push(row);
-            match self.solution_with(weights, &raised, &kept)? {
-                Some(found) => best = Some(found),
-                None => drop(raised.pop()),
+        let (smaller, larger) = every.split_at(every.len() / 2);
+        let (mut raised, mut best, mut untried) = (vec![], None, vec![larger, smaller]);
+        for _ in 0..MOST_PARTS {
+            let Some(part) = untried.pop().filter(|_| !stop.asked()) else { break };
+            let with: Vec<&Raise> = raised.iter().chain(part).copied().collect();
+            match self.solution_with(weights, &with, &kept)? {
+                Some(found) => (raised, best) = (with, Some(found)),
+                None if part.len() > 1 => {
+                    let (smaller, larger) = part.split_at(part.len() / 2);
+                    untried.extend([larger, smaller]);
+                }
+                None => {}
             }
         }
         Ok(best)
@@ -104,7 +115,7 @@ impl Exact {
     }
 
     /// The nearest weights with these rows raised and those kept, if they are a solution.
-    fn solution_with(&self, weights: &[f64], raise: &[Raise], kept: &Kept) -> Result<Option<Vec<f64>>> {
+    fn solution_with(&self, weights: &[f64], raise: &[&Raise], kept: &Kept) -> Result<Option<Vec<f64>>> {
         let (mut below, mut limit) = (vec![], vec![]);
         for Raise { target, wanted, .. } in raise {
             below.extend(self.targets.row(*target).at.iter().map(|a| -a));
@@ -162,7 +173,7 @@ mod tests {
         for lambdas in [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]] {
             let fits = solved(1.01e-8, lambdas);
             assert!(fits.len() > 5);
-            assert!(fits.iter().all(|(exact, weights)| exact.raised(weights).unwrap().is_none()));
+            assert!(fits.iter().all(|(exact, weights)| exact.raised(weights, Stop::never()).unwrap().is_none()));
         }
     }
 
@@ -171,7 +182,7 @@ mod tests {
         let (mut raised, mut left) = (0, 0);
         for (exact, weights) in [0.0, 1e-12, 1e-8].into_iter().flat_map(|behind| solved(behind, [0.0, 1.0, 0.0])) {
             let low: Vec<f64> = weights.iter().map(|w| w * (1.0 - 1e-14)).collect();
-            let Some(high) = exact.raised(&low).unwrap() else {
+            let Some(high) = exact.raised(&low, Stop::never()).unwrap() else {
                 assert!(!exact.statement.is_turned_down((0, 0), &low));
                 left += 1;
                 continue;
