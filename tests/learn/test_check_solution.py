@@ -333,3 +333,20 @@ def test_what_cannot_be_checked_is_one_clear_error():
     cone = ConeX(lb=-9, ub=9).fit(patterns[:1], targets[:1])
     with pytest.raises(ProblemError, match="2 patterns, 1 list of targets"):
         check_solution(cone, patterns[:2], targets[:1])
+
+
+@pytest.mark.parametrize("below", [9e-13, 5e-13, 1e-14, 0.0])
+def test_a_silent_peak_at_which_the_neuron_fires_by_its_tolerance_is_not_proven(below):
+    trains = SpikeTrains.from_lists([[5.0], [120.0]], stop=160.0)
+    neuron = Neuron(tau=10.0, theta_plus=0.0, after_spike="reset")
+    cone = ConeX(neuron=neuron, lb=-9.0, ub=9.0).fit([trains], [[123.0]])
+
+    def kernel(x):
+        return x / 10 * np.exp(-x / 10)
+
+    first = (0.3 - below) / np.exp(-1.0)
+    cone.weights_ = np.array([first, (0.3 - first * kernel(118.0)) / kernel(3.0)])
+    assert len(cone.neuron_.run(cone.weights_, trains)) == 2
+    found = check_solution(cone, [trains], [[123.0]])
+    assert not found.holds
+    assert found.wrong or "15.0" in found.unproven or "14.99" in found.unproven

@@ -1,6 +1,7 @@
 """Trial after trial from one receiver: each begins with what the taxels hold, and nothing is lost between two."""
 
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -316,3 +317,22 @@ def test_a_full_disk_ends_the_trials_in_one_line(tmp_path: Path, full_device: Pa
             _, said = process.communicate(timeout=60)
     assert process.returncode == 3
     assert "no space left on device" in said.splitlines()[-1]
+
+
+def test_a_trial_to_which_only_bytes_without_a_line_came_is_kept_with_their_count(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    arguments = ["--source", f"imu=pipe:{pipe},columns=a:b", "--length", 1, "--countdown", 0, "--trials", 2]
+    command = record(free_port(), tmp_path / "step.mcap", *arguments)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as ran:
+        with pipe.open("wb", buffering=0) as into:
+            try:
+                for _ in range(400):
+                    into.write(b"y" * 1000)
+                    time.sleep(0.01)
+            except BrokenPipeError:
+                pass
+        said, _ = ran.communicate(timeout=60)
+    for n in (1, 2):
+        source = taxel.open(tmp_path / f"step{n}.mcap").sources["imu"]
+        assert "bytes in no line of numbers" in str(source.verdict), said

@@ -83,6 +83,15 @@ def test_an_existing_file_is_never_overwritten_unless_asked(tmp_path: Path, endi
 
 
 @pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
+def test_a_pipe_or_a_device_is_never_replaced(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"a{ending}"
+    os.mkfifo(path)
+    with pytest.raises(OSError, match="is no regular file"):
+        taxel.convert(some_events(5), path, overwrite=True)
+    assert path.is_fifo()
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
 def test_a_missing_folder_is_a_file_not_found(tmp_path: Path, ending: str) -> None:
     with pytest.raises(FileNotFoundError, match="nowhere"):
         taxel.convert(some_events(5), tmp_path / "nowhere" / f"a{ending}")
@@ -100,9 +109,15 @@ def test_a_forbidden_folder_is_a_permission_error(tmp_path: Path, ending: str) -
         tmp_path.chmod(0o700)
 
 
+@pytest.mark.parametrize("older", [False, True])
 @pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv", ".h5"])
-def test_a_conversion_that_fails_leaves_no_file(tmp_path: Path, ending: str) -> None:
+def test_a_conversion_that_fails_leaves_no_file_and_an_older_one_whole(
+    tmp_path: Path, ending: str, older: bool
+) -> None:
     path = tmp_path / f"a{ending}"
+    if older:
+        taxel.convert(some_events(50), path)
+    before = {one.name: one.read_bytes() for one in tmp_path.iterdir()}
     code = (
         "import resource, signal, sys, taxel, numpy as np\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
@@ -112,14 +127,13 @@ def test_a_conversion_that_fails_leaves_no_file(tmp_path: Path, ending: str) -> 
         "events = taxel.Events(np.arange(n) * 100, x, y, rng.random(n) < 0.5, array=taxel.Array.thesis())\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))\n"
         "try:\n"
-        "    taxel.convert(events, sys.argv[1])\n"
+        "    taxel.convert(events, sys.argv[1], overwrite=True)\n"
         "except OSError as error:\n"
         "    print(error.errno, error.filename)\n"
     )
     said = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
     assert said.stdout.split() == [str(errno.EFBIG), str(path)]
-    # A .lsa is written in place, as while recording; that it is not complete shows in the missing .lss.
-    assert [p.name for p in tmp_path.iterdir()] == ([path.name] if ending == ".lsa" else [])
+    assert {one.name: one.read_bytes() for one in tmp_path.iterdir()} == before
 
 
 #: Writes a file of HDF5 again and again, each time with another limit of its size, and prints how each ended.
