@@ -432,6 +432,19 @@ def test_another_recording_has_none_of_the_labels_of_a_deleted_one(table: Path, 
     assert not read.conflict
 
 
+def test_recordings_of_one_stem_share_what_was_acknowledged(table: Path, tables) -> None:
+    for ending in ("mcap", "asf"):
+        table.with_name(f"walk.{ending}").write_bytes(ending.encode())
+    mark(tables, table, "heel", 1)
+    table.unlink()
+    other = frozenset({"", "walk.asf", "walk"})
+    assert texts(tables.read(table, other).conflict.missing) == [("heel", 1)]
+    _, read = tables.change(table, other, [[Edit(None, Note("toe", 2))]])
+    assert texts(read.conflict.missing) == [("heel", 1)]
+    table.unlink()
+    assert texts(tables.read(table, OWN).conflict.missing) == [("heel", 1), ("toe", 2)]
+
+
 def test_a_lock_that_is_no_file_is_refused_at_once(table: Path, tables) -> None:
     os.mkfifo(table.with_name(".taxel-labels.lock"))
     with pytest.raises(ProblemError, match=r"taxel-labels.lock: is no regular file"):

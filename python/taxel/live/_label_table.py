@@ -292,9 +292,11 @@ def _acknowledged(place: Path, file: _File) -> Acknowledged:
     try:
         known = from_json(saved["acknowledged"])
         recording = saved.get("recording")
-        # Where the table and its recording were deleted, another recording of that name has none of its labels. A
-        # recording that runs keeps its beginning, and so does a copy, whatever its times.
-        if file.descriptor is None and recording is not None:
+        # Where the table and its recording were deleted, another recording of that file name has none of its labels. A
+        # recording that runs keeps its beginning, and so does a copy, whatever its times. One with the same stem and
+        # another ending shares the table.
+        same = file.recording is not None and file.recording.name == saved.get("file")
+        if file.descriptor is None and recording is not None and same:
             now = _beginning(file.recording, whole(recording[0], 0, _BEGINNING))
             if now not in (None, recording):
                 return Acknowledged()
@@ -312,7 +314,11 @@ def _acknowledged(place: Path, file: _File) -> Acknowledged:
 
 
 def _save(file: _File, saved: dict[str, Any]) -> None:
-    about = {"about": "labels that taxel has acknowledged (docs/files.md)", "recording": _beginning(file.recording)}
+    about = {
+        "about": "labels that taxel has acknowledged (docs/files.md)",
+        "recording": _beginning(file.recording),
+        "file": None if file.recording is None else file.recording.name,
+    }
     text = json.dumps({**about, **saved}, ensure_ascii=False).encode()
     if len(text) > MOST_SAVED:
         raise ProblemError(f"{file.place}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
