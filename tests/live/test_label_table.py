@@ -198,6 +198,33 @@ def test_any_table_that_can_be_read_keeps_its_rows(text: bytes, kept, table: Pat
     assert not tables.read(table, OWN).conflict
 
 
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        (b"t_us,label\n100,2\n", b"t_us,label\n7,toe\n100,2\n"),
+        (b"label,t_us,source\nheel,1,\n", b"label,t_us,source\nheel,1,\ntoe,7,\n"),
+        (b"host_ns,t_us,comment,,label\n,1,late,,heel\n", b"host_ns,t_us,comment,,label\n,1,late,,heel\n,7,,,toe\n"),
+        (b"replaces_us, t_us ,label\n", b"replaces_us,t_us,label\n,7,toe\n"),
+        (b"\xef\xbb\xbft_us,label\r\n1,heel\r\n", b"\xef\xbb\xbft_us,label\r\n1,heel\r\n7,toe\r\n"),
+        (b"t_us,label\r1,heel\r", b"t_us,label\r1,heel\r7,toe\r"),
+        (b'\xef\xbb\xbft_us,label\n1,"a\r\nb"\n', b'\xef\xbb\xbft_us,label\n1,"a\r\nb"\n7,toe\n'),
+    ],
+)
+def test_a_table_keeps_its_columns_in_their_order_and_its_ends_of_lines(
+    text: bytes, written: bytes, table: Path, tables
+) -> None:
+    table.write_bytes(text)
+    os.utime(table, (1, 1))
+    mark(tables, table, "toe", 7)
+    assert table.read_bytes() == written
+    # A label with columns of its own; the rows of a program that appends by the header that it wrote stay as they are.
+    new = Note("ball", 9, source="left", at_ns=5)
+    tables.change(table, OWN, [[Edit(None, new)]])
+    head = table.read_bytes().splitlines()[0]
+    assert head.startswith(written.splitlines()[0])
+    assert new in tables.read(table, OWN).rows or b"comment" in text
+
+
 def test_a_deleted_table_and_an_older_text_are_conflicts_that_last(table: Path, tables) -> None:
     mark(tables, table, "heel", 1)
     older = table.read_text()

@@ -11,6 +11,7 @@ in between leaves a state that the text of the table decides.
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import ctypes
 import errno
@@ -109,7 +110,7 @@ class _File:
     descriptor: int | None
     text: bytes | None
     rows: tuple[Note, ...]
-    others: tuple[str, ...]
+    columns: tuple[str, ...]
 
     @classmethod
     def read(cls, place: Path, own: frozenset[str], recording: Path | None, *, final: bool) -> _File:
@@ -130,19 +131,27 @@ class _File:
         # A time in the future is none at which it was written.
         is_new = 0 <= time.time() - os.fstat(descriptor).st_mtime <= _WRITTEN_S
         try:
-            rows, others = _parsed(place, own, text)
+            rows, columns = _parsed(place, own, text)
         except FormatError as error:
             if final or not is_new:
                 raise
             raise _BeingWritten(error) from None
         if not text.endswith((b"\n", b"\r")) and not final and is_new:
             raise _BeingWritten(None)
-        return cls(place, own, recording, descriptor, text, rows, others)
+        return cls(place, own, recording, descriptor, text, rows, columns)
 
     def again(self, *, final: bool) -> _File:
         """Read the same file again, which may have been replaced by another."""
         assert self.descriptor is not None
         return self._of(self.place, self.own, self.recording, self.descriptor, final=final)
+
+    def text_with(self, rows: Sequence[Note]) -> bytes:
+        """Return the text of a table with these rows, with the columns, the ends of lines and the BOM of this one."""
+        text = self.text or b""
+        lines = lines_of(text.decode("utf-8-sig"))
+        end = next((end for end in ("\r\n", "\r") if lines and lines[0].endswith(end)), "\n")
+        bom = codecs.BOM_UTF8 if text.startswith(codecs.BOM_UTF8) else b""
+        return bom + text_with(rows, self.columns, end).encode()
 
     def is_current(self) -> bool:
         """Return whether the table is still the file that was read, with the same text."""
@@ -170,8 +179,8 @@ def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, 
         # An editor empties the table before it writes it.
         return (), ()
     lines = lines_of(decoded)
-    rows, others = rows_of(place, lines)
-    return tuple(replace(row, recording="") if row.recording in own else row for row in rows), others
+    rows, columns = rows_of(place, lines)
+    return tuple(replace(row, recording="") if row.recording in own else row for row in rows), columns
 
 
 def _recording_of(table: Path, own: frozenset[str]) -> Path | None:
@@ -490,7 +499,7 @@ class LabelTables:
         """Replace a table; return False if another program has written it since it was read."""
         place = file.place
         try_whole(place, overwrite=True)
-        text = text_with(joined.rows, file.others).encode()
+        text = file.text_with(joined.rows)
         try:
             again, _ = _parsed(place, file.own, text)
         except FormatError as error:
