@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import os
 import random
@@ -16,7 +17,7 @@ import pytest
 import taxel
 from taxel import FormatError, ProblemError
 from taxel.labels import Note
-from taxel.live import _label_table
+from taxel.live import _label_lock, _label_table
 from taxel.live._label_join import Edit
 from taxel.live._label_table import LabelTables
 
@@ -476,6 +477,90 @@ def test_a_lock_that_is_no_file_is_refused_at_once(table: Path, tables) -> None:
     os.mkfifo(table.with_name(".taxel-labels.lock"))
     with pytest.raises(ProblemError, match=r"taxel-labels.lock: is no regular file"):
         mark(tables, table, "heel", 1)
+
+
+def together(calls) -> list:
+    """Make calls in a thread each; return what they returned or raised."""
+    found: list = []
+
+    def call(one) -> None:
+        try:
+            found.append(one())
+        except Exception as error:
+            found.append(error)
+
+    threads = [threading.Thread(target=call, args=(one,)) for one in calls]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return found
+
+
+def slow_disk(monkeypatch) -> None:
+    sync = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda descriptor: (time.sleep(0.03), sync(descriptor)))
+    monkeypatch.setattr(_label_lock, "_WITHIN_S", 0.5)
+
+
+def test_the_tables_of_one_server_wait_for_each_other_as_long_as_it_takes(tmp_path: Path, tables, monkeypatch) -> None:
+    slow_disk(monkeypatch)
+    places = [tmp_path / f"{k}.notes.csv" for k in range(12)]
+    found = together([lambda place=place: mark(tables, place, "heel", 1) for place in places])
+    assert not [one for one in found if isinstance(one, Exception)]
+    assert [held(place) for place in places] == [Counter({("heel", 1): 1})] * 12
+
+
+def test_another_server_gets_the_lock_between_the_tables_of_one_that_queue(tmp_path: Path, tables, monkeypatch) -> None:
+    slow_disk(monkeypatch)
+    child = os.fork()
+    if not child:
+        for k in range(10):
+            mark(LabelTables(), tmp_path / "other.notes.csv", "heel", k)
+        os._exit(0)
+    ends, failed = [], []
+
+    def marks(place: Path) -> None:
+        while not ends:
+            try:
+                mark(tables, place, "toe", time.monotonic_ns() % 10**9)
+            except ProblemError as error:
+                failed.append(error)
+
+    writers = [threading.Thread(target=marks, args=(tmp_path / f"{k}.notes.csv",)) for k in range(4)]
+    for writer in writers:
+        writer.start()
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    ends.append(True)
+    for writer in writers:
+        writer.join()
+    assert (code, failed) == (0, [])
+    assert len(held(tmp_path / "other.notes.csv")) == 10
+
+
+def test_reading_waits_for_no_lock(table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 1)
+    monkeypatch.setattr(_label_lock, "_WITHIN_S", 0.1)
+    with open(table.with_name(".taxel-labels.lock")) as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert texts(tables.read(table, OWN).rows) == [("heel", 1)]
+        with pytest.raises(ProblemError, match="another program holds this lock; nothing was saved"):
+            mark(tables, table, "toe", 2)
+
+
+def test_a_table_that_is_written_while_it_is_read_is_in_no_conflict(table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 1)
+    known, once = _label_table._acknowledged, iter([True])
+
+    def late(*one):
+        if next(once, False):
+            mark(LabelTables(), table, "toe", 2)
+        return known(*one)
+
+    monkeypatch.setattr(_label_table, "_acknowledged", late)
+    read = tables.read(table, OWN)
+    assert texts(read.rows) == [("heel", 1), ("toe", 2)]
+    assert not read.conflict
 
 
 @pytest.mark.parametrize("new", [False, True])

@@ -15,12 +15,10 @@ import codecs
 import contextlib
 import ctypes
 import errno
-import fcntl
 import functools
 import hashlib
 import json
 import os
-import random
 import re
 import secrets
 import stat
@@ -37,6 +35,7 @@ from taxel._base.header_table import lines_of
 from taxel._core import FormatError, ProblemError, open_regular
 from taxel.labels import Note, rows_of, text_with
 from taxel.live._label_join import Acknowledged, Conflict, Edit, Joined, conflict_of, fold, join, minus, settled
+from taxel.live._label_lock import LOCK, locked, locked_at_once
 from taxel.live._label_state import (
     MOST_SAVED,
     NOT_SAVED,
@@ -50,12 +49,6 @@ from taxel.live._label_state import (
 )
 
 __all__ = ["LabelTables", "TableRead"]
-
-#: The lock of all tables of a folder.
-_LOCK = ".taxel-labels.lock"
-
-#: How long another process may hold the lock, s.
-_LOCK_WITHIN_S = 20.0
 
 #: A table that does not end, or cannot be read, and was written within this time is being written, s.
 _WRITTEN_S = 2.0
@@ -191,45 +184,6 @@ def _recording_of(table: Path, own: frozenset[str]) -> Path | None:
 
 def _digest(text: bytes | None) -> str:
     return "" if text is None else hashlib.sha256(text).hexdigest()
-
-
-@contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder's tables, which is made where there is none.
-
-    Raises
-    ------
-    ProblemError : another process holds it for too long
-    OSError : the folder cannot be written, or its file system has no locks
-    """
-    place, until = folder / _LOCK, time.monotonic() + _LOCK_WITHIN_S
-    # A named pipe would be waited for.
-    how = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
-    while True:
-        try:
-            lock = os.open(place, os.O_RDWR | os.O_CREAT | how, 0o666)
-        except PermissionError:
-            # That of another user.
-            if not place.exists():
-                raise
-            lock = os.open(place, os.O_RDONLY | how)
-        try:
-            if not stat.S_ISREG(os.fstat(lock).st_mode):
-                raise ProblemError(f"{place}: is no regular file, as the lock of tables must be; nothing was saved")
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                if time.monotonic() > until:
-                    raise ProblemError(f"{place}: another program holds this lock; nothing was saved") from None
-            else:
-                # A lock file that was deleted in between locks nothing.
-                with contextlib.suppress(FileNotFoundError):
-                    if os.path.samestat(os.fstat(lock), os.stat(place)):
-                        yield
-                        return
-        finally:
-            os.close(lock)
-        time.sleep(random.uniform(0.001, 0.004))
 
 
 def _sync_folder(folder: Path) -> None:
@@ -414,20 +368,22 @@ class LabelTables:
         """
         place = Path(os.path.realpath(table))
         for final in _attempts():
-            with contextlib.ExitStack() as held:
-                # Where there is no lock, no window has written; a folder that is only looked at gets none.
-                if (place.parent / _LOCK).exists():
-                    with contextlib.suppress(OSError):
-                        held.enter_context(_locked(place.parent))
+            # Where there is no lock, no window has written; a folder that is only looked at gets none.
+            if (place.parent / LOCK).exists():
+                with contextlib.suppress(OSError), locked_at_once(place.parent) as is_mine:
+                    if is_mine:
                         _clean(place)
-                try:
-                    file = _File.read(place, own, _recording_of(table, own), final=final)
-                except _BeingWritten:
-                    continue
-                try:
-                    return TableRead(file.rows, conflict_of(_acknowledged(place, file), file.rows))
-                finally:
-                    file.close()
+            try:
+                file = _File.read(place, own, _recording_of(table, own), final=final)
+            except _BeingWritten:
+                continue
+            try:
+                known = _acknowledged(place, file)
+                # Where a window wrote the table since it was read, what was acknowledged may be of the new one.
+                if final or file.is_current():
+                    return TableRead(file.rows, conflict_of(known, file.rows))
+            finally:
+                file.close()
         raise AssertionError
 
     def change(
@@ -466,7 +422,7 @@ class LabelTables:
 
     def _written(self, place: Path, own: frozenset[str], recording: Path | None, action: _Action) -> Joined:
         for final in _attempts():
-            with _locked(place.parent):
+            with locked(place.parent):
                 _clean(place)
                 try:
                     file = _File.read(place, own, recording, final=final)
