@@ -116,7 +116,7 @@ class Labels:
         may be absent. A label without a source is of all sources of its recording; a source that was a topic of a ROS
         bag may have the topic's name. A row with `replaces_us` stands for
         the recording's own note of that time; one without a label says that this note is none. Other columns are kept
-        (`Note.others`).
+        (`Note.others`). An empty text has no labels.
 
     Attributes
     ----------
@@ -295,6 +295,9 @@ def rows_of(place: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...], 
     (400, ('t_us', 'label', 'comment'))
     """
     table = HeaderTable.read(place, lines)
+    if not table.header:
+        # An editor empties a table before it writes it.
+        return (), ()
     table.has(_WANTED)
     rows = tuple(_row(f"{place}, line {line}", cells) for line, cells in table)
     return rows, table.header

@@ -168,11 +168,7 @@ def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, 
         decoded = text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FormatError(f"{place}: not a table of text: {error}") from None
-    if not decoded.strip():
-        # An editor empties the table before it writes it.
-        return (), ()
-    lines = lines_of(decoded)
-    rows, columns = rows_of(place, lines)
+    rows, columns = rows_of(place, lines_of(decoded))
     return tuple(replace(row, recording="") if row.recording in own else row for row in rows), columns
 
 
