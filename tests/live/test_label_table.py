@@ -366,6 +366,63 @@ def test_a_link_to_a_table_stays_one_and_its_permissions_stay(tmp_path: Path, ta
     assert sorted(held(real)) == [("heel", 1), ("toe", 2)]
 
 
+def linked(table: Path, text: str) -> Path:
+    """Replace a table by a link to a file in another folder with this text."""
+    real = table.parent / "store" / "x.csv"
+    real.parent.mkdir(exist_ok=True)
+    real.write_text(text)
+    link = table.with_name("link")
+    link.symlink_to("store/x.csv")
+    os.replace(link, table)
+    return real
+
+
+def test_a_table_that_becomes_a_link_and_a_file_again_keeps_what_was_acknowledged(table: Path, tables) -> None:
+    for t in range(3):
+        mark(tables, table, "heel", t)
+    linked(table, "label,t_us\nheel,0\n")
+    for again in (tables, LabelTables()):
+        assert texts(again.read(table, OWN).conflict.missing) == [("heel", 1), ("heel", 2)]
+    assert texts(mark(tables, table, "toe", 5).conflict.missing) == [("heel", 1), ("heel", 2)]
+    tables.settle(table, OWN, tables.read(table, OWN).conflict, restore=True)
+    tables.change(table, OWN, [[Edit(Note("heel", 0), None)]])
+    assert table.is_symlink()
+    text = table.read_text()
+    table.unlink()
+    table.write_text(text)
+    read = tables.read(table, OWN)
+    assert texts(read.rows) == [("heel", 1), ("heel", 2), ("toe", 5)]
+    assert not read.conflict
+    table.write_text("label,t_us\nheel,0\n")
+    conflict = tables.read(table, OWN).conflict
+    assert texts(conflict.missing) == [("heel", 1), ("heel", 2), ("toe", 5)]
+    assert texts(conflict.returned) == [("heel", 0)]
+
+
+def test_windows_on_a_table_and_on_a_link_to_it_are_in_no_conflict(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    real = linked(table, table.read_text())
+    for k in range(4):
+        one, other = (real, table) if k % 2 else (table, real)
+        mark(tables, one, "toe", k)
+        assert not tables.change(other, OWN, [[Edit(Note("toe", k), Note("ball", k))]])[1].conflict
+        assert not tables.read(one, OWN).conflict
+    real.write_text("label,t_us\n")
+    assert texts(tables.read(table, OWN).conflict.missing) == [*(("ball", k) for k in range(4)), ("heel", 1)]
+
+
+def test_a_late_line_in_a_table_that_became_a_link_goes_to_its_file(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    with table.open("a") as hand:
+        mark(tables, table, "toe", 3)
+        real = linked(table, table.read_text())
+        hand.write("hand,2\n")
+        hand.flush()
+        tables.stamp(table)
+    assert table.is_symlink()
+    assert sorted(held(real)) == [("hand", 2), ("heel", 1), ("toe", 3)]
+
+
 def test_what_is_no_regular_file_is_refused_at_once(table: Path, tables) -> None:
     os.mkfifo(table)
     with pytest.raises(ProblemError, match="a named pipe; must be a file"):

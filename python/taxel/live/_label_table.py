@@ -41,6 +41,7 @@ from taxel.live._label_state import (
     NOT_SAVED,
     bytes_of,
     from_json,
+    newest_of,
     not_saved,
     saved_of,
     state_place,
@@ -95,9 +96,10 @@ class TableRead:
 
 @dataclass(frozen=True, eq=False)
 class _File:
-    """Hold an open file of a table; without a descriptor there is none."""
+    """Hold an open file of a table, without a descriptor if there is none; `link` is its name where that is a link."""
 
     place: Path
+    link: Path | None
     own: frozenset[str]
     recording: Path | None
     descriptor: int | None
@@ -106,37 +108,40 @@ class _File:
     columns: tuple[str, ...]
 
     @classmethod
-    def read(cls, place: Path, own: frozenset[str], recording: Path | None, *, final: bool) -> _File:
+    def read(cls, table: Path, own: frozenset[str], *, final: bool) -> _File:
         """Read a table; `final` if it is not waited for any longer."""
+        place, link = _places(table)
+        recording = _recording_of(table, own)
         try:
             descriptor = open_regular(place)
         except FileNotFoundError:
-            return cls(place, own, recording, None, None, (), ())
+            return cls(place, link, own, recording, None, None, (), ())
         try:
-            return cls._of(place, own, recording, descriptor, final=final)
+            return cls(place, link, own, recording, descriptor, None, (), ()).again(final=final)
         except BaseException:
             os.close(descriptor)
             raise
 
-    @classmethod
-    def _of(cls, place: Path, own: frozenset[str], recording: Path | None, descriptor: int, *, final: bool) -> _File:
-        text = bytes_of(descriptor)
+    def again(self, *, final: bool) -> _File:
+        """Read the same file again, which may have been replaced by another."""
+        assert self.descriptor is not None
+        text = bytes_of(self.descriptor)
         # A time in the future is none at which it was written.
-        is_new = 0 <= time.time() - os.fstat(descriptor).st_mtime <= _WRITTEN_S
+        is_new = 0 <= time.time() - os.fstat(self.descriptor).st_mtime <= _WRITTEN_S
         try:
-            rows, columns = _parsed(place, own, text)
+            rows, columns = _parsed(self.place, self.own, text)
         except FormatError as error:
             if final or not is_new:
                 raise
             raise _BeingWritten(error) from None
         if not text.endswith((b"\n", b"\r")) and not final and is_new:
             raise _BeingWritten(None)
-        return cls(place, own, recording, descriptor, text, rows, columns)
+        return replace(self, text=text, rows=rows, columns=columns)
 
-    def again(self, *, final: bool) -> _File:
-        """Read the same file again, which may have been replaced by another."""
-        assert self.descriptor is not None
-        return self._of(self.place, self.own, self.recording, self.descriptor, final=final)
+    @property
+    def table(self) -> Path:
+        """The name by which the table was read."""
+        return self.link or self.place
 
     def text_with(self, rows: Sequence[Note]) -> bytes:
         """Return the text of a table with these rows, with the columns, the ends of lines and the BOM of this one."""
@@ -161,6 +166,12 @@ class _File:
     def close(self) -> None:
         if self.descriptor is not None:
             os.close(self.descriptor)
+
+
+def _places(table: Path) -> tuple[Path, Path | None]:
+    """Return the file of a table, and its own name where that is a link to the file."""
+    place, named = Path(os.path.realpath(table)), Path(os.path.realpath(table.parent), table.name)
+    return place, None if named == place else named
 
 
 def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
@@ -238,13 +249,16 @@ def _digest_at(path: Path) -> str:
         os.close(descriptor)
 
 
-def _acknowledged(place: Path, file: _File) -> Acknowledged:
+def _acknowledged(file: _File) -> Acknowledged:
     """Return what was acknowledged of a table, as it was saved beside it.
+
+    Where a link stands for a table that was a file, as git-annex makes them, it was saved beside the link.
 
     Raises
     ------
     FormatError : what was saved cannot be read
     """
+    place = newest_of(file.place, file.link)
     saved = saved_of(place)
     if saved is None:
         return Acknowledged()
@@ -283,6 +297,13 @@ def _save(file: _File, saved: dict[str, Any]) -> None:
         raise ProblemError(f"{file.place}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
     beside = state_place(file.place)
     with _new_file(beside, _mode(file), text) as (_, name):
+        os.replace(name, beside)
+    if file.link is None:
+        return
+    # The link may become a file again.
+    with contextlib.suppress(OSError), _new_file(beside := state_place(file.link), _mode(file), text) as (_, name):
+        saved_at = os.stat(state_place(file.place)).st_mtime_ns
+        os.utime(name, ns=(saved_at, saved_at))
         os.replace(name, beside)
 
 
@@ -337,10 +358,10 @@ class LabelTables:
 
     def stamp(self, table: Path) -> str:
         """Return a text that changes when a table, or what was acknowledged of it, may have changed."""
-        place = Path(os.path.realpath(table))
-        self._take_in(place)
+        place, link = _places(table)
+        self._take_in(link or place)
         parts = []
-        for one in (place, state_place(place)):
+        for one in (place, state_place(place), state_place(link or place)):
             try:
                 about = os.stat(one)
                 parts.append(f"{about.st_ino}.{about.st_size}.{about.st_mtime_ns}.{about.st_ctime_ns}")
@@ -362,7 +383,7 @@ class LabelTables:
         FormatError : no table of labels (names the line)
         OSError : it cannot be read
         """
-        place = Path(os.path.realpath(table))
+        place, _ = _places(table)
         for final in _attempts():
             # Where there is no lock, no window has written; a folder that is only looked at gets none.
             if (place.parent / LOCK).exists():
@@ -370,11 +391,11 @@ class LabelTables:
                     if is_mine:
                         _clean(place)
             try:
-                file = _File.read(place, own, _recording_of(table, own), final=final)
+                file = _File.read(table, own, final=final)
             except _BeingWritten:
                 continue
             try:
-                known = _acknowledged(place, file)
+                known = _acknowledged(file)
                 # Where a window wrote the table since it was read, what was acknowledged may be of the new one.
                 if final or file.is_current():
                     return TableRead(file.rows, conflict_of(known, file.rows))
@@ -407,28 +428,32 @@ class LabelTables:
         return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
     def _write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
-        place = Path(os.path.realpath(table))
         try:
-            return self._written(place, own, _recording_of(table, own), action)
+            return self._written(table, own, action)
         except OSError as error:
+            place, _ = _places(table)
             reason = (error.strerror or str(error)).removeprefix("is ").lower()
             beside = state_place(place)
             where = f"{beside.name}: " if error.filename == str(beside) else ""
             raise ProblemError(f"{place.name} cannot be saved: {where}{reason}") from error
 
-    def _written(self, place: Path, own: frozenset[str], recording: Path | None, action: _Action) -> Joined:
+    def _written(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
         for final in _attempts():
+            place, _ = _places(table)
             with locked(place.parent):
                 _clean(place)
                 try:
-                    file = _File.read(place, own, recording, final=final)
+                    file = _File.read(table, own, final=final)
                 except _BeingWritten:
                     continue
                 except FormatError as error:
                     raise ProblemError(f"{error}; nothing was saved: mend the table, then try again") from None
                 kept = False
                 try:
-                    known = _acknowledged(place, file)
+                    if file.place != place:
+                        # A link that leads elsewhere by now.
+                        continue
+                    known = _acknowledged(file)
                     joined = action(known, file.rows)
                     if minus(joined.rows, file.rows) or minus(file.rows, joined.rows):
                         kept = self._replace(file, known, joined)
@@ -482,10 +507,10 @@ class LabelTables:
         with self._watched_lock:
             self._watched.append(one)
 
-    def _take_in(self, place: Path | None = None) -> None:
+    def _take_in(self, table: Path | None = None) -> None:
         """Take in what programs wrote to a table that they had opened before it was replaced; `None`: to any table."""
         with self._watched_lock:
-            mine = [one for one in self._watched if place in (None, one.file.place)]
+            mine = [one for one in self._watched if table in (None, one.file.table)]
             count, size = len(self._watched), sum(len(one.file.text or b"") for one in self._watched)
             self._watched = [one for one in self._watched if one not in mine]
         left = []
@@ -518,7 +543,7 @@ class LabelTables:
         try:
             before, _ = _parsed(file.place, file.own, file.text or b"")
             action = functools.partial(fold, before=before, after=now.rows)
-            self._written(file.place, file.own, file.recording, action)
+            self._written(file.table, file.own, action)
         except (FormatError, ProblemError, OSError):
             return one
         return _Watched(replace(now, rows=()), seen)
