@@ -7,6 +7,7 @@ import fcntl
 import json
 import os
 import random
+import resource
 import threading
 import time
 from collections import Counter
@@ -493,11 +494,60 @@ def test_a_late_line_in_a_table_that_was_replaced_is_taken_in(table: Path, table
 
 
 def test_watched_tables_are_bounded(table: Path, tables, monkeypatch) -> None:
-    monkeypatch.setattr(_label_table, "_MOST_WATCHED", 3)
-    for t in range(9):
+    for t in range(40):
         mark(tables, table, "heel", t)
+    assert len(tables._watched) == _label_table._MOST_WATCHED <= 32
+    monkeypatch.setattr(_label_table, "_MOST_WATCHED_BYTES", 10)
+    mark(tables, table, "heel", 40)
+    assert len(tables._watched) == 1
+
+
+def test_a_program_that_holds_its_table_open_is_heard_however_often_the_page_saves(table: Path, tables) -> None:
+    mark(tables, table, "heel", 0)
+    with table.open("a") as hand:
+        for t in range(1, 40):
+            hand.write(f"hand,{t}\n")
+            hand.flush()
+            mark(tables, table, "heel", t)
+            tables.stamp(table)
+    assert held(table) == Counter((label, t) for label in ("hand", "heel") for t in range(40)) - Counter([("hand", 0)])
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE])
+def test_watched_tables_make_room_on_a_full_disk(code: int, table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 0)
+    new = _label_table._new_file
+    with table.open("a") as hand:
+        for t in range(1, 9):
+            mark(tables, table, "heel", t)
+        hand.write("hand,9\n")
+        hand.flush()
+
+        def full(*of):
+            if len(tables._watched) > 3:
+                raise OSError(code, os.strerror(code))
+            return new(*of)
+
+        monkeypatch.setattr(_label_table, "_new_file", full)
+        mark(tables, table, "heel", 10)
         tables.stamp(table)
-    assert len(tables._watched) == 3
+    assert sorted(held(table)) == [("hand", 9), *(("heel", t) for t in range(9)), ("heel", 10)]
+    monkeypatch.setattr(_label_table, "_new_file", no_space)
+    with pytest.raises(ProblemError, match=r"cannot be saved: no space left"):
+        mark(tables, table, "toe", 11)
+
+
+def test_saving_needs_few_descriptors(table: Path, tables) -> None:
+    limit = resource.getrlimit(resource.RLIMIT_NOFILE)
+    used = os.open(os.devnull, os.O_RDONLY)
+    os.close(used)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (used + 12, limit[1]))
+    try:
+        for t in range(30):
+            mark(tables, table, "heel", t)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limit)
+    assert len(held(table)) == 30
 
 
 def test_another_recording_has_none_of_the_labels_of_a_deleted_one(table: Path, tables) -> None:

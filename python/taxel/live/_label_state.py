@@ -105,7 +105,7 @@ def newest_of(place: Path, link: Path | None) -> Path:
             times.append(-1 if one is None else os.stat(state_place(one)).st_mtime_ns)
         except FileNotFoundError:
             times.append(-1)
-    # Both are saved with one time while the link stays.
+    # A state that is saved by the link's name is saved beside the file just before.
     return link if link is not None and times[1] > times[0] else place
 
 

@@ -58,7 +58,10 @@ _WRITTEN_S = 2.0
 _WHOLE_WITHIN_S = 6.0
 
 #: How many replaced tables are watched for programs that still write to them, and how many bytes of text.
-_MOST_WATCHED, _MOST_WATCHED_BYTES = 256, 1 << 26
+_MOST_WATCHED, _MOST_WATCHED_BYTES = 16, 1 << 20
+
+#: What an operating system answers that has no more space or descriptors, which the watched tables take.
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE)
 
 #: The beginning of a recording by which it is told from another one of the same name, bytes.
 _BEGINNING = 1 << 16
@@ -302,8 +305,6 @@ def _save(file: _File, saved: dict[str, Any]) -> None:
         return
     # The link may become a file again.
     with contextlib.suppress(OSError), _new_file(beside := state_place(file.link), _mode(file), text) as (_, name):
-        saved_at = os.stat(state_place(file.place)).st_mtime_ns
-        os.utime(name, ns=(saved_at, saved_at))
         os.replace(name, beside)
 
 
@@ -340,6 +341,11 @@ class _Watched:
     file: _File
     seen: tuple[int, int]
 
+    def is_written(self) -> bool:
+        """Return whether it has another text than was taken in."""
+        assert self.file.descriptor is not None
+        return bytes_of(self.file.descriptor) != self.file.text
+
 
 class LabelTables:
     """Read and write tables of labels; methods may be called from several threads at a time."""
@@ -360,6 +366,8 @@ class LabelTables:
         """Return a text that changes when a table, or what was acknowledged of it, may have changed."""
         place, link = _places(table)
         self._take_in(link or place)
+        while self._let_go():
+            pass
         parts = []
         for one in (place, state_place(place), state_place(link or place)):
             try:
@@ -428,14 +436,20 @@ class LabelTables:
         return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
     def _write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
-        try:
-            return self._written(table, own, action)
-        except OSError as error:
-            place, _ = _places(table)
-            reason = (error.strerror or str(error)).removeprefix("is ").lower()
-            beside = state_place(place)
-            where = f"{beside.name}: " if error.filename == str(beside) else ""
-            raise ProblemError(f"{place.name} cannot be saved: {where}{reason}") from error
+        while True:
+            try:
+                joined = self._written(table, own, action)
+            except OSError as error:
+                if error.errno in _FULL and self._let_go(most=0):
+                    continue
+                place, _ = _places(table)
+                reason = (error.strerror or str(error)).removeprefix("is ").lower()
+                beside = state_place(place)
+                where = f"{beside.name}: " if error.filename == str(beside) else ""
+                raise ProblemError(f"{place.name} cannot be saved: {where}{reason}") from error
+            while self._let_go():
+                pass
+            return joined
 
     def _written(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
         for final in _attempts():
@@ -507,22 +521,38 @@ class LabelTables:
         with self._watched_lock:
             self._watched.append(one)
 
+    def _let_go(self, most: int = _MOST_WATCHED) -> bool:
+        """Close the table that was replaced or written to longest ago, if they are too many or too large; say whether.
+
+        What was written to it is taken in. The last one stays, as a program may write to it this moment, but for
+        `most` 0, where the disk is full: then those stay that have something which cannot be taken in.
+        """
+        with self._watched_lock:
+            count, size = len(self._watched), sum(len(one.file.text or b"") for one in self._watched)
+            if count <= most and (count <= 1 or size <= _MOST_WATCHED_BYTES):
+                return False
+            oldest = next((one for one in self._watched if most or not one.is_written()), None)
+            if oldest is None:
+                return False
+            self._watched.remove(oldest)
+        now = self._taken_in(oldest)
+        if most and now.file is not oldest.file:
+            with self._watched_lock:
+                self._watched.append(now)
+        else:
+            now.file.close()
+        return True
+
     def _take_in(self, table: Path | None = None) -> None:
         """Take in what programs wrote to a table that they had opened before it was replaced; `None`: to any table."""
         with self._watched_lock:
             mine = [one for one in self._watched if table in (None, one.file.table)]
-            count, size = len(self._watched), sum(len(one.file.text or b"") for one in self._watched)
             self._watched = [one for one in self._watched if one not in mine]
-        left = []
-        for one in mine:
-            now = self._taken_in(one)
-            if count > _MOST_WATCHED or size > _MOST_WATCHED_BYTES:
-                count, size = count - 1, size - len(now.file.text or b"")
-                now.file.close()
-            else:
-                left.append(now)
+        found = [(one.file, self._taken_in(one)) for one in mine]
+        written = [now for file, now in found if now.file is not file]
         with self._watched_lock:
-            self._watched = [*left, *self._watched]
+            # That of a program that holds its table open stays the newest.
+            self._watched = [*(now for file, now in found if now.file is file), *self._watched, *written]
 
     def _taken_in(self, one: _Watched) -> _Watched:
         file = one.file
