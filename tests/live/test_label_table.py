@@ -681,6 +681,32 @@ def test_what_was_acknowledged_is_readable_by_those_who_may_read_the_table(new: 
     assert table.with_name(SAVED).stat().st_mode & 0o777 == 0o600 == table.stat().st_mode & 0o777
 
 
+def test_a_table_stays_with_its_group_where_the_user_is_in_it(table: Path, tables, monkeypatch) -> None:
+    """The group is asked for on the new file before its permissions are set; another user's group cannot be given."""
+    table.write_text("label,t_us\n")
+    table.chmod(0o664)
+    if os.getuid() == 0:
+        os.chown(table, -1, 3000)
+    group, asked, give = table.stat().st_gid, [], os.fchown
+
+    def fchown(descriptor: int, user: int, of: int) -> None:
+        asked.append((user, of, os.fstat(descriptor).st_mode & 0o070))
+        give(descriptor, user, of)
+
+    monkeypatch.setattr(os, "fchown", fchown)
+    mark(tables, table, "heel", 1)
+    assert set(asked) == {(-1, group, 0)}
+    for one in (table, table.with_name(SAVED)):
+        assert (one.stat().st_gid, one.stat().st_mode & 0o777) == (group, 0o664)
+
+    def refused(*_: object) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "fchown", refused)
+    mark(tables, table, "toe", 2)
+    assert sorted(held(table)) == [("heel", 1), ("toe", 2)]
+
+
 @pytest.mark.parametrize(
     "row",
     [

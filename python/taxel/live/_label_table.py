@@ -299,20 +299,20 @@ def _save(file: _File, saved: dict[str, Any]) -> None:
     if len(text) > MOST_SAVED:
         raise ProblemError(f"{file.place}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
     beside = state_place(file.place)
-    with _new_file(beside, _mode(file), text) as (_, name):
+    with _new_file(beside, _about(file), text) as (_, name):
         os.replace(name, beside)
     if file.link is None:
         return
     # The link may become a file again.
-    with contextlib.suppress(OSError), _new_file(beside := state_place(file.link), _mode(file), text) as (_, name):
+    with contextlib.suppress(OSError), _new_file(beside := state_place(file.link), _about(file), text) as (_, name):
         os.replace(name, beside)
 
 
-def _mode(file: _File) -> int | None:
+def _about(file: _File) -> os.stat_result | None:
     """Return who may read a table, which holds for what is saved beside it too; None where neither is there."""
     for place in (file.place, state_place(file.place)):
         with contextlib.suppress(FileNotFoundError):
-            return stat.S_IMODE(os.stat(place).st_mode)
+            return os.stat(place)
     return None
 
 
@@ -501,7 +501,7 @@ class LabelTables:
         _save(file, {**states, "before": _digest(file.text), "after": _digest(text)})
         replaced = False
         try:
-            with _new_file(place, None if file.descriptor is None else _mode(file), text) as (descriptor, name):
+            with _new_file(place, None if file.descriptor is None else _about(file), text) as (descriptor, name):
                 replaced = file.is_current() and _put(name, file)
                 if replaced and not _is_old(name, file):
                     # Another program was quicker: its file comes back. It may have written to ours in the meantime.
@@ -602,14 +602,18 @@ def _is_old(name: str, file: _File) -> bool:
 
 
 @contextlib.contextmanager
-def _new_file(place: Path, mode: int | None, text: bytes) -> Iterator[tuple[int, str]]:
+def _new_file(place: Path, about: os.stat_result | None, text: bytes) -> Iterator[tuple[int, str]]:
     """Write a new text to a file beside that which it will replace, on the disk; remove what is there afterwards."""
     name = str(place.with_name(f".{place.name}.{secrets.token_hex(4)}.new"))
     try:
         how = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-        descriptor = os.open(name, how, 0o666 if mode is None else mode & 0o600)
+        mode = 0o666 if about is None else stat.S_IMODE(about.st_mode)
+        descriptor = os.open(name, how, mode if about is None else mode & 0o600)
         try:
-            if mode is not None:
+            if about is not None:
+                # Of a group that this user is not in, it cannot be.
+                with contextlib.suppress(OSError):
+                    os.fchown(descriptor, -1, about.st_gid)
                 os.fchmod(descriptor, mode)
             with open(descriptor, "wb", closefd=False) as part:
                 part.write(text)
