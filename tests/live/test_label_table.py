@@ -161,7 +161,12 @@ def test_a_line_that_is_being_written_is_waited_for(table: Path, tables) -> None
         (b"label,t_us\nheel,soon\n", "line 2: t_us is 'soon'"),
         (b"# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
         (b'label,t_us\n"heel,1\n', "a quote opens"),
-        (b"\xff\xfe", "not a table of text"),
+        (
+            "label,t_us\nheel,1\n".encode("utf-16"),
+            r"csv, line 1, byte 0: not text in UTF-8 \(UTF-16\); save it as UTF-8",
+        ),
+        (b"label,t_us\r\nheel,1\r\nf\xfc\xdf,2\r\n", "csv, line 3, byte 21: not text in UTF-8 .*; save it as UTF-8"),
+        (b"\xef\xbb\xbflabel,t_us\rf\xfc\xdf,2\r", "csv, line 2, byte 15: not text in UTF-8 .*; save it as UTF-8"),
     ],
 )
 def test_a_table_that_cannot_be_read_is_not_written(text: bytes, said: str, table: Path, tables) -> None:
@@ -171,8 +176,9 @@ def test_a_table_that_cannot_be_read_is_not_written(text: bytes, said: str, tabl
     with pytest.raises(ProblemError, match=f"{said}.*nothing was saved: mend the table"):
         mark(tables, table, "toe", 2)
     assert table.read_bytes() == text
-    with pytest.raises(FormatError, match=said):
-        tables.read(table, OWN)
+    for read in (lambda: tables.read(table, OWN), lambda: taxel.Labels(table)):
+        with pytest.raises(FormatError, match=said):
+            read()
     table.write_text("label,t_us\n")
     read = mark(tables, table, "ball", 3)
     assert texts(read.rows) == [("ball", 3)]

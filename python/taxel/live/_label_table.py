@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base.arguments import shown
+from taxel._base.documents import decoded
 from taxel._base.files import try_whole
 from taxel._base.header_table import lines_of
 from taxel._core import FormatError, ProblemError, open_regular
@@ -149,7 +150,7 @@ class _File:
     def text_with(self, rows: Sequence[Note]) -> bytes:
         """Return the text of a table with these rows, with the columns, the ends of lines and the BOM of this one."""
         text = self.text or b""
-        lines = lines_of(text.decode("utf-8-sig"))
+        lines = lines_of(decoded(self.place, text))
         end = next((end for end in ("\r\n", "\r") if lines and lines[0].endswith(end)), "\n")
         bom = codecs.BOM_UTF8 if text.startswith(codecs.BOM_UTF8) else b""
         return bom + text_with(rows, self.columns, end).encode()
@@ -178,11 +179,7 @@ def _places(table: Path) -> tuple[Path, Path | None]:
 
 
 def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
-    try:
-        decoded = text.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FormatError(f"{place}: not a table of text: {error}") from None
-    rows, columns = rows_of(place, lines_of(decoded))
+    rows, columns = rows_of(place, lines_of(decoded(place, text)))
     return tuple(replace(row, recording="") if row.recording in own else row for row in rows), columns
 
 
