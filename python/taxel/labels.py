@@ -116,7 +116,7 @@ class Labels:
         may be absent. A label without a source is of all sources of its recording; a source that was a topic of a ROS
         bag may have the topic's name. A row with `replaces_us` stands for
         the recording's own note of that time; one without a label says that this note is none. Other columns are kept
-        (`Note.others`).
+        (`Note.others`). An empty text has no labels.
 
     Attributes
     ----------
@@ -275,7 +275,7 @@ def beside(recording: str | os.PathLike[str]) -> Path:
 
 
 def rows_of(place: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...], tuple[str, ...]]:
-    """Return the rows of a table of labels, those without a label too, and the columns that taxel does not know.
+    """Return the rows of a table of labels, those without a label too, and the names of its columns in their order.
 
     Parameters
     ----------
@@ -290,40 +290,56 @@ def rows_of(place: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...], 
 
     Examples
     --------
-    >>> rows, others = rows_of("a.csv", ["label,t_us,comment", "heel,400,late"])
-    >>> rows[0].t, others
-    (400, ('comment',))
+    >>> rows, columns = rows_of("a.csv", ["t_us,label,comment", "400,heel,late"])
+    >>> rows[0].t, columns
+    (400, ('t_us', 'label', 'comment'))
     """
     table = HeaderTable.read(place, lines)
+    if not table.header:
+        # An editor empties a table before it writes it.
+        return (), ()
     table.has(_WANTED)
     rows = tuple(_row(f"{place}, line {line}", cells) for line, cells in table)
-    return rows, tuple(name for name in table.header if name and name not in (*_WANTED, *_KNOWN))
+    return rows, table.header
 
 
-def text_with(rows: Iterable[Note], others: Iterable[str] = ()) -> str:
+def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n") -> str:
     r"""Return the text of a table with these rows, in the order of time.
 
     Parameters
     ----------
     rows : iterable of Note
-    others : iterable of str
-        Columns that taxel does not know, also where no row has them.
+    columns : iterable of str
+        The columns of the table so far, which keep their order, also where no row has them: another program may append
+        rows by it. New ones follow.
+    end : str
+        Of a line.
 
     Examples
     --------
-    >>> text_with([Note("lift", 900), Note("contact", 400, source="left")])
-    'label,t_us,source\ncontact,400,left\nlift,900,\n'
+    >>> text_with([Note("lift", 900), Note("contact", 400, source="left")], ["t_us", "label"])
+    't_us,label,source\n400,contact,left\n900,lift,\n'
     """
-    ordered = sorted(rows, key=lambda row: row.t or 0)
-    cells = [(row.source, row.recording, row.replaces, row.at_ns or None) for row in ordered]
-    kept = [k for k, _ in enumerate(_KNOWN) if any(row[k] not in ("", None) for row in cells)]
-    more = list(dict.fromkeys([*others, *(name for row in ordered for name, _ in row.others)]))
+    cells = [
+        {
+            **dict(row.others),
+            "label": row.text,
+            "t_us": row.t,
+            "source": row.source,
+            "recording": row.recording,
+            "replaces_us": row.replaces,
+            "host_ns": row.at_ns or None,
+        }
+        for row in sorted(rows, key=lambda row: row.t or 0)
+    ]
+    kept = [name for name in _KNOWN if any(row[name] not in ("", None) for row in cells)]
+    others = [name for row in cells for name in row if name not in (*_WANTED, *_KNOWN)]
+    there = list(columns)
+    header = [*there, *(name for name in dict.fromkeys([*_WANTED, *kept, *others]) if name not in there)]
     text = io.StringIO(newline="")
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow([*_WANTED, *(_KNOWN[k] for k in kept), *more])
-    for row, known in zip(ordered, cells, strict=True):
-        own = dict(row.others)
-        table.writerow([row.text, row.t, *(known[k] for k in kept), *(own.get(name, "") for name in more)])
+    table = csv.writer(text, lineterminator=end)
+    table.writerow(header)
+    table.writerows([[row.get(name, "") for name in header] for row in cells])
     return text.getvalue()
 
 

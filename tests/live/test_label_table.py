@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import os
 import random
+import resource
 import threading
 import time
 from collections import Counter
@@ -16,7 +18,7 @@ import pytest
 import taxel
 from taxel import FormatError, ProblemError
 from taxel.labels import Note
-from taxel.live import _label_table
+from taxel.live import _label_lock, _label_table
 from taxel.live._label_join import Edit
 from taxel.live._label_table import LabelTables
 
@@ -159,7 +161,12 @@ def test_a_line_that_is_being_written_is_waited_for(table: Path, tables) -> None
         (b"label,t_us\nheel,soon\n", "line 2: t_us is 'soon'"),
         (b"# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
         (b'label,t_us\n"heel,1\n', "a quote opens"),
-        (b"\xff\xfe", "not a table of text"),
+        (
+            "label,t_us\nheel,1\n".encode("utf-16"),
+            r"csv, line 1, byte 0: not text in UTF-8 \(UTF-16\); save it as UTF-8",
+        ),
+        (b"label,t_us\r\nheel,1\r\nf\xfc\xdf,2\r\n", "csv, line 3, byte 21: not text in UTF-8 .*; save it as UTF-8"),
+        (b"\xef\xbb\xbflabel,t_us\rf\xfc\xdf,2\r", "csv, line 2, byte 15: not text in UTF-8 .*; save it as UTF-8"),
     ],
 )
 def test_a_table_that_cannot_be_read_is_not_written(text: bytes, said: str, table: Path, tables) -> None:
@@ -169,8 +176,9 @@ def test_a_table_that_cannot_be_read_is_not_written(text: bytes, said: str, tabl
     with pytest.raises(ProblemError, match=f"{said}.*nothing was saved: mend the table"):
         mark(tables, table, "toe", 2)
     assert table.read_bytes() == text
-    with pytest.raises(FormatError, match=said):
-        tables.read(table, OWN)
+    for read in (lambda: tables.read(table, OWN), lambda: taxel.Labels(table)):
+        with pytest.raises(FormatError, match=said):
+            read()
     table.write_text("label,t_us\n")
     read = mark(tables, table, "ball", 3)
     assert texts(read.rows) == [("ball", 3)]
@@ -196,6 +204,33 @@ def test_any_table_that_can_be_read_keeps_its_rows(text: bytes, kept, table: Pat
     assert texts(read.rows) == [*kept, ("toe", 2)] == sorted(held(table).elements())
     assert (b"comment" in text) == (b"comment" in table.read_bytes())
     assert not tables.read(table, OWN).conflict
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        (b"t_us,label\n100,2\n", b"t_us,label\n7,toe\n100,2\n"),
+        (b"label,t_us,source\nheel,1,\n", b"label,t_us,source\nheel,1,\ntoe,7,\n"),
+        (b"host_ns,t_us,comment,,label\n,1,late,,heel\n", b"host_ns,t_us,comment,,label\n,1,late,,heel\n,7,,,toe\n"),
+        (b"replaces_us, t_us ,label\n", b"replaces_us,t_us,label\n,7,toe\n"),
+        (b"\xef\xbb\xbft_us,label\r\n1,heel\r\n", b"\xef\xbb\xbft_us,label\r\n1,heel\r\n7,toe\r\n"),
+        (b"t_us,label\r1,heel\r", b"t_us,label\r1,heel\r7,toe\r"),
+        (b'\xef\xbb\xbft_us,label\n1,"a\r\nb"\n', b'\xef\xbb\xbft_us,label\n1,"a\r\nb"\n7,toe\n'),
+    ],
+)
+def test_a_table_keeps_its_columns_in_their_order_and_its_ends_of_lines(
+    text: bytes, written: bytes, table: Path, tables
+) -> None:
+    table.write_bytes(text)
+    os.utime(table, (1, 1))
+    mark(tables, table, "toe", 7)
+    assert table.read_bytes() == written
+    # A label with columns of its own; the rows of a program that appends by the header that it wrote stay as they are.
+    new = Note("ball", 9, source="left", at_ns=5)
+    tables.change(table, OWN, [[Edit(None, new)]])
+    head = table.read_bytes().splitlines()[0]
+    assert head.startswith(written.splitlines()[0])
+    assert new in tables.read(table, OWN).rows or b"comment" in text
 
 
 def test_a_deleted_table_and_an_older_text_are_conflicts_that_last(table: Path, tables) -> None:
@@ -338,6 +373,63 @@ def test_a_link_to_a_table_stays_one_and_its_permissions_stay(tmp_path: Path, ta
     assert sorted(held(real)) == [("heel", 1), ("toe", 2)]
 
 
+def linked(table: Path, text: str) -> Path:
+    """Replace a table by a link to a file in another folder with this text."""
+    real = table.parent / "store" / "x.csv"
+    real.parent.mkdir(exist_ok=True)
+    real.write_text(text)
+    link = table.with_name("link")
+    link.symlink_to("store/x.csv")
+    os.replace(link, table)
+    return real
+
+
+def test_a_table_that_becomes_a_link_and_a_file_again_keeps_what_was_acknowledged(table: Path, tables) -> None:
+    for t in range(3):
+        mark(tables, table, "heel", t)
+    linked(table, "label,t_us\nheel,0\n")
+    for again in (tables, LabelTables()):
+        assert texts(again.read(table, OWN).conflict.missing) == [("heel", 1), ("heel", 2)]
+    assert texts(mark(tables, table, "toe", 5).conflict.missing) == [("heel", 1), ("heel", 2)]
+    tables.settle(table, OWN, tables.read(table, OWN).conflict, restore=True)
+    tables.change(table, OWN, [[Edit(Note("heel", 0), None)]])
+    assert table.is_symlink()
+    text = table.read_text()
+    table.unlink()
+    table.write_text(text)
+    read = tables.read(table, OWN)
+    assert texts(read.rows) == [("heel", 1), ("heel", 2), ("toe", 5)]
+    assert not read.conflict
+    table.write_text("label,t_us\nheel,0\n")
+    conflict = tables.read(table, OWN).conflict
+    assert texts(conflict.missing) == [("heel", 1), ("heel", 2), ("toe", 5)]
+    assert texts(conflict.returned) == [("heel", 0)]
+
+
+def test_windows_on_a_table_and_on_a_link_to_it_are_in_no_conflict(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    real = linked(table, table.read_text())
+    for k in range(4):
+        one, other = (real, table) if k % 2 else (table, real)
+        mark(tables, one, "toe", k)
+        assert not tables.change(other, OWN, [[Edit(Note("toe", k), Note("ball", k))]])[1].conflict
+        assert not tables.read(one, OWN).conflict
+    real.write_text("label,t_us\n")
+    assert texts(tables.read(table, OWN).conflict.missing) == [*(("ball", k) for k in range(4)), ("heel", 1)]
+
+
+def test_a_late_line_in_a_table_that_became_a_link_goes_to_its_file(table: Path, tables) -> None:
+    mark(tables, table, "heel", 1)
+    with table.open("a") as hand:
+        mark(tables, table, "toe", 3)
+        real = linked(table, table.read_text())
+        hand.write("hand,2\n")
+        hand.flush()
+        tables.stamp(table)
+    assert table.is_symlink()
+    assert sorted(held(real)) == [("hand", 2), ("heel", 1), ("toe", 3)]
+
+
 def test_what_is_no_regular_file_is_refused_at_once(table: Path, tables) -> None:
     os.mkfifo(table)
     with pytest.raises(ProblemError, match="a named pipe; must be a file"):
@@ -408,11 +500,60 @@ def test_a_late_line_in_a_table_that_was_replaced_is_taken_in(table: Path, table
 
 
 def test_watched_tables_are_bounded(table: Path, tables, monkeypatch) -> None:
-    monkeypatch.setattr(_label_table, "_MOST_WATCHED", 3)
-    for t in range(9):
+    for t in range(40):
         mark(tables, table, "heel", t)
+    assert len(tables._watched) == _label_table._MOST_WATCHED <= 32
+    monkeypatch.setattr(_label_table, "_MOST_WATCHED_BYTES", 10)
+    mark(tables, table, "heel", 40)
+    assert len(tables._watched) == 1
+
+
+def test_a_program_that_holds_its_table_open_is_heard_however_often_the_page_saves(table: Path, tables) -> None:
+    mark(tables, table, "heel", 0)
+    with table.open("a") as hand:
+        for t in range(1, 40):
+            hand.write(f"hand,{t}\n")
+            hand.flush()
+            mark(tables, table, "heel", t)
+            tables.stamp(table)
+    assert held(table) == Counter((label, t) for label in ("hand", "heel") for t in range(40)) - Counter([("hand", 0)])
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE])
+def test_watched_tables_make_room_on_a_full_disk(code: int, table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 0)
+    new = _label_table._new_file
+    with table.open("a") as hand:
+        for t in range(1, 9):
+            mark(tables, table, "heel", t)
+        hand.write("hand,9\n")
+        hand.flush()
+
+        def full(*of):
+            if len(tables._watched) > 3:
+                raise OSError(code, os.strerror(code))
+            return new(*of)
+
+        monkeypatch.setattr(_label_table, "_new_file", full)
+        mark(tables, table, "heel", 10)
         tables.stamp(table)
-    assert len(tables._watched) == 3
+    assert sorted(held(table)) == [("hand", 9), *(("heel", t) for t in range(9)), ("heel", 10)]
+    monkeypatch.setattr(_label_table, "_new_file", no_space)
+    with pytest.raises(ProblemError, match=r"cannot be saved: no space left"):
+        mark(tables, table, "toe", 11)
+
+
+def test_saving_needs_few_descriptors(table: Path, tables) -> None:
+    limit = resource.getrlimit(resource.RLIMIT_NOFILE)
+    used = os.open(os.devnull, os.O_RDONLY)
+    os.close(used)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (used + 12, limit[1]))
+    try:
+        for t in range(30):
+            mark(tables, table, "heel", t)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limit)
+    assert len(held(table)) == 30
 
 
 def test_another_recording_has_none_of_the_labels_of_a_deleted_one(table: Path, tables) -> None:
@@ -432,10 +573,107 @@ def test_another_recording_has_none_of_the_labels_of_a_deleted_one(table: Path, 
     assert not read.conflict
 
 
+def test_recordings_of_one_stem_share_what_was_acknowledged(table: Path, tables) -> None:
+    for ending in ("mcap", "asf"):
+        table.with_name(f"walk.{ending}").write_bytes(ending.encode())
+    mark(tables, table, "heel", 1)
+    table.unlink()
+    other = frozenset({"", "walk.asf", "walk"})
+    assert texts(tables.read(table, other).conflict.missing) == [("heel", 1)]
+    _, read = tables.change(table, other, [[Edit(None, Note("toe", 2))]])
+    assert texts(read.conflict.missing) == [("heel", 1)]
+    table.unlink()
+    assert texts(tables.read(table, OWN).conflict.missing) == [("heel", 1), ("toe", 2)]
+
+
 def test_a_lock_that_is_no_file_is_refused_at_once(table: Path, tables) -> None:
     os.mkfifo(table.with_name(".taxel-labels.lock"))
     with pytest.raises(ProblemError, match=r"taxel-labels.lock: is no regular file"):
         mark(tables, table, "heel", 1)
+
+
+def together(calls) -> list:
+    """Make calls in a thread each; return what they returned or raised."""
+    found: list = []
+
+    def call(one) -> None:
+        try:
+            found.append(one())
+        except Exception as error:
+            found.append(error)
+
+    threads = [threading.Thread(target=call, args=(one,)) for one in calls]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return found
+
+
+def slow_disk(monkeypatch) -> None:
+    sync = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda descriptor: (time.sleep(0.03), sync(descriptor)))
+    monkeypatch.setattr(_label_lock, "_WITHIN_S", 0.5)
+
+
+def test_the_tables_of_one_server_wait_for_each_other_as_long_as_it_takes(tmp_path: Path, tables, monkeypatch) -> None:
+    slow_disk(monkeypatch)
+    places = [tmp_path / f"{k}.notes.csv" for k in range(12)]
+    found = together([lambda place=place: mark(tables, place, "heel", 1) for place in places])
+    assert not [one for one in found if isinstance(one, Exception)]
+    assert [held(place) for place in places] == [Counter({("heel", 1): 1})] * 12
+
+
+def test_another_server_gets_the_lock_between_the_tables_of_one_that_queue(tmp_path: Path, tables, monkeypatch) -> None:
+    slow_disk(monkeypatch)
+    child = os.fork()
+    if not child:
+        for k in range(10):
+            mark(LabelTables(), tmp_path / "other.notes.csv", "heel", k)
+        os._exit(0)
+    ends, failed = [], []
+
+    def marks(place: Path) -> None:
+        while not ends:
+            try:
+                mark(tables, place, "toe", time.monotonic_ns() % 10**9)
+            except ProblemError as error:
+                failed.append(error)
+
+    writers = [threading.Thread(target=marks, args=(tmp_path / f"{k}.notes.csv",)) for k in range(4)]
+    for writer in writers:
+        writer.start()
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    ends.append(True)
+    for writer in writers:
+        writer.join()
+    assert (code, failed) == (0, [])
+    assert len(held(tmp_path / "other.notes.csv")) == 10
+
+
+def test_reading_waits_for_no_lock(table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 1)
+    monkeypatch.setattr(_label_lock, "_WITHIN_S", 0.1)
+    with open(table.with_name(".taxel-labels.lock")) as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert texts(tables.read(table, OWN).rows) == [("heel", 1)]
+        with pytest.raises(ProblemError, match="another program holds this lock; nothing was saved"):
+            mark(tables, table, "toe", 2)
+
+
+def test_a_table_that_is_written_while_it_is_read_is_in_no_conflict(table: Path, tables, monkeypatch) -> None:
+    mark(tables, table, "heel", 1)
+    known, once = _label_table._acknowledged, iter([True])
+
+    def late(*one):
+        if next(once, False):
+            mark(LabelTables(), table, "toe", 2)
+        return known(*one)
+
+    monkeypatch.setattr(_label_table, "_acknowledged", late)
+    read = tables.read(table, OWN)
+    assert texts(read.rows) == [("heel", 1), ("toe", 2)]
+    assert not read.conflict
 
 
 @pytest.mark.parametrize("new", [False, True])
@@ -447,6 +685,32 @@ def test_what_was_acknowledged_is_readable_by_those_who_may_read_the_table(new: 
     table.chmod(0o600)
     mark(tables, table, "toe", 2)
     assert table.with_name(SAVED).stat().st_mode & 0o777 == 0o600 == table.stat().st_mode & 0o777
+
+
+def test_a_table_stays_with_its_group_where_the_user_is_in_it(table: Path, tables, monkeypatch) -> None:
+    """The group is asked for on the new file before its permissions are set; another user's group cannot be given."""
+    table.write_text("label,t_us\n")
+    table.chmod(0o664)
+    if os.getuid() == 0:
+        os.chown(table, -1, 3000)
+    group, asked, give = table.stat().st_gid, [], os.fchown
+
+    def fchown(descriptor: int, user: int, of: int) -> None:
+        asked.append((user, of, os.fstat(descriptor).st_mode & 0o070))
+        give(descriptor, user, of)
+
+    monkeypatch.setattr(os, "fchown", fchown)
+    mark(tables, table, "heel", 1)
+    assert set(asked) == {(-1, group, 0)}
+    for one in (table, table.with_name(SAVED)):
+        assert (one.stat().st_gid, one.stat().st_mode & 0o777) == (group, 0o664)
+
+    def refused(*_: object) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "fchown", refused)
+    mark(tables, table, "toe", 2)
+    assert sorted(held(table)) == [("heel", 1), ("toe", 2)]
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import _core
-from taxel.labels import TURN_US
+from taxel.labels import TURN_US, write_labels
 from taxel.live._requests import RequestHandler
 from taxel.live._shown_files import Opening
+from taxel.recording.opening import is_recording
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
 BEGAN_NS = 1_700_000_000_000_000_000
@@ -209,3 +210,19 @@ def test_a_cell_in_a_column_without_a_name_is_refused_and_an_empty_one_is_not(tm
     place.write_text("label,t_us,,\nheel,5,late,\n")
     with pytest.raises(taxel.FormatError, match="line 2: 'late' stands in a column without a name; give it one"):
         taxel.Labels(place)
+
+
+@pytest.mark.parametrize("text", [b"", b"\n \n", b"\xef\xbb\xbf", b"\xef\xbb\xbf\r\n"])
+@pytest.mark.parametrize("name", ["walk.notes.csv", "labels.csv"])
+def test_an_empty_table_has_no_labels(text: bytes, name: str, tmp_path: Path) -> None:
+    made = record(tmp_path / "walk.mcap", 0, 1.0)
+    place = tmp_path / name
+    place.write_bytes(text)
+    table = taxel.Labels(place)
+    assert (table.rows, table.removed, table.recordings) == ((), (), ())
+    assert taxel.open(made.path).notes == made.notes == ()
+    # It is no recording of its folder.
+    assert [one.path for one in taxel.open(tmp_path)] == [made.path]
+    assert not is_recording(place)
+    write_labels(place, [("heel", 5)])
+    assert [row.text for row in taxel.Labels(place).rows] == ["heel"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import re
@@ -21,6 +22,7 @@ __all__ = [
     "BY_HAND",
     "BY_TAXEL",
     "NotTomlError",
+    "decoded",
     "memory_of_json",
     "of_json",
     "of_toml",
@@ -54,17 +56,31 @@ def read_text(path: str | os.PathLike[str], most: int = BY_HAND) -> str:
 
     Raises
     ------
-    FormatError : more than `most` bytes, not UTF-8 (names the byte), or no file but a pipe, a socket or a device
+    FormatError : more than `most` bytes, not UTF-8 (names line and byte), or no file but a pipe, a socket or a device
     OSError : the file is not there, or cannot be read
     """
     with open_file(path) as file:
         data = file.read(most + 1)
     if len(data) > most:
         raise FormatError(f"{path}: more than {most} bytes; must be at most that")
+    return decoded(path, data)
+
+
+def decoded(path: str | os.PathLike[str], data: bytes) -> str:
+    """Return the text of a file's bytes, UTF-8 with or without BOM.
+
+    Raises
+    ------
+    FormatError : not UTF-8 (names line and byte)
+    """
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise FormatError(f"{path}, byte {error.start}: not text in UTF-8 ({error.reason})") from None
+        # Counted in the whole file, with its BOM.
+        at = error.start + len(data) - len(error.object)
+        line = len(data[:at].replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n"))
+        reason = "UTF-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else error.reason
+        raise FormatError(f"{path}, line {line}, byte {at}: not text in UTF-8 ({reason}); save it as UTF-8") from None
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ __all__ = [
     "NOT_SAVED",
     "bytes_of",
     "from_json",
+    "newest_of",
     "not_saved",
     "saved_of",
     "state_place",
@@ -94,6 +95,18 @@ def from_json(saved: dict[str, Any]) -> Acknowledged:
 def not_saved(place: Path, error: Exception) -> FormatError:
     reason = f"not what taxel saved of the labels that it acknowledged ({error})"
     return FormatError(f"{state_place(place)}: {reason}; delete it to go on without")
+
+
+def newest_of(place: Path, link: Path | None) -> Path:
+    """Return the table by whose name the newest state is saved: the file itself, or a link to it."""
+    times = []
+    for one in (place, link):
+        try:
+            times.append(-1 if one is None else os.stat(state_place(one)).st_mtime_ns)
+        except FileNotFoundError:
+            times.append(-1)
+    # A state that is saved by the link's name is saved beside the file just before.
+    return link if link is not None and times[1] > times[0] else place
 
 
 def saved_of(place: Path) -> dict[str, Any] | None:

@@ -11,15 +11,14 @@ in between leaves a state that the text of the table decides.
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import ctypes
 import errno
-import fcntl
 import functools
 import hashlib
 import json
 import os
-import random
 import re
 import secrets
 import stat
@@ -31,16 +30,19 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base.arguments import shown
+from taxel._base.documents import decoded
 from taxel._base.files import try_whole
 from taxel._base.header_table import lines_of
 from taxel._core import FormatError, ProblemError, open_regular
 from taxel.labels import Note, rows_of, text_with
 from taxel.live._label_join import Acknowledged, Conflict, Edit, Joined, conflict_of, fold, join, minus, settled
+from taxel.live._label_lock import LOCK, locked, locked_at_once
 from taxel.live._label_state import (
     MOST_SAVED,
     NOT_SAVED,
     bytes_of,
     from_json,
+    newest_of,
     not_saved,
     saved_of,
     state_place,
@@ -50,12 +52,6 @@ from taxel.live._label_state import (
 
 __all__ = ["LabelTables", "TableRead"]
 
-#: The lock of all tables of a folder.
-_LOCK = ".taxel-labels.lock"
-
-#: How long another process may hold the lock, s.
-_LOCK_WITHIN_S = 20.0
-
 #: A table that does not end, or cannot be read, and was written within this time is being written, s.
 _WRITTEN_S = 2.0
 
@@ -63,7 +59,10 @@ _WRITTEN_S = 2.0
 _WHOLE_WITHIN_S = 6.0
 
 #: How many replaced tables are watched for programs that still write to them, and how many bytes of text.
-_MOST_WATCHED, _MOST_WATCHED_BYTES = 256, 1 << 26
+_MOST_WATCHED, _MOST_WATCHED_BYTES = 16, 1 << 20
+
+#: What an operating system answers that has no more space or descriptors, which the watched tables take.
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE)
 
 #: The beginning of a recording by which it is told from another one of the same name, bytes.
 _BEGINNING = 1 << 16
@@ -101,48 +100,60 @@ class TableRead:
 
 @dataclass(frozen=True, eq=False)
 class _File:
-    """Hold an open file of a table; without a descriptor there is none."""
+    """Hold an open file of a table, without a descriptor if there is none; `link` is its name where that is a link."""
 
     place: Path
+    link: Path | None
     own: frozenset[str]
     recording: Path | None
     descriptor: int | None
     text: bytes | None
     rows: tuple[Note, ...]
-    others: tuple[str, ...]
+    columns: tuple[str, ...]
 
     @classmethod
-    def read(cls, place: Path, own: frozenset[str], recording: Path | None, *, final: bool) -> _File:
+    def read(cls, table: Path, own: frozenset[str], *, final: bool) -> _File:
         """Read a table; `final` if it is not waited for any longer."""
+        place, link = _places(table)
+        recording = _recording_of(table, own)
         try:
             descriptor = open_regular(place)
         except FileNotFoundError:
-            return cls(place, own, recording, None, None, (), ())
+            return cls(place, link, own, recording, None, None, (), ())
         try:
-            return cls._of(place, own, recording, descriptor, final=final)
+            return cls(place, link, own, recording, descriptor, None, (), ()).again(final=final)
         except BaseException:
             os.close(descriptor)
             raise
 
-    @classmethod
-    def _of(cls, place: Path, own: frozenset[str], recording: Path | None, descriptor: int, *, final: bool) -> _File:
-        text = bytes_of(descriptor)
+    def again(self, *, final: bool) -> _File:
+        """Read the same file again, which may have been replaced by another."""
+        assert self.descriptor is not None
+        text = bytes_of(self.descriptor)
         # A time in the future is none at which it was written.
-        is_new = 0 <= time.time() - os.fstat(descriptor).st_mtime <= _WRITTEN_S
+        is_new = 0 <= time.time() - os.fstat(self.descriptor).st_mtime <= _WRITTEN_S
         try:
-            rows, others = _parsed(place, own, text)
+            rows, columns = _parsed(self.place, self.own, text)
         except FormatError as error:
             if final or not is_new:
                 raise
             raise _BeingWritten(error) from None
         if not text.endswith((b"\n", b"\r")) and not final and is_new:
             raise _BeingWritten(None)
-        return cls(place, own, recording, descriptor, text, rows, others)
+        return replace(self, text=text, rows=rows, columns=columns)
 
-    def again(self, *, final: bool) -> _File:
-        """Read the same file again, which may have been replaced by another."""
-        assert self.descriptor is not None
-        return self._of(self.place, self.own, self.recording, self.descriptor, final=final)
+    @property
+    def table(self) -> Path:
+        """The name by which the table was read."""
+        return self.link or self.place
+
+    def text_with(self, rows: Sequence[Note]) -> bytes:
+        """Return the text of a table with these rows, with the columns, the ends of lines and the BOM of this one."""
+        text = self.text or b""
+        lines = lines_of(decoded(self.place, text))
+        end = next((end for end in ("\r\n", "\r") if lines and lines[0].endswith(end)), "\n")
+        bom = codecs.BOM_UTF8 if text.startswith(codecs.BOM_UTF8) else b""
+        return bom + text_with(rows, self.columns, end).encode()
 
     def is_current(self) -> bool:
         """Return whether the table is still the file that was read, with the same text."""
@@ -161,17 +172,15 @@ class _File:
             os.close(self.descriptor)
 
 
+def _places(table: Path) -> tuple[Path, Path | None]:
+    """Return the file of a table, and its own name where that is a link to the file."""
+    place, named = Path(os.path.realpath(table)), Path(os.path.realpath(table.parent), table.name)
+    return place, None if named == place else named
+
+
 def _parsed(place: Path, own: frozenset[str], text: bytes) -> tuple[tuple[Note, ...], tuple[str, ...]]:
-    try:
-        decoded = text.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FormatError(f"{place}: not a table of text: {error}") from None
-    if not decoded.strip():
-        # An editor empties the table before it writes it.
-        return (), ()
-    lines = lines_of(decoded)
-    rows, others = rows_of(place, lines)
-    return tuple(replace(row, recording="") if row.recording in own else row for row in rows), others
+    rows, columns = rows_of(place, lines_of(decoded(place, text)))
+    return tuple(replace(row, recording="") if row.recording in own else row for row in rows), columns
 
 
 def _recording_of(table: Path, own: frozenset[str]) -> Path | None:
@@ -182,45 +191,6 @@ def _recording_of(table: Path, own: frozenset[str]) -> Path | None:
 
 def _digest(text: bytes | None) -> str:
     return "" if text is None else hashlib.sha256(text).hexdigest()
-
-
-@contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder's tables, which is made where there is none.
-
-    Raises
-    ------
-    ProblemError : another process holds it for too long
-    OSError : the folder cannot be written, or its file system has no locks
-    """
-    place, until = folder / _LOCK, time.monotonic() + _LOCK_WITHIN_S
-    # A named pipe would be waited for.
-    how = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
-    while True:
-        try:
-            lock = os.open(place, os.O_RDWR | os.O_CREAT | how, 0o666)
-        except PermissionError:
-            # That of another user.
-            if not place.exists():
-                raise
-            lock = os.open(place, os.O_RDONLY | how)
-        try:
-            if not stat.S_ISREG(os.fstat(lock).st_mode):
-                raise ProblemError(f"{place}: is no regular file, as the lock of tables must be; nothing was saved")
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                if time.monotonic() > until:
-                    raise ProblemError(f"{place}: another program holds this lock; nothing was saved") from None
-            else:
-                # A lock file that was deleted in between locks nothing.
-                with contextlib.suppress(FileNotFoundError):
-                    if os.path.samestat(os.fstat(lock), os.stat(place)):
-                        yield
-                        return
-        finally:
-            os.close(lock)
-        time.sleep(random.uniform(0.001, 0.004))
 
 
 def _sync_folder(folder: Path) -> None:
@@ -279,22 +249,27 @@ def _digest_at(path: Path) -> str:
         os.close(descriptor)
 
 
-def _acknowledged(place: Path, file: _File) -> Acknowledged:
+def _acknowledged(file: _File) -> Acknowledged:
     """Return what was acknowledged of a table, as it was saved beside it.
+
+    Where a link stands for a table that was a file, as git-annex makes them, it was saved beside the link.
 
     Raises
     ------
     FormatError : what was saved cannot be read
     """
+    place = newest_of(file.place, file.link)
     saved = saved_of(place)
     if saved is None:
         return Acknowledged()
     try:
         known = from_json(saved["acknowledged"])
         recording = saved.get("recording")
-        # Where the table and its recording were deleted, another recording of that name has none of its labels. A
-        # recording that runs keeps its beginning, and so does a copy, whatever its times.
-        if file.descriptor is None and recording is not None:
+        # Where the table and its recording were deleted, another recording of that file name has none of its labels. A
+        # recording that runs keeps its beginning, and so does a copy, whatever its times. One with the same stem and
+        # another ending shares the table.
+        same = file.recording is not None and file.recording.name == saved.get("file")
+        if file.descriptor is None and recording is not None and same:
             now = _beginning(file.recording, whole(recording[0], 0, _BEGINNING))
             if now not in (None, recording):
                 return Acknowledged()
@@ -312,20 +287,29 @@ def _acknowledged(place: Path, file: _File) -> Acknowledged:
 
 
 def _save(file: _File, saved: dict[str, Any]) -> None:
-    about = {"about": "labels that taxel has acknowledged (docs/files.md)", "recording": _beginning(file.recording)}
+    about = {
+        "about": "labels that taxel has acknowledged (docs/files.md)",
+        "recording": _beginning(file.recording),
+        "file": None if file.recording is None else file.recording.name,
+    }
     text = json.dumps({**about, **saved}, ensure_ascii=False).encode()
     if len(text) > MOST_SAVED:
         raise ProblemError(f"{file.place}: more labels than the {MOST_SAVED} bytes of what taxel saves beside it hold")
     beside = state_place(file.place)
-    with _new_file(beside, _mode(file), text) as (_, name):
+    with _new_file(beside, _about(file), text) as (_, name):
+        os.replace(name, beside)
+    if file.link is None:
+        return
+    # The link may become a file again.
+    with contextlib.suppress(OSError), _new_file(beside := state_place(file.link), _about(file), text) as (_, name):
         os.replace(name, beside)
 
 
-def _mode(file: _File) -> int | None:
+def _about(file: _File) -> os.stat_result | None:
     """Return who may read a table, which holds for what is saved beside it too; None where neither is there."""
     for place in (file.place, state_place(file.place)):
         with contextlib.suppress(FileNotFoundError):
-            return stat.S_IMODE(os.stat(place).st_mode)
+            return os.stat(place)
     return None
 
 
@@ -354,6 +338,11 @@ class _Watched:
     file: _File
     seen: tuple[int, int]
 
+    def is_written(self) -> bool:
+        """Return whether it has another text than was taken in."""
+        assert self.file.descriptor is not None
+        return bytes_of(self.file.descriptor) != self.file.text
+
 
 class LabelTables:
     """Read and write tables of labels; methods may be called from several threads at a time."""
@@ -372,10 +361,12 @@ class LabelTables:
 
     def stamp(self, table: Path) -> str:
         """Return a text that changes when a table, or what was acknowledged of it, may have changed."""
-        place = Path(os.path.realpath(table))
-        self._take_in(place)
+        place, link = _places(table)
+        self._take_in(link or place)
+        while self._let_go():
+            pass
         parts = []
-        for one in (place, state_place(place)):
+        for one in (place, state_place(place), state_place(link or place)):
             try:
                 about = os.stat(one)
                 parts.append(f"{about.st_ino}.{about.st_size}.{about.st_mtime_ns}.{about.st_ctime_ns}")
@@ -397,22 +388,24 @@ class LabelTables:
         FormatError : no table of labels (names the line)
         OSError : it cannot be read
         """
-        place = Path(os.path.realpath(table))
+        place, _ = _places(table)
         for final in _attempts():
-            with contextlib.ExitStack() as held:
-                # Where there is no lock, no window has written; a folder that is only looked at gets none.
-                if (place.parent / _LOCK).exists():
-                    with contextlib.suppress(OSError):
-                        held.enter_context(_locked(place.parent))
+            # Where there is no lock, no window has written; a folder that is only looked at gets none.
+            if (place.parent / LOCK).exists():
+                with contextlib.suppress(OSError), locked_at_once(place.parent) as is_mine:
+                    if is_mine:
                         _clean(place)
-                try:
-                    file = _File.read(place, own, _recording_of(table, own), final=final)
-                except _BeingWritten:
-                    continue
-                try:
-                    return TableRead(file.rows, conflict_of(_acknowledged(place, file), file.rows))
-                finally:
-                    file.close()
+            try:
+                file = _File.read(table, own, final=final)
+            except _BeingWritten:
+                continue
+            try:
+                known = _acknowledged(file)
+                # Where a window wrote the table since it was read, what was acknowledged may be of the new one.
+                if final or file.is_current():
+                    return TableRead(file.rows, conflict_of(known, file.rows))
+            finally:
+                file.close()
         raise AssertionError
 
     def change(
@@ -440,28 +433,38 @@ class LabelTables:
         return TableRead(joined.rows, conflict_of(joined.acknowledged, joined.rows))
 
     def _write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
-        place = Path(os.path.realpath(table))
-        try:
-            return self._written(place, own, _recording_of(table, own), action)
-        except OSError as error:
-            reason = (error.strerror or str(error)).removeprefix("is ").lower()
-            beside = state_place(place)
-            where = f"{beside.name}: " if error.filename == str(beside) else ""
-            raise ProblemError(f"{place.name} cannot be saved: {where}{reason}") from error
+        while True:
+            try:
+                joined = self._written(table, own, action)
+            except OSError as error:
+                if error.errno in _FULL and self._let_go(most=0):
+                    continue
+                place, _ = _places(table)
+                reason = (error.strerror or str(error)).removeprefix("is ").lower()
+                beside = state_place(place)
+                where = f"{beside.name}: " if error.filename == str(beside) else ""
+                raise ProblemError(f"{place.name} cannot be saved: {where}{reason}") from error
+            while self._let_go():
+                pass
+            return joined
 
-    def _written(self, place: Path, own: frozenset[str], recording: Path | None, action: _Action) -> Joined:
+    def _written(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
         for final in _attempts():
-            with _locked(place.parent):
+            place, _ = _places(table)
+            with locked(place.parent):
                 _clean(place)
                 try:
-                    file = _File.read(place, own, recording, final=final)
+                    file = _File.read(table, own, final=final)
                 except _BeingWritten:
                     continue
                 except FormatError as error:
                     raise ProblemError(f"{error}; nothing was saved: mend the table, then try again") from None
                 kept = False
                 try:
-                    known = _acknowledged(place, file)
+                    if file.place != place:
+                        # A link that leads elsewhere by now.
+                        continue
+                    known = _acknowledged(file)
                     joined = action(known, file.rows)
                     if minus(joined.rows, file.rows) or minus(file.rows, joined.rows):
                         kept = self._replace(file, known, joined)
@@ -484,7 +487,7 @@ class LabelTables:
         """Replace a table; return False if another program has written it since it was read."""
         place = file.place
         try_whole(place, overwrite=True)
-        text = text_with(joined.rows, file.others).encode()
+        text = file.text_with(joined.rows)
         try:
             again, _ = _parsed(place, file.own, text)
         except FormatError as error:
@@ -495,7 +498,7 @@ class LabelTables:
         _save(file, {**states, "before": _digest(file.text), "after": _digest(text)})
         replaced = False
         try:
-            with _new_file(place, None if file.descriptor is None else _mode(file), text) as (descriptor, name):
+            with _new_file(place, None if file.descriptor is None else _about(file), text) as (descriptor, name):
                 replaced = file.is_current() and _put(name, file)
                 if replaced and not _is_old(name, file):
                     # Another program was quicker: its file comes back. It may have written to ours in the meantime.
@@ -515,22 +518,38 @@ class LabelTables:
         with self._watched_lock:
             self._watched.append(one)
 
-    def _take_in(self, place: Path | None = None) -> None:
+    def _let_go(self, most: int = _MOST_WATCHED) -> bool:
+        """Close the table that was replaced or written to longest ago, if they are too many or too large; say whether.
+
+        What was written to it is taken in. The last one stays, as a program may write to it this moment, but for
+        `most` 0, where the disk is full: then those stay that have something which cannot be taken in.
+        """
+        with self._watched_lock:
+            count, size = len(self._watched), sum(len(one.file.text or b"") for one in self._watched)
+            if count <= most and (count <= 1 or size <= _MOST_WATCHED_BYTES):
+                return False
+            oldest = next((one for one in self._watched if most or not one.is_written()), None)
+            if oldest is None:
+                return False
+            self._watched.remove(oldest)
+        now = self._taken_in(oldest)
+        if most and now.file is not oldest.file:
+            with self._watched_lock:
+                self._watched.append(now)
+        else:
+            now.file.close()
+        return True
+
+    def _take_in(self, table: Path | None = None) -> None:
         """Take in what programs wrote to a table that they had opened before it was replaced; `None`: to any table."""
         with self._watched_lock:
-            mine = [one for one in self._watched if place in (None, one.file.place)]
-            count, size = len(self._watched), sum(len(one.file.text or b"") for one in self._watched)
+            mine = [one for one in self._watched if table in (None, one.file.table)]
             self._watched = [one for one in self._watched if one not in mine]
-        left = []
-        for one in mine:
-            now = self._taken_in(one)
-            if count > _MOST_WATCHED or size > _MOST_WATCHED_BYTES:
-                count, size = count - 1, size - len(now.file.text or b"")
-                now.file.close()
-            else:
-                left.append(now)
+        found = [(one.file, self._taken_in(one)) for one in mine]
+        written = [now for file, now in found if now.file is not file]
         with self._watched_lock:
-            self._watched = [*left, *self._watched]
+            # That of a program that holds its table open stays the newest.
+            self._watched = [*(now for file, now in found if now.file is file), *self._watched, *written]
 
     def _taken_in(self, one: _Watched) -> _Watched:
         file = one.file
@@ -551,7 +570,7 @@ class LabelTables:
         try:
             before, _ = _parsed(file.place, file.own, file.text or b"")
             action = functools.partial(fold, before=before, after=now.rows)
-            self._written(file.place, file.own, file.recording, action)
+            self._written(file.table, file.own, action)
         except (FormatError, ProblemError, OSError):
             return one
         return _Watched(replace(now, rows=()), seen)
@@ -580,14 +599,18 @@ def _is_old(name: str, file: _File) -> bool:
 
 
 @contextlib.contextmanager
-def _new_file(place: Path, mode: int | None, text: bytes) -> Iterator[tuple[int, str]]:
+def _new_file(place: Path, about: os.stat_result | None, text: bytes) -> Iterator[tuple[int, str]]:
     """Write a new text to a file beside that which it will replace, on the disk; remove what is there afterwards."""
     name = str(place.with_name(f".{place.name}.{secrets.token_hex(4)}.new"))
     try:
         how = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-        descriptor = os.open(name, how, 0o666 if mode is None else mode & 0o600)
+        mode = 0o666 if about is None else stat.S_IMODE(about.st_mode)
+        descriptor = os.open(name, how, mode if about is None else mode & 0o600)
         try:
-            if mode is not None:
+            if about is not None:
+                # Of a group that this user is not in, it cannot be.
+                with contextlib.suppress(OSError):
+                    os.fchown(descriptor, -1, about.st_gid)
                 os.fchmod(descriptor, mode)
             with open(descriptor, "wb", closefd=False) as part:
                 part.write(text)

@@ -11,10 +11,13 @@ from taxel.formats.ros import is_bag
 from taxel.recording.contents import Contents
 from taxel.recording.verdict import Verdict
 
-__all__ = ["ENDINGS", "is_label_table", "is_own_table", "kind_of", "kind_of_file", "verdict_of"]
+__all__ = ["ENDINGS", "LABELS", "is_label_table", "is_own_table", "kind_of", "kind_of_file", "verdict_of"]
 
 #: taxel's own kinds of files by their endings.
 ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
+
+#: The table of labels of a folder.
+LABELS = "labels.csv"
 
 #: The magic bytes of taxel's own kinds of files.
 _MAGIC = {
@@ -43,8 +46,10 @@ def is_own_table(path: Path) -> bool:
 
 
 def is_label_table(path: Path) -> bool:
-    """Return whether the first line of a .csv names the columns of a table of labels (`taxel.Labels`)."""
-    return {b"label", b"t_us"} <= set(_columns(path))
+    """Return whether a .csv is a table of labels (`taxel.Labels`): by its first line, or empty by its name."""
+    names = _columns(path)
+    is_named = path.name == LABELS or path.name.endswith(".notes.csv")
+    return {b"label", b"t_us"} <= set(names) or (names == [b""] and is_named)
 
 
 def _columns(path: Path) -> list[bytes]:

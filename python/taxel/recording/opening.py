@@ -28,7 +28,7 @@ from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording.contents import Contents, several
 from taxel.recording.csv import check_head, read_csv
 from taxel.recording.h5 import is_ours, read_h5
-from taxel.recording.kinds import ENDINGS, is_label_table, is_own_table, kind_of
+from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_own_table, kind_of
 from taxel.recording.layout import check_size, laid_out, on_array
 from taxel.recording.npz import read_npz
 from taxel.recording.read_foreign import is_foreign, read_foreign
@@ -52,9 +52,6 @@ __all__ = [
 
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
-
-#: The file name of a folder's reference events.
-LABELS = "labels.csv"
 
 
 def open_any(

@@ -1,0 +1,120 @@
+"""The lock of the tables of labels in a folder: a file that processes lock; threads of one process queue for it."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import random
+import stat
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from taxel._core import ProblemError
+
+__all__ = ["LOCK", "locked", "locked_at_once"]
+
+#: The lock of all tables of a folder.
+LOCK = ".taxel-labels.lock"
+
+#: How long another process may hold the lock, s.
+_WITHIN_S = 20.0
+
+#: How long at most another process sleeps before it tries again, s.
+_TRIES_S = 0.004
+
+
+class _Turn:
+    """Let one thread at a time lock a folder, which waits for other processes only."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self._ended = -1.0
+
+    def __enter__(self) -> None:
+        self.lock.acquire()
+        # Another process, which polls, finds the file free before this one locks it again.
+        time.sleep(max(0.0, self._ended + 2 * _TRIES_S - time.monotonic()))
+
+    def __exit__(self, *_: object) -> None:
+        self._ended = time.monotonic()
+        self.lock.release()
+
+
+_TURNS: dict[Path, _Turn] = {}
+
+
+def _turn(folder: Path) -> _Turn:
+    return _TURNS.setdefault(folder, _Turn())
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder's tables, which is made where there is none.
+
+    Raises
+    ------
+    ProblemError : another process holds it for too long
+    OSError : the folder cannot be written, or its file system has no locks
+    """
+    with _turn(folder):
+        until = time.monotonic() + _WITHIN_S
+        while True:
+            with _file(folder / LOCK) as is_mine:
+                if is_mine:
+                    yield
+                    return
+            if time.monotonic() > until:
+                raise ProblemError(f"{folder / LOCK}: another program holds this lock; nothing was saved")
+            time.sleep(random.uniform(0.25 * _TRIES_S, _TRIES_S))
+
+
+@contextlib.contextmanager
+def locked_at_once(folder: Path) -> Iterator[bool]:
+    """Hold the lock of a folder's tables if nobody else does; return whether it is held.
+
+    Raises
+    ------
+    ProblemError, OSError : as of `locked`, but for the time
+    """
+    turn = _turn(folder)
+    if not turn.lock.acquire(blocking=False):
+        yield False
+        return
+    try:
+        with _file(folder / LOCK) as is_mine:
+            yield is_mine
+    finally:
+        turn.lock.release()
+
+
+@contextlib.contextmanager
+def _file(place: Path) -> Iterator[bool]:
+    """Lock a file if no other process has locked it; return whether it is locked."""
+    # A named pipe would be waited for.
+    how = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
+    try:
+        lock = os.open(place, os.O_RDWR | os.O_CREAT | how, 0o666)
+    except PermissionError:
+        # That of another user.
+        if not place.exists():
+            raise
+        lock = os.open(place, os.O_RDONLY | how)
+    try:
+        if not stat.S_ISREG(os.fstat(lock).st_mode):
+            raise ProblemError(f"{place}: is no regular file, as the lock of tables must be; nothing was saved")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+            return
+        try:
+            # A lock file that was deleted in between locks nothing.
+            is_there = os.path.samestat(os.fstat(lock), os.stat(place))
+        except FileNotFoundError:
+            is_there = False
+        yield is_there
+    finally:
+        os.close(lock)
