@@ -325,6 +325,17 @@ def as_events(**more: Any) -> dict[str, Any]:
     return {"t": np.arange(3), "x": few, "y": few, "p": few.astype(bool)} | more
 
 
+def test_a_table_of_long_numbers_is_in_memory_a_few_lines_at_a_time(tmp_path: Path) -> None:
+    with gzip.open(tmp_path / "a.csv.gz", "wb", compresslevel=1) as file:
+        file.write(b"a,b\n")
+        for _ in range(60):
+            file.write(b"0" * 4_000_000 + b"7,1\n")
+    (tmp_path / "layout.toml").write_text("rows = 1\ncolumns = 2\nrate_hz = 10\n")
+    said = opened(tmp_path / "a.csv.gz")
+    assert said["arrays"] == 60 * 16
+    assert said["peak"] < 144 * MIB
+
+
 #: What a small file may claim, and what the line says; each took gigabytes.
 STRANGE: dict[str, tuple[dict[str, Any], str]] = {
     "markers": (as_events(markers=np.zeros((4_000_000, 2), np.int64)), "at most 262144 markers"),
