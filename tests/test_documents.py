@@ -16,7 +16,7 @@ from refusal import refused
 
 import taxel
 from taxel import FormatError, formats
-from taxel._base.documents import BY_HAND, BY_TAXEL, of_json, of_toml, read_json, read_toml
+from taxel._base.documents import BY_HAND, BY_TAXEL, memory_of_json, of_json, of_toml, read_json, read_toml
 from taxel.cli._recordings import assignments
 from taxel.detect import PlainRule, recipes
 from taxel.simulate import SceneFile
@@ -52,7 +52,8 @@ BAD_TOML = {
     "nothing": ("a = ", "not TOML"),
 }
 BAD_JSON = {
-    "lists": ("[" * 100_000, "nested too deeply"),
+    "bare lists": ("[" * 100_000, "nested too deeply|not JSON of an object: begins with '\\['"),
+    "lists": ('{"a": ' + "[" * 100_000, "nested too deeply"),
     "closed lists": ('{"a": ' + "[" * 70 + "]" * 70 + "}", "nested too deeply; must be at most 64"),
     "objects": ('{"a": ' * 100_000, "nested too deeply"),
     "digits": ('{"a": ' + "9" * 5000 + "}", "not JSON: .*4300"),
@@ -107,6 +108,26 @@ def test_what_is_too_long_is_refused_by_what_it_is(tmp_path: Path) -> None:
             read(path)
 
 
+@pytest.mark.parametrize("kind", [taxel.Tare, taxel.Calibration, taxel.Readout])
+def test_what_taxel_did_not_write_is_refused_before_it_is_parsed(
+    kind: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise AssertionError("parsed")
+
+    path = tmp_path / "a.json"
+    monkeypatch.setattr("taxel._base.documents.json.loads", fail)
+    for text, why in {
+        "[" + "1," * 1000 + "1]": "not JSON of an object: begins with '\\['",
+        " \n\t7": "not JSON of an object: begins with '7'",
+        "": "not JSON of an object: empty",
+        '{"a":[' + "1," * 42_000_000 + "1]}": r"claims \d+ bytes, unpacked; at most 2147483648 are read",
+    }.items():
+        path.write_text(text)
+        with refused(why, FormatError):
+            kind.load(path)
+
+
 def test_a_setting_is_read_as_a_file_is() -> None:
     assert assignments(["a.b=[1.5, 2.5]", "c=plain text", "d='x'"]) == {"a.b": [1.5, 2.5], "c": "plain text", "d": "x"}
     with refused("--set a: nested too deeply", FormatError):
@@ -128,6 +149,7 @@ def test_what_taxel_writes_for_four_million_taxels_loads(tmp_path: Path) -> None
     """A tare holds the rest and the noise of each taxel: the largest sensor of a file has 2048 x 2048."""
     one = json.dumps([1 / 3] * 1000)
     assert 2 * (1 << 22) * (len(one) / 1000) < BY_TAXEL
+    assert 3 * (1 << 22) * (memory_of_json(one) / 1000) < 1 << 31
     rng = np.random.default_rng(1)
     tare = taxel.Tare.take(taxel.Frames(rng.random((3, 300, 300)), [0, 100, 200]))
     assert tare.save(tmp_path / "tare.json").stat().st_size > BY_HAND

@@ -234,9 +234,106 @@ def test_a_column_of_times_is_in_memory_once(tmp_path: Path) -> None:
     assert whole["peak"] - small["peak"] <= 1.4 * whole["arrays"] + 4 * MIB
 
 
+@pytest.mark.parametrize("kind", ["npy", "own h5", "own npz"])
+@pytest.mark.parametrize(("t", "says"), [("numbers", "rate_hz = 100"), ("times", "rate_hz = 100\nfalls = 9")])
+def test_what_a_layout_says_of_a_single_taxel_takes_little_memory(kind: str, t: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "layout.toml").write_text(f"{says}\n")
+    path = tmp_path / f"a.{kind.rpartition(' ')[2]}"
+    peaks = {}
+    for n in (1000, 2_000_000):
+        values, times = np.ones((n, 1, 1), "u1"), np.arange(n) * (1 if t == "numbers" else 10_000)
+        if kind == "npy":
+            np.save(path, values)
+        else:
+            as_file(path, {"values": values, "t": times})
+        peaks[n] = opened(path)
+    small, whole = peaks.values()
+    assert whole["arrays"] == 12 * 2_000_000
+    assert whole["peak"] - small["peak"] <= 1.4 * whole["arrays"] + 4 * MIB
+
+
+@pytest.mark.parametrize("kind", ["npz", "h5"])
+def test_pictures_of_taxel_itself_that_fall_are_in_memory_once(kind: str, tmp_path: Path) -> None:
+    (tmp_path / "layout.toml").write_text("falls = 9\n")
+    n = 1500
+    columns = {"values": np.ones((n, 64, 64), "f4"), "t": np.arange(n) * 1000}
+    whole = opened(as_file(tmp_path / f"a.{kind}", columns))
+    small = opened(as_file(tmp_path / f"a.{kind}", {name: column[:10] for name, column in columns.items()}))
+    assert whole["peak"] - small["peak"] <= 1.4 * whole["arrays"] + 4 * MIB
+
+
+def events_of_anybody(n: int, dtype: str) -> dict[str, Any]:
+    """Columns of events, all of one dtype, as `np.savez(t=t, x=x, y=y, p=p)` writes them."""
+    ones = dict.fromkeys(("p", "present", "repaired"), np.ones(n, dtype))
+    return {"t": np.arange(n, dtype=dtype), **dict.fromkeys(("x", "y", "intensity"), np.full(n, 7, dtype)), **ones}
+
+
+def as_file(path: Path, columns: dict[str, Any]) -> Path:
+    if path.suffix == ".npz":
+        np.savez(path, **columns)
+    else:
+        with h5py.File(path, "w") as h5:
+            h5.attrs["taxel"] = 1
+            for name, column in columns.items():
+                h5[name] = column
+    return path
+
+
+@pytest.mark.parametrize("dtype", ["i8", ">f8"])
+@pytest.mark.parametrize("kind", ["npz", "h5"])
+def test_events_of_every_dtype_are_in_memory_once(kind: str, dtype: str, tmp_path: Path) -> None:
+    few, many = (opened(as_file(tmp_path / f"{n}.{kind}", events_of_anybody(n, dtype))) for n in (1000, 2_000_000))
+    assert many["arrays"] > 30 * MIB
+    assert many["peak"] - few["peak"] <= 1.4 * many["arrays"] + 4 * MIB
+
+
+@pytest.mark.parametrize("kind", ["npz", "h5"])
+@pytest.mark.parametrize(
+    ("column", "value", "why"),
+    [
+        ("t", 0.5, "a whole number that fits int64"),
+        ("x", 65_536, "a whole number that fits uint16"),
+        ("y", -1, "a whole number that fits uint16"),
+        ("x", np.nan, "a whole number that fits uint16"),
+        ("p", 2, "True or False"),
+        ("intensity", 1e300, "a whole number that fits uint16"),
+    ],
+)
+def test_a_value_that_a_column_of_events_does_not_hold_is_refused_with_its_place(
+    column: str, value: float, why: str, kind: str, tmp_path: Path
+) -> None:
+    columns = events_of_anybody(300_000, "f8")
+    columns[column] = columns[column].copy()
+    columns[column][299_000] = value
+    with refused(rf"a.{kind}: {column}\[299000\] is .*: must be {why}", FormatError):
+        taxel.open(as_file(tmp_path / f"a.{kind}", columns))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("dtype", ["f2", "i1", "u1", ">i4", "f4"])
+def test_events_of_a_narrow_dtype_open_without_a_warning(dtype: str, tmp_path: Path) -> None:
+    for kind in ("npz", "h5"):
+        events = taxel.open(as_file(tmp_path / f"a.{kind}", events_of_anybody(100, dtype))).events
+        assert (events.t.dtype, events.x.dtype, events.p.dtype) == (np.int64, np.uint16, np.bool_)
+        assert list(events.t) == list(range(100))
+        assert set(events.x) == {7}
+        assert events.p.all()
+
+
 def as_events(**more: Any) -> dict[str, Any]:
     few = np.zeros(3, np.uint16)
     return {"t": np.arange(3), "x": few, "y": few, "p": few.astype(bool)} | more
+
+
+def test_a_table_of_long_numbers_is_in_memory_a_few_lines_at_a_time(tmp_path: Path) -> None:
+    with gzip.open(tmp_path / "a.csv.gz", "wb", compresslevel=1) as file:
+        file.write(b"a,b\n")
+        for _ in range(60):
+            file.write(b"0" * 4_000_000 + b"7,1\n")
+    (tmp_path / "layout.toml").write_text("rows = 1\ncolumns = 2\nrate_hz = 10\n")
+    said = opened(tmp_path / "a.csv.gz")
+    assert said["arrays"] == 60 * 16
+    assert said["peak"] < 144 * MIB
 
 
 #: What a small file may claim, and what the line says; each took gigabytes.
@@ -389,6 +486,39 @@ def test_a_control_group_of_version_1_counts_also_from_within_a_container(place:
     assert limits.available(tmp_path) == 150_000
     group(tmp_path / "sys/fs/cgroup/memory" / place, 1, 600_000, 700_000, 50_000)
     assert limits.available(tmp_path) == 0
+
+
+#: What reading a table of labels takes, once all that it needs is loaded.
+LABELS = """
+import re, sys, taxel
+peak = lambda: int(re.findall(r"VmHWM: *\\t? *(\\d+)", open("/proc/self/status").read())[0]) * 1024
+taxel.Labels(sys.argv[1])
+before = peak()
+taxel.Labels(sys.argv[2])
+print(peak() - before)
+"""
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("label,t_us", "a,1"),
+        ("label,t_us", "heel{k},{k}000"),
+        ("recording,label,t_us,source", "g,a{k},{k},palm"),
+        ("label,t_us,note,by", "heel,{k},x{k},y{k}"),
+        ("label,t_us", "ħēęļ{k},{k}"),
+        ("label,t_us,note", "heel,{k}," + "x" * 300),
+    ],
+)
+def test_a_table_of_labels_claims_what_it_takes(head: str, row: str, tmp_path: Path) -> None:
+    (few := tmp_path / "few.csv").write_text(f"{head}\n{row.format(k=1)}\n", encoding="utf-8")
+    rows = "".join(f"{row.format(k=k)}\n" for k in range(60_000))
+    (many := tmp_path / "many.csv").write_text(f"{head}\n{rows}", encoding="utf-8")
+    done = subprocess.run([sys.executable, "-c", LABELS, few, many], check=True, capture_output=True, text=True)
+    with limits.opening(1), pytest.raises(FormatError, match="claims") as refusal:
+        taxel.Labels(many)
+    claimed = int(re.findall(r"claims (\d+) bytes", str(refusal.value))[0])
+    assert claimed / 3 <= int(done.stdout) <= 1.05 * claimed
 
 
 # columns that grow

@@ -13,10 +13,11 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from taxel._base.arguments import refuse_changed
 from taxel._base.files import open_file
 from taxel._base.limits import UNPACKED, unpacked
 from taxel._base.messages import first_line
-from taxel._core import FormatError
+from taxel._core import FormatError, ProblemError
 
 __all__ = ["read_array", "read_arrays", "shapes", "stored_names"]
 
@@ -113,7 +114,7 @@ def read_array(path: str | os.PathLike[str], dtype: DTypeLike | None = None) -> 
                 raise FormatError(f"{path}: says that it holds {size} bytes ({shape}, {own}); there are {stored}")
             unpacked(str(path), _kept(shape, own, dtype))
             file.seek(0)
-            return _read(file, dtype)
+            return _read(file, dtype, str(path))
         except (FormatError, MemoryError):
             raise
         # As in `read_arrays`.
@@ -137,8 +138,7 @@ def read_arrays(
     wanted : names of arrays; others are ignored
     texts : dict from the names of those that hold one text to how many characters it may have
     dtypes : dict from name to dtype
-        What numbers are converted to, piece by piece as they are read. What it cannot hold becomes infinite or wraps
-        around.
+        What numbers are converted to, piece by piece as they are read. What a float cannot hold becomes infinite.
     chosen : function of a dict from name to shape
         Which of those that there are are read; it may refuse them by their shapes before any is read.
 
@@ -207,7 +207,7 @@ def _arrays(
                 raise FormatError(f"{place}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
         for name in there:
             with archive.open(members[name]) as array:
-                columns[name] = _read(array, dtypes.get(name))
+                columns[name] = _read(array, dtypes.get(name), f"{path}: {name}")
     return columns
 
 
@@ -232,8 +232,13 @@ def _kept(shape: tuple[int, ...], stored: np.dtype[Any], dtype: DTypeLike | None
     return math.prod(shape) * (np.dtype(dtype) if dtype is not None and stored.kind in "biuf" else stored).itemsize
 
 
-def _read(file: IO[bytes], dtype: DTypeLike | None) -> NDArray[Any]:
-    """Read an array whose size was checked; numbers are converted piece by piece, into the order of C."""
+def _read(file: IO[bytes], dtype: DTypeLike | None, place: str) -> NDArray[Any]:
+    """Read an array whose size was checked; numbers are converted piece by piece, into the order of C.
+
+    Raises
+    ------
+    FormatError : a number that another dtype than a float does not hold
+    """
     begin = file.tell()
     shape, fortran, stored = _described(file)
     if dtype is None or stored.kind not in "biuf" or 0 in shape:
@@ -248,5 +253,10 @@ def _read(file: IO[bytes], dtype: DTypeLike | None) -> NDArray[Any]:
         if len(piece) < count:
             raise ValueError(f"ends after {start + len(piece)} of {array.size} values")
         with np.errstate(over="ignore", invalid="ignore"):
-            flat[start : start + count] = piece.astype(dtype)
+            flat[start : start + count] = converted = piece.astype(dtype)
+        if converted.dtype.kind != "f":
+            try:
+                refuse_changed(place, piece, converted, begin=start)
+            except ProblemError as error:
+                raise FormatError(str(error)) from None
     return array

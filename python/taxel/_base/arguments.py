@@ -319,17 +319,23 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
             array = np.require(received, dtype, ["C", "A"]).reshape(received.shape)
     except (TypeError, ValueError, OverflowError) as error:
         raise ProblemError(f"{name}: {error}") from None
-    if received.dtype != array.dtype:
-        place = _first_changed(np.atleast_1d(received), np.atleast_1d(array))
-        if place is not None:
-            where = f"[{', '.join(map(str, place))}]" if received.ndim else ""
-            value = shown(np.atleast_1d(received).astype(object)[place])
-            expected = {"b": "True or False", "f": "a number that fits"}.get(
-                array.dtype.kind, "a whole number that fits"
-            )
-            fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
-            raise ProblemError(f"{name}{where} is {value}: must be {expected}{fits}" + f", in {unit}" * bool(unit))
+    refuse_changed(name, received, array, unit)
     return array
+
+
+def refuse_changed(
+    name: str, received: NDArray[Any], array: NDArray[Any], unit: str | None = None, *, begin: int = 0
+) -> None:
+    """Refuse values that a conversion of `received` to `array` changed; `begin` is the place of the first in errors."""
+    if received.dtype == array.dtype:
+        return
+    place = _first_changed(np.atleast_1d(received), np.atleast_1d(array))
+    if place is not None:
+        where = f"[{', '.join(map(str, (begin + place[0], *place[1:])))}]" if received.ndim else ""
+        value = shown(np.atleast_1d(received)[place].astype(object))
+        expected = {"b": "True or False", "f": "a number that fits"}.get(array.dtype.kind, "a whole number that fits")
+        fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
+        raise ProblemError(f"{name}{where} is {value}: must be {expected}{fits}" + f", in {unit}" * bool(unit))
 
 
 def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ...] | None:

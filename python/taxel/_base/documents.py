@@ -24,6 +24,7 @@ __all__ = [
     "NotTomlError",
     "decoded",
     "memory_of_json",
+    "object_of_json",
     "of_json",
     "of_toml",
     "read_json",
@@ -36,6 +37,8 @@ __all__ = [
 BY_HAND = 1 << 20
 #: Bytes of one that taxel writes, with numbers of each taxel or input, as a readout, a tare or a calibration: 256 MiB.
 BY_TAXEL = 1 << 28
+#: Bytes that it and its values may take in memory: 2 GiB, as of three numbers for each of 2048 x 2048 taxels.
+_ROOM = 1 << 31
 #: Dots in a key of TOML, for each of which tomllib goes through all before it.
 _DOTS = 100
 #: Tables or lists within each other.
@@ -93,11 +96,21 @@ def read_json(path: str | os.PathLike[str], most: int = BY_HAND) -> Any:
     return of_json(str(path), read_text(path, most), most)
 
 
-def text_of_json(path: str | os.PathLike[str], most: int = BY_TAXEL) -> str:
-    """Return the text of a file of JSON that the compiled part reads; errors as of `read_json`."""
-    text = read_text(path, most)
-    of_json(str(path), text, most)
+def text_of_json(path: str | os.PathLike[str]) -> str:
+    """Return the text of a file of JSON that the compiled part reads; errors as of `read_text` and `object_of_json`."""
+    text = read_text(path, BY_TAXEL)
+    object_of_json(str(path), text)
     return text
+
+
+def object_of_json(place: str, text: str) -> dict[str, Any]:
+    """Return the object that taxel wrote in JSON, with numbers of each taxel; errors as of `of_json`."""
+    first = text.lstrip(" \t\r\n")[:1] if text[:1].isspace() else text[:1]
+    if first != "{":
+        begins = f"begins with {shown(first)}" if first else "empty"
+        raise FormatError(f"{place}: not JSON of an object: {begins}; must begin with '{{'")
+    values: dict[str, Any] = of_json(place, text, BY_TAXEL, room=_ROOM)
+    return values
 
 
 def of_toml(place: str, text: str) -> dict[str, Any]:
@@ -208,7 +221,9 @@ def _check_depth(place: str, value: Any) -> None:
         inner: list[Any] = []
         for one in level:
             entries = one.values() if isinstance(one, dict) else one if isinstance(one, list) else ()
-            inner += [entry for entry in entries if isinstance(entry, dict | list)]
+            # Most lists are long ones of numbers.
+            if not {dict, list}.isdisjoint(map(type, entries)):
+                inner += [entry for entry in entries if isinstance(entry, dict | list)]
         level = inner
         if not level:
             return

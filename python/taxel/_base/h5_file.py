@@ -16,12 +16,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from taxel._base.arguments import shown
+from taxel._base.arguments import refuse_changed, shown
 from taxel._base.child_process import ChildProcess, search_path
 from taxel._base.files import open_file
 from taxel._base.limits import DESCRIPTION, unpacked
 from taxel._base.messages import first_line
-from taxel._core import FormatError
+from taxel._core import FormatError, ProblemError
 
 __all__ = ["Entry", "H5File"]
 
@@ -172,12 +172,13 @@ class H5File:
         ----------
         name : str
         dtype : dtype, optional
-            What the values are converted to, piece by piece as they are read. What it cannot hold becomes infinite or
-            wraps around.
+            What the values are converted to, piece by piece as they are read. What a float cannot hold becomes
+            infinite.
 
         Raises
         ------
-        FormatError : no numbers, more bytes than a file may hold, or damage
+        FormatError : no numbers, more bytes than a file may hold, one that another dtype than a float does not hold,
+            or damage
         MemoryError : within the limits, but not within the memory that there is
         """
         entry = self.entries[name]
@@ -196,8 +197,15 @@ class H5File:
         self._order({"name": name, "text": False})
         while "done" not in (answer := self._answer(PATIENCE_S)):
             place = tuple(slice(*edges) for edges in answer["block"])
+            piece = self._bytes(answer["size"]).view(stored).reshape(array[place].shape)
             with np.errstate(over="ignore", invalid="ignore"):
-                array[place] = self._bytes(answer["size"]).view(stored).reshape(array[place].shape)
+                array[place] = piece
+            if kept.kind != "f":
+                try:
+                    begin = place[0].start if place else 0
+                    refuse_changed(f"{self.path}: {name}", piece, array[place], begin=begin)
+                except ProblemError as error:
+                    raise FormatError(str(error)) from None
         return array
 
     def _place(self, name: str) -> str:

@@ -17,7 +17,7 @@ from taxel import _core
 from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
-from taxel._base.documents import BY_TAXEL, of_json, read_text
+from taxel._base.documents import BY_TAXEL, object_of_json, read_text
 from taxel._base.files import beside, named, write_whole
 from taxel._base.messages import counted, escaped, first_line
 from taxel._core import FormatError, ProblemError
@@ -409,8 +409,8 @@ class Calibration:
             raise ProblemError(f"calibration is {shown(text)}: must be JSON text")
         entry = "the whole"
         try:
-            document = of_json("calibration", text, BY_TAXEL)
-            if not isinstance(document, dict) or document.get("taxel") != "calibration":
+            document = object_of_json("calibration", text)
+            if document.get("taxel") != "calibration":
                 raise ProblemError('must be an object with "taxel": "calibration"')
             entry = "array"
             array = Array._from_geometry(mapping(entry, document[entry]))

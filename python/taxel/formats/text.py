@@ -36,7 +36,7 @@ __all__ = [
     "table",
 ]
 
-#: Number of cells of a table, and of lines of a text, that are in memory as texts at once.
+#: Number of cells of a table, and of lines of a text, that are in memory as texts at once; of cells at most 4 MiB.
 _CELLS, _LINES = 1 << 17, 4096
 #: Bytes of a text that are read at once.
 _PIECE = 1 << 20
@@ -280,14 +280,15 @@ def grouped(
     ------
     FormatError : a row of another number of cells
     """
-    line, some = first_line, list[Sequence[str]]()
+    line, some, characters = first_line, list[Sequence[str]](), 0
     for row in rows:
         if len(row) != columns:
             raise FormatError(f"{path.name}, line {line + len(some)}: {len(row)} cells, must have {columns}")
         some.append(row)
-        if len(some) * columns >= _CELLS:
+        characters += sum(map(len, row))
+        if len(some) * columns >= _CELLS or characters >= LINE:
             yield line, some
-            line, some = line + len(some), []
+            line, some, characters = line + len(some), [], 0
     if some:
         yield line, some
 

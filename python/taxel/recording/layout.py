@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -81,9 +82,7 @@ def laid_out(of: Contents, layout: Layout) -> Contents:
         raise FormatError(f"{layout.place}: {of.name} holds events; falls, unit and rate_hz are of pictures")
     if not same.has_events and same.frames is not None:
         # Read at once, so that a layout that contradicts the file is refused where the file is opened.
-        # Those of another program were read a moment ago, and nobody else has them.
-        is_ours = of.kind in ("table", "arrays")
-        same = same.but(frames=_read(same.frames, layout, of.name, is_ours=is_ours))
+        same = same.but(frames=_read(same.frames, layout, of.name, is_alone=of.kind in _ALONE))
     untimed = same.untimed and layout.rate_hz is None
     return same.but(side=of.side or layout.side, heel=layout.heel or of.heel, untimed=untimed)
 
@@ -113,25 +112,31 @@ def _places_along(of: Contents) -> object:
     return packaged(of.kind).array(of.array.columns, of.array, of.side).places
 
 
-def _read(own: Frames, layout: Layout, name: str, *, is_ours: bool) -> Frames:
-    """Return pictures in the unit, at the rate and in the direction that a layout says; `is_ours`: `own` may change."""
+#: Kinds of files of one recording, whose times no other one has.
+_ALONE = ("table", "arrays", "npz", "h5", "csv")
+
+
+def _read(own: Frames, layout: Layout, name: str, *, is_alone: bool) -> Frames:
+    """Return pictures in the unit, at the rate and in the direction that a layout says.
+
+    They were read a moment ago, and nobody else has them: `own` is changed, its times too if it is alone in its file.
+    """
     unit, t, values = own.unit, own.t, own.values
     if layout.unit is not None:
         if unit not in (*_UNSAID, layout.unit):
             raise FormatError(f"{layout.place}: says unit {layout.unit}; {name} is in {unit}")
         unit = layout.unit
     if layout.rate_hz is not None:
-        counted = np.arange(len(t))
-        if np.array_equal(t, counted):
+        if _are_numbers(t):
             try:
-                t = times_at(counted, layout.rate_hz)
+                t = _times_at(layout.rate_hz, _writable(t) if is_alone else np.empty_like(t))
             except ProblemError as error:
                 raise FormatError(f"{layout.place}: {name}: {error}") from None
-        elif len(t) > 1 and abs(layout.rate_hz * (step := float(np.median(np.diff(t)))) / 1e6 - 1) > _SLACK:
+        elif len(t) > 1 and abs(layout.rate_hz * (step := _median_step(t)) / 1e6 - 1) > _SLACK:
             raise FormatError(f"{layout.place}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
     if layout.falls is not False:
         full = 0.0 if layout.falls is True else layout.falls
-        values = _writable(values) if is_ours else values.copy()
+        values = _writable(values)
         step = max(1, _PIECE // max(1, values[:1].size))
         for begin in range(0, len(values), step):
             part = values[begin : begin + step]
@@ -147,6 +152,33 @@ def _read(own: Frames, layout: Layout, name: str, *, is_ours: bool) -> Frames:
     return Frames(values, t, unit=unit, array=own.array)
 
 
+def _parts(length: int) -> Iterator[slice]:
+    """Yield the parts of a column that are computed one after the other, beside which little memory is taken."""
+    return (slice(begin, min(begin + _PIECE, length)) for begin in range(0, length, _PIECE))
+
+
+def _are_numbers(t: NDArray[np.int64]) -> bool:
+    """Return whether times only number the pictures: 0, 1, 2 ..."""
+    return all(np.array_equal(t[part], np.arange(part.start, part.stop)) for part in _parts(len(t)))
+
+
+def _times_at(rate_hz: float, t: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Fill a column with the times of pictures at a rate (`times_at`)."""
+    # The last is refused before the others change.
+    times_at(np.array([len(t) - 1]), rate_hz)
+    for part in _parts(len(t)):
+        t[part] = times_at(np.arange(part.start, part.stop), rate_hz)
+    return frozen_whole(t)
+
+
+def _median_step(t: NDArray[np.int64]) -> float:
+    """Return the median of the steps between times, us, as exact as 32 bits."""
+    steps = np.empty(len(t) - 1, np.float32)
+    for part in _parts(len(steps)):
+        steps[part] = np.diff(t[part.start : part.stop + 1])
+    return float(np.median(steps, overwrite_input=True))
+
+
 def _writable(array: NDArray[Any]) -> NDArray[Any]:
     """Return an array that nobody else has, made writable again; a copy if its memory is not NumPy's."""
     parts, part = list[NDArray[Any]](), array.base
@@ -160,7 +192,7 @@ def _writable(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
-#: Values that are turned at once.
-_PIECE = 1 << 20
+#: Values, or times, that are computed at once.
+_PIECE = 1 << 17
 #: The share by which a rate that a layout says may differ from that of a file's own times.
 _SLACK = 0.05

@@ -40,7 +40,12 @@ _OF_EVENTS = (*_EVENTS, "intensity", "present", "repaired")
 #: The columns that are a single text, and how many characters they may have; NumPy's have 4 bytes.
 TEXTS = {"about": ABOUT // 6, "unit": UNIT}
 #: The columns that are converted as they are read.
-DTYPES = {"values": np.float32}
+DTYPES: dict[str, type[np.generic]] = {
+    "values": np.float32,
+    "t": np.int64,
+    **dict.fromkeys(("x", "y", "intensity"), np.uint16),
+    **dict.fromkeys(("p", "present", "repaired"), np.bool_),
+}
 #: The entry with the checksum over all columns; earlier versions wrote none, and ignore it.
 _DIGEST = "digest"
 #: Bytes of a column that are taken into the checksum at once.
