@@ -477,3 +477,16 @@ def test_an_error_of_an_encoder_names_the_option_that_sets_the_value(tmp_path: P
     np.save(tmp_path / "palm.npy", VALUES.reshape(3, 2, 3))
     words = ["encode", str(tmp_path / "palm.npy"), str(tmp_path / "o.npz"), "--encoder", encoder, "--rate-hz", "100"]
     assert str(CliRunner().invoke(app, words).exception).endswith(end)
+
+
+def test_arrays_that_a_layout_names_are_read_also_where_they_have_names_of_taxel(tmp_path: Path) -> None:
+    p = np.arange(12.0).reshape(3, 2, 2)
+    np.savez(tmp_path / "a.npz", t=[0, 10, 20], p=p)
+    (tmp_path / "layout.toml").write_text('[data]\narray = "p"\ntime = "t"\ntime_unit = "ms"\n')
+    opened = taxel.open(tmp_path / "a.npz").frames()
+    assert opened.values.tolist() == p.tolist()
+    assert opened.t.tolist() == [0, 10_000, 20_000]
+    # What taxel wrote is its own, whatever a layout for its folder says.
+    events = taxel.Events([0], [1], [1], [True], array=taxel.Array(2, 2))
+    taxel.convert(events, tmp_path / "b.npz")
+    assert taxel.open(tmp_path / "b.npz").events == events

@@ -20,7 +20,8 @@ from refusal import refused
 import taxel
 from taxel import formats
 from taxel._base import limits
-from taxel._core import FormatError
+from taxel._core import FormatError, ProblemError
+from taxel.cli._recordings import assignments
 from taxel.live import Live
 
 from . import hostile
@@ -292,3 +293,22 @@ def test_a_recording_to_which_nothing_came_leaves_no_file_unless_something_was_n
             live.note("the board is off")
             assert live.stop().path == path
         assert [n.text for n in taxel.open(path).notes] == ["the board is off"]
+
+
+def test_a_long_name_of_a_column_does_not_fill_an_error(tmp_path: Path) -> None:
+    (tmp_path / "layout.toml").write_text("rows = 1\ncolumns = 2\nrate_hz = 10\n")
+    (path := tmp_path / "a.csv").write_text(f"{'n' * 100_000},b\nx,1\n")
+    with pytest.raises(FormatError, match=r"a.csv, line 2: 'nnn.*is 'x', not a number") as caught:
+        taxel.open(path)
+    assert len(str(caught.value)) < 300
+    with pytest.raises(ProblemError, match="must be KEY=VALUE") as wrong:
+        assignments(["[" * 100_000])
+    assert len(str(wrong.value)) < 300
+
+
+@pytest.mark.parametrize("names", ["x{k}y0", "n{k}"])
+def test_a_table_of_too_many_columns_is_named(names: str, tmp_path: Path) -> None:
+    columns = ",".join(names.format(k=k) for k in range(65_536))
+    (path := tmp_path / "a.csv").write_text(f"t_us,{columns}\n0{',1' * 65_536}\n")
+    with pytest.raises(FormatError, match=r"a.csv, line 1: columns is 65536: must be"):
+        taxel.open(path)

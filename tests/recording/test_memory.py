@@ -550,6 +550,13 @@ def test_columns_that_grow_stop_at_the_limit() -> None:
         taxel.open("a.npz", limit=0)
 
 
+def test_what_no_opening_reads_names_no_option_of_one() -> None:
+    with refused(r"a: claims 9 bytes, unpacked; at most 8 are read$", FormatError):
+        limits.unpacked("a", 9, 8)
+    with limits.opening(), refused(r"at most 8 are read: --limit BYTES", FormatError):
+        limits.unpacked("a", 9, 8)
+
+
 @pytest.mark.parametrize("name", ["walk.npz", "walk.mcap", "walk.lsa", "walk.csv"])
 @pytest.mark.parametrize("command", ["info", "convert", "cut", "merge", "encode", "emulate"])
 def test_a_command_names_its_option_in_one_line(

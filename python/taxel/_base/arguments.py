@@ -69,6 +69,11 @@ def shown(value: object) -> str:
     return words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."
 
 
+def short(name: str) -> str:
+    """Return a name that an error states, or the beginning of a long one."""
+    return name if len(name) <= _SHOWN else shown(name)
+
+
 def _beginning(value: object, depth: int = 3) -> object:
     """Return the part of a long value that an error can show: each entry needs at least one character."""
     if type(value) in (str, bytes):

@@ -154,10 +154,9 @@ def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
     else:
         bound, why = _most() if room is None else room.most, " (3/4 of the memory that is available)"
     if whole > bound:
-        raise FormatError(
-            f"{place}: claims {whole} bytes, unpacked; at most {bound} are read{why}: --limit BYTES (limit=) says how "
-            "many may be"
-        )
+        # What is read outside an opening has no such option.
+        advice = "" if room is None else ": --limit BYTES (limit=) says how many may be"
+        raise FormatError(f"{place}: claims {whole} bytes, unpacked; at most {bound} are read{why}{advice}")
 
 
 def _most() -> int:

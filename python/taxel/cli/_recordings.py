@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from taxel._base.arguments import short
 from taxel._base.documents import NotTomlError, of_toml
 from taxel._base.messages import counted, escaped, warn
 from taxel._base.number_text import float_of
@@ -56,9 +57,9 @@ def assignments(settings: list[str]) -> dict[str, Any]:
     for one in settings:
         key, equals, value = one.partition("=")
         if not equals or not key.strip():
-            raise ProblemError(f"--set {one}: must be KEY=VALUE")
+            raise ProblemError(f"--set {short(one)}: must be KEY=VALUE")
         try:
-            values[key.strip()] = of_toml(f"--set {key.strip()}", f"value = {value}")["value"]
+            values[key.strip()] = of_toml(f"--set {short(key.strip())}", f"value = {value}")["value"]
         except NotTomlError:
             values[key.strip()] = value.strip()
     return values

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import limits
-from taxel._base.arguments import shown
+from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing
 from taxel._base.files import open_file
 from taxel._base.header_table import HeaderTable
@@ -211,7 +211,7 @@ def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = Fals
     ------
     FormatError : no finite number (names file, line and column)
     """
-    text = cell.strip()
+    text, what = cell.strip(), short(what)
     remedy = f"; if it marks a missing value, say in a layout file: [table] missing = {shown(text)}" if unmarked else ""
     try:
         value = float_of(text)

@@ -200,6 +200,15 @@ def _csv_events(path: Path, names: list[str], blocks: Iterator[_Block], array: A
         raise FormatError(f"{path}: {error}") from None
 
 
+def _sensor(path: Path, exists: NDArray[np.bool_], names: list[str] | None) -> Array:
+    """Return the sensor that the first line describes."""
+    try:
+        rows, columns = exists.shape
+        return Array(rows, columns, exists=None if exists.all() else exists, names=names)
+    except ProblemError as error:
+        raise FormatError(f"{path}, line 1: {error}") from None
+
+
 def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: Array | None) -> Frames:
     matches, called = [_TAXEL.fullmatch(name) for name in names[1:]], None
     if all(matches):
@@ -222,7 +231,7 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
             raise FormatError(sparse)
         exists = np.zeros((rows, columns), bool)
         exists[y, x] = True
-        sensor = Array(rows, columns, exists=None if exists.all() else exists, names=called)
+        sensor = _sensor(path, exists, called)
     elif x.max() >= columns or y.max() >= rows:
         k = int(np.flatnonzero((x >= columns) | (y >= rows))[0])
         raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {rows} x {columns} taxels")

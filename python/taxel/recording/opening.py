@@ -202,7 +202,7 @@ def _open_one(place: Path, how: How) -> Recording:
     try:
         if said is None:
             refuse_without_layout(place)
-        if said is not None and is_foreign(place):
+        if said is not None and is_foreign(place, said):
             if how.topics.are_given:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
             contents = read_foreign(place, said)

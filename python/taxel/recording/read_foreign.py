@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.archive import read_array, read_arrays, shapes, stored_names
-from taxel._base.arguments import shown
+from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing, frozen_whole
 from taxel._base.h5_file import H5File
 from taxel._base.limits import COLUMNS, VALUE
@@ -73,15 +73,19 @@ _TIMES = re.compile(
 )
 
 
-def is_foreign(path: Path) -> bool:
-    """Return whether a file is a table or holds arrays that taxel did not write; false for a file that is not there."""
+def is_foreign(path: Path, layout: Layout | None = None) -> bool:
+    """Return whether a file is a table or holds arrays that taxel did not write; false for a file that is not there.
+
+    Arrays that a layout names are those of another program, also where they have names that taxel gives.
+    """
     ending = Path(path.name.removesuffix(".gz")).suffix.lower()
     if not path.is_file() or ending not in (*_TABLES, *ARRAYS):
         return False
     if ending == ".npz":
         names = set(stored_names(path))
         # Other programs name their times t too.
-        return "about" not in names and not ("t" in names and names & {"x", "y", "p", "values"})
+        says = layout is not None and layout.data is not None and layout.data.array in names
+        return "about" not in names and (says or not ("t" in names and names & {"x", "y", "p", "values"}))
     if ending == ".h5":
         return not is_ours(path)
     if ending == ".csv":
@@ -132,7 +136,7 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
         pictures = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
         frames = Frames(frozen_whole(pictures), frozen_whole(t), array=array)
     except ProblemError as error:
-        raise FormatError(f"{layout.place}: {first_line(error)}") from None
+        raise FormatError(f"{layout.place}: {path.name}: {first_line(error)}") from None
     limited(path, frames)
     kind = "table" if is_table else "arrays"
     return Contents(path, path.name, kind, array, frames=frames, untimed=read.t is None, lost=read.lost)
@@ -270,7 +274,7 @@ def _us(times: NDArray[np.float64], name: str, how: Table, path: Path, first: in
     """Return the times of some lines in us; `first` is the number of the first."""
     missing = np.flatnonzero(np.isnan(times))
     if len(missing):
-        raise FormatError(f"{path.name}, line {first + missing[0]}: {name} is missing; every picture has a time")
+        raise FormatError(f"{path.name}, line {first + missing[0]}: {short(name)} is missing; every picture has a time")
     return whole_us(path.name, times * UNITS_US.get(how.time_unit, UNITS_US["s"]) / 1e6, first)
 
 
@@ -362,7 +366,11 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str], named
     # Quotes are no part of a name.
     name = column.strip("\"'")
     if name not in names:
-        there = ", ".join(names[:8]) + " ..." * (len(names) > 8) if named else "no names, so give its number from 1"
+        there = (
+            ", ".join(map(short, names[:8])) + " ..." * (len(names) > 8)
+            if named
+            else "no names, so give its number from 1"
+        )
         of = " of times" if key == "time_column" else ""
         raise FormatError(f"{path.name}: no column {shown(name)}{of}; there are {there}")
     return names.index(name)

@@ -5,6 +5,7 @@ One odd message does not decide for all: most of them say which length is read, 
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 
 from taxel._base.columns import Growing
 from taxel._base.limits import TIME_US, VALUE
-from taxel._core import FormatError
+from taxel._base.messages import first_line
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.checks import sensor
 from taxel.formats.ros.bag import Bag, opened
@@ -243,7 +245,12 @@ class _Held:
         ((most, _),) = lengths.most_common(1)
         stated = Counter(g for one, g in zip(self.values, self.grids, strict=True) if g and one.shape == most)
         rows, columns = stated.most_common(1)[0][0] if stated else (1, most[0])
-        return Array(rows, columns, name=self.topic)
+        try:
+            return Array(rows, columns, name=self.topic)
+        except ProblemError as error:
+            raise FormatError(
+                f"{self.place}: its messages hold {math.prod(most)} values: {first_line(error)}"
+            ) from None
 
 
 def _fits(numbers: _Shape, array: Array) -> bool:
