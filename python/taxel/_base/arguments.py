@@ -337,7 +337,8 @@ def refuse_changed(
     place = _first_changed(np.atleast_1d(received), np.atleast_1d(array))
     if place is not None:
         where = f"[{', '.join(map(str, (begin + place[0], *place[1:])))}]" if received.ndim else ""
-        value = shown(np.atleast_1d(received)[place].astype(object))
+        found = np.atleast_1d(received)[place]
+        value = shown(found.item() if isinstance(found, np.generic) else found)
         expected = {"b": "True or False", "f": "a number that fits"}.get(array.dtype.kind, "a whole number that fits")
         fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
         raise ProblemError(f"{name}{where} is {value}: must be {expected}{fits}" + f", in {unit}" * bool(unit))
