@@ -313,7 +313,7 @@ def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n"
         The columns of the table so far, which keep their order, also where no row has them: another program may append
         rows by it. New ones follow.
     end : str
-        Of a line.
+        What ends a line.
 
     Examples
     --------

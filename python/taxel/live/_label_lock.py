@@ -73,7 +73,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked_at_once(folder: Path) -> Iterator[bool]:
-    """Hold the lock of a folder's tables if nobody else does; return whether it is held.
+    """Lock a folder's tables unless another thread or process has locked them; yield whether they are locked.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def locked_at_once(folder: Path) -> Iterator[bool]:
 
 @contextlib.contextmanager
 def _file(place: Path) -> Iterator[bool]:
-    """Lock a file if no other process has locked it; return whether it is locked."""
+    """Lock a file unless another process has locked it; yield whether it is locked."""
     # A named pipe would be waited for.
     how = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
     try:

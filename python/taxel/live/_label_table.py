@@ -608,7 +608,7 @@ def _new_file(place: Path, about: os.stat_result | None, text: bytes) -> Iterato
         descriptor = os.open(name, how, mode if about is None else mode & 0o600)
         try:
             if about is not None:
-                # Of a group that this user is not in, it cannot be.
+                # A user cannot give a file to a group without being in it.
                 with contextlib.suppress(OSError):
                     os.fchown(descriptor, -1, about.st_gid)
                 os.fchmod(descriptor, mode)
