@@ -119,7 +119,8 @@ _ALONE = ("table", "arrays", "npz", "h5", "csv")
 def _read(own: Frames, layout: Layout, name: str, *, is_alone: bool) -> Frames:
     """Return pictures in the unit, at the rate and in the direction that a layout says.
 
-    No other code holds these pictures yet, so that `own` is changed in place; its times only if it is alone in its file.
+    No other code holds these pictures yet, so that `own` is changed in place: its times only if it is alone in its
+    file.
     """
     unit, t, values = own.unit, own.t, own.values
     if layout.unit is not None:
