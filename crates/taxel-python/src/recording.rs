@@ -350,12 +350,12 @@ fn recording_damage(counts: &str) -> PyResult<String> {
     Ok(json!(taxel_live::recording::damage_of_version_1(&parsed("counts", counts)?)).to_string())
 }
 
-/// Writes raw bytes as a complete `.lsa` with its `.lss`.
+/// Writes raw bytes as a new, complete `.lsa` with its `.lss`.
 #[pyfunction]
-fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>, overwrite: bool) -> PyResult<()> {
+fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>) -> PyResult<()> {
     let bytes = payload.as_bytes();
     enter(py, |_| {
-        let mut writer = LsaWriter::create(&path, overwrite)?;
+        let mut writer = LsaWriter::create(&path, false)?;
         writer.bytes(bytes)?;
         writer.finish()
     })

@@ -127,7 +127,7 @@ def _write_lsa(place: Path, payload: bytes, overwrite: bool) -> None:
         tempfile.TemporaryDirectory(dir=place.parent, prefix=f".{place.name}.") as folder,
     ):
         made = Path(folder) / "made.lsa"
-        _core.write_lsa(made, payload, False)
+        _core.write_lsa(made, payload)
         os.replace(made, part)
     write_whole(done, lambda _: None, overwrite=True)
 
