@@ -10,7 +10,7 @@ from exact import excess, reaches
 from sklearn.base import clone
 from test_solved_simulated import LAMBDAS, drawn_neuron
 
-from taxel import SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX, check_gap, check_solution
 
 #: Further problems are tried by `pytest -m slow`.
@@ -122,3 +122,46 @@ def test_another_unit_of_potentials_gives_the_same_bits(factor):
         neuron = clone(plain).set_params(theta_0=factor * plain.theta_0, theta_plus=factor * plain.theta_plus)
         other, _, _ = fitted(seed, neuron=neuron, lb=factor * cone.lb, ub=factor * cone.ub)
         assert np.array_equal(other.weights_, factor * cone.weights_, equal_nan=True), f"seed {seed}"
+
+
+def beside_one_that_cannot_be_raised(seed, count):
+    """A pattern of targets with inhibitory inputs, and one whose only excitatory input has its largest weight."""
+    random = np.random.default_rng([62, seed])
+    trains = 8 * count
+    own = 60.0 + 40 * np.arange(count) + random.uniform(0, 3, count)
+    stop = float(own[-1]) + 20
+    times = [list(random.uniform(0, stop, max(1, int(stop / 30)))) for _ in range(trains)]
+    for t in own:
+        for n in random.choice(trains, 3, replace=False):
+            times[n].append(float(t))
+    values = [random.choice([-1, 1], len(one)) * random.uniform(0.3, 3, len(one)) for one in times]
+    many = [[], [], *map(np.sort, times)]
+    first = SpikeTrains.from_lists(many, stop=stop, values=[[], [], *values], kind="graded")
+    alone = [[10.0], [15.0], *[[]] * trains]
+    second = SpikeTrains.from_lists(alone, stop=60.0, values=[[1.0], [-1.0], *[[]] * trains], kind="graded")
+    kernel = 0.5 * np.exp(-0.5)
+    largest = 0.3 / kernel
+    while largest * kernel < 0.3:
+        largest = np.nextafter(largest, 9)
+    lower, upper = np.full(trains + 2, -1.0), np.full(trains + 2, 1.0)
+    upper[0], lower[1] = largest, 0.5
+    neuron = Neuron(tau=10.0, theta_plus=0.2, refractory=3.0)
+    cone = ConeX(neuron=neuron, lambdas=(0, 1, 0), lb=lower, ub=upper, margin=1e-6)
+    return cone, [first, second], [own.tolist(), [15.0]]
+
+
+@pytest.mark.parametrize("count", [2, 5, 12])
+def test_one_row_that_cannot_be_raised_leaves_none_of_the_others(count):
+    there = 0
+    for seed in range(4):
+        cone, patterns, targets = beside_one_that_cannot_be_raised(seed, count)
+        cone.fit(patterns, targets)
+        if cone.status_ != "solved":
+            continue
+        turned = turned_down(cone, patterns, targets)
+        assert (1, 0) in turned
+        for k in (k for p, k in turned if p == 0):
+            there += 1
+            assert reaches(cone.neuron_, cone.weights_, patterns[0], targets[0], k), f"seed {seed}, target {k}"
+        assert check_solution(cone, patterns, targets), f"seed {seed}"
+    assert there > count
