@@ -432,6 +432,16 @@ def test_a_bag_that_was_cut_off_says_what_makes_it_whole(tmp_path: Path) -> None
         taxel.open(bag, topic="/palm")
 
 
+@pytest.mark.parametrize("top", [0x40, 0xFF])
+def test_a_position_in_the_header_that_no_file_has_is_damage(top: int, tmp_path: Path) -> None:
+    bag = bags.write(tmp_path / "a.bag", palms())
+    data = bytearray(bag.read_bytes())
+    data[data.index(b"index_pos=") + 17] = top
+    bag.write_bytes(data)
+    with pytest.raises(taxel.FormatError, match=r"a\.bag: cannot be read as a ROS bag: .*a position that no file has"):
+        taxel.open(bag, topic="/palm")
+
+
 def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> None:
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "own.mcap")

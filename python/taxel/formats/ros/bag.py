@@ -145,14 +145,14 @@ def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
     # Damaged files raise errors of rosbags' parts: of struct, of SQLite, of YAML, of bz2, of zstd; and a damaged size
     # asks for more memory than there is.
     except Exception as error:
-        # A damaged position is one that no file has.
-        if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
+        is_position = getattr(error, "errno", None) == errno.EINVAL or "offset-sized" in str(error)
+        if isinstance(error, OSError) and error.errno is not None and not is_position:
             error.filename = error.filename or str(path)
             raise
         why = "more memory than there is" if isinstance(error, MemoryError) else first_line(error)
-        if isinstance(error, OSError | OverflowError):
-            why = "its header is damaged"
-        if "index" in why.lower() and path.suffix == ".bag":
+        if is_position:
+            why = "it is damaged: it names a position that no file has"
+        elif "index" in why.lower() and path.suffix == ".bag":
             why = "its index is missing or damaged, as of a recording that was cut off; rosbag reindex makes it anew"
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):
             why = "its end is missing, as of a recording that was cut off; mcap recover makes a whole file of it"
