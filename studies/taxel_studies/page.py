@@ -9,7 +9,6 @@ from markupsafe import Markup
 from taxel.report import write_whole
 from taxel.report.page import render
 from taxel_studies import STUDIES, load
-from taxel_studies.kept import changed
 from taxel_studies.study import Section, read_section
 
 __all__ = ["write_page"]
@@ -34,10 +33,7 @@ def write_page(report: Path) -> Path:
     """
     sections = {name: read_section(report / name) for name in STUDIES}
     charts = {name: _charts(name, section) for name, section in sections.items()}
-    stale = {name: changed(section) for name, section in sections.items() if section is not None}
-    text = render(
-        "page.html.j2", package="taxel_studies", titles=STUDIES, sections=sections, charts=charts, stale=stale
-    )
+    text = render("page.html.j2", package="taxel_studies", titles=STUDIES, sections=sections, charts=charts)
     return write_whole(report / "index.html", lambda file: file.write(text.encode()), overwrite=True)
 
 

@@ -19,6 +19,7 @@ from taxel import FormatError, ProblemError
 from taxel.cli import main
 from taxel_studies import STUDIES, load
 from taxel_studies.page import write_page
+from taxel_studies.runner import SharedFolder
 
 #: Studies on recordings have tests of their own.
 MADE_HERE = [name for name in STUDIES if not load(name).data]
@@ -45,8 +46,8 @@ def small(tmp_path) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def courses(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp("courses")
+def courses(tmp_path_factory) -> SharedFolder:
+    return SharedFolder(tmp_path_factory.mktemp("courses"), "0123abc")
 
 
 def ends(arguments: list[str]) -> int:
