@@ -29,7 +29,6 @@ from _rounds import stamp
 
 import taxel
 from taxel import ProblemError
-from taxel.cli import bridge as measured
 from taxel.live import Live, Remote
 
 #: Frames a second, datagrams a frame, and bytes a datagram.
@@ -38,10 +37,6 @@ STREAMS = {
     "a foot: 5208 datagrams/s of 640 bytes": (192.0, 1, 640),
     "full frames: 10 000 datagrams/s of 1400 bytes": (1000.0, 10, 1400),
 }
-#: The sources of the other wheel.
-READS = ("crates/taxel-bridge/src/**/*.rs", "crates/taxel-bridge/Cargo.lock")
-#: The command; its module is named, so that this result is stale when it changes.
-COMMAND = measured.__name__.rpartition(".")[2]
 #: Words of the figures that are better when smaller.
 SMALLER = ("latency",)
 AHEAD_S, DRIFT_PPM = 3.7, 50.0
@@ -66,7 +61,7 @@ class Other:
 
     def __init__(self, *more: str) -> None:
         self.port, self.place = free_port(), f"127.0.0.1:{free_port()}"
-        command = [sys.executable, "-m", "taxel", COMMAND, "--json", "--host", "127.0.0.1", "--port", str(self.port)]
+        command = [sys.executable, "-m", "taxel", "bridge", "--json", "--host", "127.0.0.1", "--port", str(self.port)]
         self._process = subprocess.Popen([*command, "--listen", self.place, *more], stdout=subprocess.PIPE, text=True)
 
     def end(self) -> dict[str, Any]:

@@ -35,12 +35,9 @@ from _goals import Goal, at_most
 from _rounds import stamp
 
 import taxel
-from taxel.cli import information as measured
 from taxel.formats import plate
 
 PERSON, WALKER = "subj000", "GaPt23"
-#: The command; its module is named, so that this result is stale when it changes.
-COMMAND = measured.__name__.rpartition(".")[2]
 #: Rows of the longest footfall, and the time between the samples of a stride, us.
 ROWS, SAMPLE_US = 42, 10_000
 #: How long before the listed contact of a stride its own is searched, us.
@@ -149,7 +146,7 @@ def _written(name: str, rows: list[tuple[str, int, str]], recording: Path, windo
     with table.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([("recording", "t_us", "label"), *rows])
     window = ["--window-ms", str(window_ms)]
-    command = [COMMAND, str(recording), "--labels", str(table), *window, "--report", str(page)]
+    command = ["information", str(recording), "--labels", str(table), *window, "--report", str(page)]
     return Asked(len(rows), window_ms, command)
 
 

@@ -40,7 +40,6 @@ from _rounds import stamp, thread_seconds
 
 import taxel
 from taxel import ProblemError
-from taxel.cli import convert, info, view
 from taxel.live import Live, Panel
 
 if TYPE_CHECKING:
@@ -51,9 +50,6 @@ SIDES, CHANGES_PER_S = (64,), 1e5
 PEERS = {"all of it": "websockets", "the page in Chromium": "playwright"}
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
-#: The commands; their modules are named, so that this result is stale when one changes, as with the page's files.
-VIEW, INFO, CONVERT = (module.__name__.rpartition(".")[2] for module in (view, info, convert))
-READS = ("crates/taxel-panel/web/**/*.*",)
 #: Runs a command, then prints the largest memory of its process: wait4 would give that of the process that began it.
 COMMAND = """
 import sys
@@ -313,7 +309,7 @@ def command(*words: str | Path) -> dict[str, float]:
     begun = time.perf_counter()
     process = subprocess.Popen([sys.executable, "-c", COMMAND, *map(str, words)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None  # a pipe
-    if words[0] == VIEW:
+    if words[0] == "view":
         process.stdout.readline()
         memory = {}
         wall = time.perf_counter() - begun
@@ -344,9 +340,9 @@ def openings(seconds: float, rounds: int, scratch: Path, *, chromium: bool) -> l
         if chromium:
             row["page"] = medians(rounds, partial(opening_on_page, file))
         words: dict[str, tuple[str | Path, ...]] = {
-            "view": (VIEW, file, "--no-open", "--json"),
-            "info": (INFO, file),
-            "convert": (CONVERT, file, scratch / "converted.mcap", "--overwrite"),
+            "view": ("view", file, "--no-open", "--json"),
+            "info": ("info", file),
+            "convert": ("convert", file, scratch / "converted.mcap", "--overwrite"),
         }
         rows.append(row | {name: medians(rounds, partial(command, *said)) for name, said in words.items()})
     return rows

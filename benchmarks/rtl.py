@@ -33,8 +33,6 @@ sys.path.append(str(Path(__file__).parents[1] / "rtl" / "bench"))
 from logic import missing
 from pair import Pair
 
-#: Files that are neither imported nor compiled into taxel, from the checkout on.
-READS = ("rtl/*.sv", "rtl/bench/*.*")
 GOALS = {"16 channels, bench": 30.0, "16 channels, whole": 60.0}
 
 

@@ -3,22 +3,22 @@
 python docs/figures.py            judges all statements and draws all pictures again
 python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first, with the commit
 
-A report is taken as long as the code that ran it is the commit's: the digests of its sources are the checkout's. Beside
-each figure of a report its coarse result is kept, with which `taxel study NAME --confirm` holds it against later code.
+A report is taken if the commit that is checked out computed it, without local changes. Beside each figure its coarse
+result is kept, with which `taxel study NAME --confirm` compares that of later code.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from taxel.report import code_version
 from taxel_studies import STUDIES, load
-from taxel_studies.kept import changed, keep_coarse
+from taxel_studies.kept import keep_coarse
 from taxel_studies.study import drawn
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
@@ -31,24 +31,10 @@ def keep(report: Path, data: Path | None = None) -> None:
         if summary.exists():
             section = json.loads(summary.read_text())
             section.pop("tables")
-            section["commit"] = commit(name, section)
+            if section.get("commit") != code_version("taxel", "taxel_studies"):
+                sys.exit(f"{name}: not computed by the commit that is checked out, without local changes; run it again")
             (FIGURES / f"{name}.json").write_text(json.dumps(section) + "\n")
             keep_coarse(name, FIGURES, data=data)
-
-
-def commit(name: str, section: dict[str, Any]) -> str:
-    """Return the commit whose code ran a study; end where that is not the one that is checked out, unchanged."""
-    if changed(section):
-        sys.exit(f"{name}: other code than is here ran it; run it again, or check that code out")
-    if git("status", "--porcelain", "--untracked-files=no", "--", ":/python", ":/studies", ":/crates"):
-        sys.exit(f"{name}: the code here is not committed; commit it first")
-    return git("rev-parse", "--short", "HEAD")
-
-
-def git(*arguments: str) -> str:
-    """Return what git says of this checkout."""
-    ran = subprocess.run(["git", *arguments], cwd=FIGURES, capture_output=True, text=True, check=True)
-    return ran.stdout.strip()
 
 
 def judged(section: dict[str, Any]) -> list[dict[str, Any]]:

@@ -21,7 +21,6 @@ from sphinx.pycode import ModuleAnalyzer
 
 from taxel.cli import app as command_line
 from taxel_studies import STUDIES
-from taxel_studies.kept import changed
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
 #: Characters; the values of longer constants are not shown.
@@ -79,7 +78,9 @@ def study(section: dict[str, Any]) -> list[str]:
     """Return a study's section."""
     name, title = section["name"], f"{section['title'][0].upper()}{section['title'][1:]}"
     where = "../benchmarks/results/figures"
-    made = f"({section['date']}, {section['cpu_seconds']:.0f} s of CPU)"
+    made = (
+        f"({section['date']}, commit {section['commit']}, {section['machine']}, {section['cpu_seconds']:.0f} s of CPU)"
+    )
     options = "" if section["size"] == "full" else f" --size {section['size']}"
     options += "".join(f" --set {name}={json.dumps(section['parameters'][name])}" for name in section["changed"])
     lines = [
@@ -87,10 +88,6 @@ def study(section: dict[str, Any]) -> list[str]:
         f"*{section['where']}.* Made by ``taxel study {name}{options} --report figures`` {made};",
         f"numbers: :download:`{name}.json <{where}/{name}.json>`.",
     ]
-    parts = changed(section)
-    if parts:
-        first = ", ".join(parts[:3]) + ("" if len(parts) <= 3 else f" and {len(parts) - 3} more")
-        lines += ["", f"**Stale**: made by other code than this one; changed since: {literal(first)}.", ""]
     for picture in section["pictures"]:
         lines += ["", f".. image:: {where}/{picture}", f"   :alt: {name}: {section['title']}", "   :width: 100%", ""]
     rows = [[s["says"], s["published"], s["ours"], VERDICTS[s["holds"]], s["why"]] for s in section["statements"]]

@@ -42,6 +42,15 @@ def test_there_are_results_that_name_commits() -> None:
     assert benchmarks - named == set(), "no result with a commit: run taxel bench NAME"
 
 
+@pytest.mark.parametrize("path", sorted(RESULTS.rglob("*.json")), ids=lambda path: str(path.relative_to(RESULTS)))
+def test_a_kept_result_names_its_commit_date_and_machine(path: Path) -> None:
+    result = json.loads(path.read_text())
+    assert result["commit"]
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", result["date"])
+    # Of the first coarse results the machine was not saved.
+    assert result.get("machine") or path.parent.name == "coarse"
+
+
 @pytest.mark.parametrize(("file", "commit"), NAMED)
 def test_a_result_names_a_clean_commit_of_this_history(file: str, commit: str) -> None:
     assert re.fullmatch(r"[0-9a-f]{7,40}", commit), f"{file}: {commit}"

@@ -42,44 +42,24 @@ Confirm = Annotated[
     bool,
     typer.Option(
         "--confirm",
-        help="Run it at size toy, hold it against the result kept beside its figure; where it is the same, the figure "
-        "counts as one of this code.",
+        help="Run it at size toy, and compare the result with the one kept beside its figure; exit code 1 where they "
+        "differ.",
     ),
 ]
 
 REPORT = Path("taxel-studies")
 KEPT = Path("benchmarks/results/figures")
-#: Changed sources of a stale figure that are named.
-MOST_NAMED = 6
 
 
 @app.callback(invoke_without_command=True)
-def _root(
-    context: typer.Context,
-    stale: Annotated[
-        bool, typer.Option("--stale", help="List the kept figures whose code has changed since, and what changed.")
-    ] = False,
-    figures: Figures = KEPT,
-) -> None:
+def _root(context: typer.Context) -> None:
     """Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.
 
     Figures and tables of the thesis are names too: fig5.6 runs the study that holds it.
 
     Example: taxel study fig6.9 --size toy
     """
-    if stale:
-        from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
-
-        outdated = stale_figures(figures)
-        for name, parts in outdated.items():
-            more = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
-            say(f"{name}: {', '.join(parts[:MOST_NAMED])}{more}")
-        say(
-            f"{len(outdated)} kept figures are stale; taxel study NAME --confirm, or run them again"
-            if outdated
-            else "no kept figure is stale"
-        )
-    elif context.invoked_subcommand is None:
+    if context.invoked_subcommand is None:
         say(*context.get_help().split("\n"))
 
 
@@ -97,7 +77,7 @@ def every(
     figures: Figures = KEPT,
     as_json: AsJson = False,
 ) -> None:
-    """Run every study and make one page of them; with --confirm, confirm those whose kept figures are stale.
+    """Run every study and make one page of them; with --confirm, compare each with its kept coarse result.
 
     Studies on recordings are left out, and named, where no recordings are; so are those whose packages are not
     installed.
@@ -105,10 +85,10 @@ def every(
     Example: taxel study all --report figures --jobs 2
     """
     if confirm:
-        from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
+        from taxel_studies.kept import kept_figures  # noqa: PLC0415  the command line starts quickly
 
         moved = []
-        for name in stale_figures(figures):
+        for name in kept_figures(figures):
             if _left_out(name, _data(data)) is None:
                 try:
                     _confirm(name, figures, data, strict)
@@ -151,10 +131,7 @@ def every(
 
 def _left_out(name: str, data: Path | None) -> str | None:
     """Say why a study cannot be run here; None where it can."""
-    study = load(name)
-    why = study.lacks
-    if study.data and (data is None or not any((data / folder).is_dir() for folder in study.data)):
-        why = f"it needs any of {', '.join(study.data)} (--data)"
+    why = load(name).cannot_run(data)
     if why is not None:
         say(f"{name}: left out, {why}", err=True)
     return why
@@ -163,7 +140,8 @@ def _left_out(name: str, data: Path | None) -> str | None:
 def _confirm(name: str, figures: Path, data: Path | None, strict: bool) -> None:
     from taxel_studies.kept import confirm  # noqa: PLC0415  the command line starts quickly
 
-    say(f"{name}: {confirm(name, figures, data=_data(data), strict=strict)}")
+    confirm(name, figures, data=_data(data), strict=strict)
+    say(f"{name}: confirmed")
 
 
 def _add(name: str, title: str) -> Callable[..., None]:

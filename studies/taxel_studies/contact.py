@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from taxel.frames import Frames
 from taxel.simulate.fem import Course, KeptCourses, SamplingGrid, Yeoh, bodies
 from taxel.simulate.fem.solids import Solids
 from taxel_studies import indented
+from taxel_studies.runner import SharedFolder
 from taxel_studies.study import Parameters, Row, Statement, Summary
 
 WHERE = "thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2"
@@ -52,7 +52,7 @@ COLOURS = ("C3", "C1", "C9")
 tasks = indented.tasks
 
 
-def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
     """Press once, and return how well the forces balance."""
     del seed
     course = indented.make(params, courses)
@@ -69,13 +69,13 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
     """List the courses, and what the pictures show of one of them."""
     paths = [{**row.params["course"], **row.result} for row in rows]
     wanted = p["drawn"]
     asked = indented.courses_of(p)
     shown = asked[wanted["diameter_mm"], wanted["modulus_kpa"], wanted["angle_deg"]]
-    course = KeptCourses(courses).made(shown)
+    course = KeptCourses(courses.path, courses.code).made(shown)
     most = max(row.result["most_kpa"] for row in rows)
     return {
         "paths": [{k: v for k, v in one.items() if k != "silicone"} for one in paths],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -11,7 +10,7 @@ from matplotlib.figure import Figure
 from taxel.encode import FA1
 from taxel.simulate.fem import DRAGON_SKIN_10, Indentation, SamplingGrid, Yeoh
 from taxel_studies import indented
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
 
 __all__ = ["CHOICES", "courses_under"]
@@ -86,7 +85,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     return listed
 
 
-def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
     """Press once; or sample all contacts under one choice, and return the bits of the discriminants' answers."""
     course = indented.make(params, courses)
     if course is not None:
@@ -106,7 +105,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     return indented.bits_of(indented.summed(x, len(conditions), samples, seed), samples)
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
     """List the bits by choice and period."""
     del courses
     bits = {(r.params["choice"], r.params["period_ms"]): r.result["bits"] for r in rows if "choice" in r.params}

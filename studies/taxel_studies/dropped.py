@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from itertools import product
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,11 +18,11 @@ from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.information import NearestNeighbours
-from taxel.report import installed_sources, write_whole
+from taxel.report import write_whole
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US, Registers
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 
 __all__ = [
     "ANSWERED",
@@ -160,21 +159,22 @@ def tasks(p: Mapping[str, Any]) -> list[Task]:
     return [Task({**named(p), "condition": list(one)}, p["seed"]) for one in conditions(p)]
 
 
-def played_summary(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
+def played_summary(
+    params: Mapping[str, Any], seed: int, courses: SharedFolder, rig: Rig = IMPACTS
+) -> dict[str, Any] | None:
     """Return the events and contact times of the drops of a realisation of `tasks`; None for another one."""
     if "condition" not in params:
         return None
-    drops = played(params, Condition(*params["condition"]), seed, folder, rig)
+    drops = played(params, Condition(*params["condition"]), seed, courses, rig)
     return {"events": drops.events.tolist(), "lasted_ms": to_ms(drops.lasted_us).round(3).tolist()}
 
 
-def played(p: Mapping[str, Any], condition: Condition, seed: int, folder: Path, rig: Rig = IMPACTS) -> Drops:
+def played(p: Mapping[str, Any], condition: Condition, seed: int, courses: SharedFolder, rig: Rig = IMPACTS) -> Drops:
     """Return a condition's drops from the folder, or drop the ball and keep them there."""
-    code = installed_sources("taxel_studies").digest(__name__)
-    made_by = json.dumps([named(p), condition, rig, seed, code], sort_keys=True)
+    made_by = json.dumps([named(p), condition, rig, seed, courses.code], sort_keys=True)
     digest = hashlib.sha256(made_by.encode()).hexdigest()[:16]
     b, h, s = condition
-    path = folder / f"drops-{b:g}mm-{h:g}mm-{s:g}deg-{digest}.npz"
+    path = courses.path / f"drops-{b:g}mm-{h:g}mm-{s:g}deg-{digest}.npz"
     if not path.exists():
         drops = _drop(p, condition, seed, rig)
         write_whole(path, lambda file: np.savez_compressed(file, **drops._asdict()), overwrite=True)

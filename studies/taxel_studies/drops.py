@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped
 from taxel_studies.dropped import FRAMES, REGION, Condition
+from taxel_studies.runner import SharedFolder
 from taxel_studies.study import Parameters, Row, Statement, Summary
 
 WHERE = "thesis 5.6.2 and 5.7, figures 5.10 and 5.14"
@@ -41,12 +41,12 @@ PICTURES_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 tasks = dropped.tasks
 
 
-def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any] | None:
+def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any] | None:
     """Drop a ball so many times, and count."""
     return dropped.played_summary(params, seed, courses)
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
     """Return each drop's data rate, and the events of one."""
     shown = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses)
     spikes = dropped.sampled(shown.ticks[:1], to_ms(FRAME_US), np.zeros(1))[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from taxel.information import confusion_matrix, nested_predictions, panzeri_treves
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
 
 WHERE = "thesis 4.4.2, figures 4.8 and 4.10"
@@ -62,7 +61,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     ]
 
 
-def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
     """Drop the ball as often as asked; or return the bits of discriminants on all drops at a period."""
     drops = dropped.played_summary(params, seed, courses, TENNIS)
     if drops is not None:
@@ -77,7 +76,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 
 
 def sampled_drops(
-    p: Parameters, seed: int, courses: Path, period_ms: float, length_ms: float, *, aligned: bool = True
+    p: Parameters, seed: int, courses: SharedFolder, period_ms: float, length_ms: float, *, aligned: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the pictures of all drops at a period, one drop a row, and the number of each drop's condition."""
     rng = np.random.default_rng([seed, PHASES])
@@ -90,7 +89,7 @@ def sampled_drops(
     return np.concatenate(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
     """List the bits by period, and one drop's pictures."""
     asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
     one = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses, TENNIS).ticks[:1]

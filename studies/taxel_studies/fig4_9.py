@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import dropped, fig4_8
 from taxel_studies.dropped import TENNIS
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary
 
 WHERE = "thesis 4.4.2, figure 4.9"
@@ -52,7 +51,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     ]
 
 
-def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
     """Drop the ball as often as asked; or map all drops at a rate onto a plane, and classify each by its neighbours."""
     drops = dropped.played_summary(params, seed, courses, TENNIS)
     if drops is not None:
@@ -78,7 +77,7 @@ def own_neighbours(places: NDArray[np.float64], y: NDArray[np.int64]) -> float:
     return float(np.mean(y[near] == y[:, None]))
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
     """List the maps by rate."""
     del courses
     maps = {row.params["rate_hz"]: row.result for row in rows if "rate_hz" in row.params}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
 WHERE = "thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13"
@@ -100,7 +99,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     return first + last
 
 
-def realise(params: dict[str, Any], seed: int, courses: Path) -> Any:
+def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> Any:
     """Drop a ball as often as asked; or compare all drops at a period, and return the bits of neighbours' answers."""
     drops = dropped.played_summary(params, seed, courses)
     if drops is not None:
@@ -140,7 +139,7 @@ def _samples_before(time_ms: float, period_ms: float, most: int) -> int:
 
 
 def _spikes(
-    params: dict[str, Any], seed: int, courses: Path, *, aligned: bool
+    params: dict[str, Any], seed: int, courses: SharedFolder, *, aligned: bool
 ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
     """Return all drops' change events at a period, and the number of each one's condition."""
     parts = []
@@ -168,7 +167,7 @@ def _bits(
     return bits
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
     """List the bits by period."""
     del courses
     lines = []

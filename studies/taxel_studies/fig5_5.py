@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from matplotlib.figure import Figure
 from taxel.encode import FA1
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented, kept_bits
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
 WHERE = "thesis 5.5.1 and 5.5.3, figures 5.5, 5.6 and 5.8"
@@ -106,7 +105,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     return first + second + last + [asked("bits", period, a, p["even_ms"]) for period, a in chosen.items()]
 
 
-def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
     """Press once; or sample all contacts at a period, and return the bits of the discriminants' answers."""
     course = indented.make(params, courses)
     if course is not None:
@@ -157,7 +156,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
     """List the bits by period, alpha and question."""
     del courses
     lines = []

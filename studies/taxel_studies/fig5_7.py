@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 from taxel.encode import FA1
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
 
 WHERE = "thesis 5.5.2, figure 5.7"
@@ -50,7 +49,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     ]
 
 
-def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
     """Press once; or sample all contacts, and return the bits of discriminants on spikes with so many bits."""
     course = indented.make(params, courses)
     if course is not None:
@@ -74,7 +73,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     return indented.bits_of(indented.summed(x, len(conditions), samples, seed), samples)
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
     """List the bits by period and bits an event."""
     del courses
     bits = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from taxel.frames import Frames
 from taxel.information import FoldSums, folds
 from taxel.simulate.fem import TABLE_5_1, Condition, Course, Indentation, KeptCourses, SamplingGrid, Table, paths
 from taxel_studies.kept_bits import information
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Row
 
 __all__ = [
@@ -84,23 +83,23 @@ def tasks(p: Mapping[str, Any]) -> list[Task]:
     return course_tasks(list(courses_of(p).values()))
 
 
-def make(params: Mapping[str, Any], courses: Path) -> Course | None:
+def make(params: Mapping[str, Any], courses: SharedFolder) -> Course | None:
     """Return the course that a realisation is to make, from the folder or anew; None where it makes none."""
     if _COURSE not in params:
         return None
-    return KeptCourses(courses).made(Indentation.from_dict(params[_COURSE]))
+    return KeptCourses(courses.path, courses.code).made(Indentation.from_dict(params[_COURSE]))
 
 
-def largest_kpa(asked: Sequence[Indentation], courses: Path, grid: SamplingGrid) -> float:
+def largest_kpa(asked: Sequence[Indentation], courses: SharedFolder, grid: SamplingGrid) -> float:
     """Return the largest pressure on any taxel of a grid on any course: Table 5.3's range."""
-    kept = KeptCourses(courses)
+    kept = KeptCourses(courses.path, courses.code)
     return max(grid.most_kpa(kept.made(one)) for one in asked)
 
 
 def rasters(
     conditions: Sequence[Condition],
     asked: Mapping[tuple[float, float, float], Indentation],
-    courses: Path,
+    courses: SharedFolder,
     *,
     grid: SamplingGrid,
     encoder: FA1,
@@ -112,7 +111,7 @@ def rasters(
 
     Of the whole contact, or of its beginning until a time.
     """
-    kept = KeptCourses(courses)
+    kept = KeptCourses(courses.path, courses.code)
     steps = grid.steps(encoder.period_ms) if until_ms is None else round(until_ms / encoder.period_ms)
     raster = np.zeros((len(conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
     t = np.round(np.arange(steps + 1) * encoder.period_ms * 1000).astype(np.int64)

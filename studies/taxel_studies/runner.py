@@ -1,7 +1,7 @@
 """Runs the realisations of a study: shows progress, resumes after a stop, uses processes here or a cluster.
 
 A study gives one pure function of parameters and seed, and the list of what to run. Each result is one JSON line, keyed
-by parameters, seed and a digest of the code, so a result that is there already is not computed again, and a stop
+by parameters, seed and the commit, so a result that is there already is not computed again, and a stop
 (Ctrl-C, kill, power) loses no more than the realisations that are running.
 """
 
@@ -29,7 +29,7 @@ from taxel import DeviceError, ProblemError
 if TYPE_CHECKING:
     import joblib
 
-__all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "one_of", "run", "whole"]
+__all__ = ["BACKENDS", "HERE", "Results", "SharedFolder", "Task", "Workers", "one_of", "run", "whole"]
 
 #: Where realisations may run: in loky's processes on this machine, or on a cluster.
 BACKENDS = ("loky", "dask", "ray")
@@ -82,6 +82,21 @@ class Task:
         return json.dumps([self.params, self.seed, code], sort_keys=True)
 
 
+@dataclass(frozen=True)
+class SharedFolder:
+    """Name the folder in which the studies of a report share what takes long to compute.
+
+    Parameters
+    ----------
+    path : Path
+    code : str
+        Which code runs, as of `Results`: what other code saved there is computed again. Processes of one run share it.
+    """
+
+    path: Path
+    code: str
+
+
 class Results:
     """Save results in a file of JSON lines, and read those that are there.
 
@@ -90,7 +105,7 @@ class Results:
     path : Path
         Made at the first result. A last line that a kill cut short is dropped.
     code : str
-        The digest of the code: results of other code stay in the file, but count no more.
+        Which code runs (`taxel.report.code_version`): results of other code stay in the file, but count no more.
     """
 
     def __init__(self, path: Path, code: str) -> None:

@@ -22,8 +22,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from taxel import FormatError, ProblemError, __version__
-from taxel.report import installed_sources, write_whole
-from taxel_studies.runner import HERE, Results, Task, Workers, one_of, run, whole
+from taxel.report import code_version, write_whole
+from taxel_studies.runner import HERE, Results, SharedFolder, Task, Workers, one_of, run, whole
 
 __all__ = [
     "Parameters",
@@ -35,6 +35,7 @@ __all__ = [
     "Table",
     "drawn",
     "logarithmic",
+    "machine",
     "one_task",
     "one_task_per_seed",
     "only_result",
@@ -121,8 +122,7 @@ class Study:
     (``WHERE``, ``PROTOCOL`` ...), and from its functions (``tasks``, ``realise`` ...).
 
     Of studies on recordings `tasks`, `then`, `realise` and `summarise` are also given ``data``, the folder of them; of
-    studies on simulated contact `realise` and `summarise` are also given ``courses``, a folder in the report's that
-    these share.
+    studies on simulated contact `realise` and `summarise` are also given ``courses``, a `SharedFolder` in the report's.
 
     Attributes
     ----------
@@ -211,20 +211,16 @@ class Study:
         return values
 
     @property
-    def code(self) -> str:
-        """The digest of the code that computes a realisation: when it changes, results are computed anew."""
-        return installed_sources("taxel_studies").digest(self.realise.__module__)
-
-    @property
-    def made_of(self) -> dict[str, str]:
-        """The digest of every source that its figures are computed from, by name."""
-        return installed_sources("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
-
-    @property
     def lacks(self) -> str | None:
         """The modules that are not installed, in words; None where all are."""
         missing = [name for name in self.needs if find_spec(name) is None]
         return f'it needs {", ".join(missing)}: pip install "taxel[studies]"' if missing else None
+
+    def cannot_run(self, data: Path | None) -> str | None:
+        """Say what a run would miss: all of its recordings, or modules; None where it can begin."""
+        if self.data and (data is None or not any((data / folder).is_dir() for folder in self.data)):
+            return f"it needs any of {', '.join(self.data)} (--data)"
+        return self.lacks
 
     def run(
         self,
@@ -238,6 +234,8 @@ class Study:
         quiet: bool = False,
     ) -> Section:
         """Run what is not in `report` yet, draw, judge; leave ``summary.json`` and the picture there.
+
+        Results that are there count if the same commit computed them, without local changes.
 
         Parameters
         ----------
@@ -278,10 +276,11 @@ class Study:
         folder = report / self.name
         folder.mkdir(parents=True, exist_ok=True)
         listing = dict(given)
+        code = code_version("taxel", "taxel_studies")
         if self.courses:
-            given["courses"] = report / "courses"
-            given["courses"].mkdir(exist_ok=True)
-        results = Results(folder / "results.jsonl", self.code)
+            given["courses"] = SharedFolder(report / "courses", code)
+            given["courses"].path.mkdir(exist_ok=True)
+        results = Results(folder / "results.jsonl", code)
         begun = time.time()
         rows: dict[str, Row] = {}
 
@@ -312,8 +311,8 @@ class Study:
             "said": summary,
             "cpu_seconds": round(sum(row.seconds for row in rows.values()), 1),
             "wall_seconds": round(time.time() - begun, 1),
-            "made_of": self.made_of,
-            **_machine(),
+            "commit": code,
+            **machine(),
         }
         _write_section(folder, section, drawn(self, parameters, summary))
         return section
@@ -354,7 +353,7 @@ def _kind(value: Any) -> str:
     return kinds.get(type(value), "a text")
 
 
-def _machine() -> dict[str, Any]:
+def machine() -> dict[str, Any]:
     """Return what times depend on: processor, versions, date."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()

@@ -10,7 +10,7 @@ from taxel import Frames, ProblemError
 from taxel.encode import FA1
 from taxel.simulate.fem import Course, Indentation, KeptCourses, SamplingGrid, press
 from taxel_studies import contact, contact_choices, fig5_5, fig5_7, indented, load
-from taxel_studies.runner import Task
+from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Row
 
 ASKED = Indentation(
@@ -84,7 +84,9 @@ def test_rasters_are_the_encoders_spikes(tmp_path, course):
     asked = indented.courses_of(p)
     assert list(asked.values()) == [ASKED]
     grid, encoder = SamplingGrid(), FA1(range=5.0, period_ms=2.0, bits=3)
-    x = indented.rasters(conditions, asked, tmp_path, grid=grid, encoder=encoder, samples=4, seed=7)
+    x = indented.rasters(
+        conditions, asked, SharedFolder(tmp_path, kept.code), grid=grid, encoder=encoder, samples=4, seed=7
+    )
     assert x.shape == (8, 50 * 25)
     values = grid.draw(course, conditions[1].depth_mm, 2.0, 4, seed=15)
     t = np.arange(51) * 2000
@@ -142,7 +144,7 @@ def test_alpha_is_searched_at_long_periods_then_around_the_best_at_short_ones():
 
 @pytest.fixture(scope="module")
 def courses(tmp_path_factory):
-    return tmp_path_factory.mktemp("courses")
+    return SharedFolder(tmp_path_factory.mktemp("courses"), "0123abc")
 
 
 def rows_of(study, p, courses) -> list[Row]:

@@ -1,7 +1,8 @@
-"""Figures saved for the page name the commit that ran them, or are not saved."""
+"""Figures saved for the page name the commit that ran them, or are not saved; their coarse results are compared."""
 
 import importlib.util
 import json
+import os
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,7 +15,6 @@ from typer.testing import CliRunner
 from taxel import FormatError, ProblemError
 from taxel_studies import kept, load
 from taxel_studies.command import app, tell
-from taxel_studies.page import write_page
 
 _spec = importlib.util.spec_from_file_location("figures", Path(__file__).parents[2] / "docs" / "figures.py")
 assert _spec is not None
@@ -28,28 +28,27 @@ def report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A report of one study, of this very code; the page's folder is another."""
     (tmp_path / "kept").mkdir()
     monkeypatch.setattr(figures, "FIGURES", tmp_path / "kept")
-    study = load("fig6.1")
+    monkeypatch.setattr(figures, "code_version", lambda *packages: "0123abc")
     (tmp_path / "fig6.1").mkdir()
-    section = {"name": "fig6.1", "tables": [], "made_of": study.made_of}
+    section = {"name": "fig6.1", "tables": [], "commit": "0123abc"}
     (tmp_path / "fig6.1" / "summary.json").write_text(json.dumps(section))
     return tmp_path
 
 
-def test_the_commit_is_named_where_its_code_ran_the_study(report: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(figures, "git", lambda *arguments: "" if arguments[0] == "status" else "1234abc")
+def test_a_kept_figure_and_its_coarse_result_name_the_commit(report: Path) -> None:
     figures.keep(report)
-    assert json.loads((report / "kept" / "fig6.1.json").read_text())["commit"] == "1234abc"
+    for name in ("fig6.1.json", "coarse/fig6.1.json"):
+        assert json.loads((report / "kept" / name).read_text())["commit"] == "0123abc"
+    coarse = json.loads((report / "kept" / "coarse" / "fig6.1.json").read_text())
+    assert {"date", "machine"} < coarse.keys()
 
 
-def test_a_report_of_other_code_or_of_uncommitted_code_is_not_kept(
-    report: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("code", ["4567def", "0123abc with local changes, 1"])
+def test_a_report_of_another_commit_or_beside_local_changes_is_not_kept(
+    report: Path, monkeypatch: pytest.MonkeyPatch, code: str
 ) -> None:
-    monkeypatch.setattr(figures, "git", lambda *arguments: " M python/taxel/neuron.py")
-    with pytest.raises(SystemExit, match="not committed"):
-        figures.keep(report)
-    summary = report / "fig6.1" / "summary.json"
-    summary.write_text(summary.read_text().replace('"taxel.neuron": "', '"taxel.neuron": "0'))
-    with pytest.raises(SystemExit, match="other code"):
+    monkeypatch.setattr(figures, "code_version", lambda *packages: code)
+    with pytest.raises(SystemExit, match=r"fig6\.1: not computed by the commit that is checked out"):
         figures.keep(report)
     assert list((report / "kept").iterdir()) == []
 
@@ -87,25 +86,26 @@ def spoil(file: Path, change: Callable[[dict[str, Any]], Any]) -> None:
     file.write_text(json.dumps(value))
 
 
-def test_a_figure_of_this_code_is_not_stale(figure: Path) -> None:
-    assert kept.stale_figures(figure) == {}
+def test_what_is_not_kept_is_refused(figure: Path) -> None:
+    assert kept.kept_figures(figure) == ["fig6.1"]
     with pytest.raises(FormatError, match="holds no kept figure"):
-        kept.stale_figures(figure / "report")
+        kept.kept_figures(figure / "report")
+    with pytest.raises(ProblemError, match=r"fig6\.2\.json: no coarse result of fig6\.2 is kept"):
+        kept.confirm("fig6.2", figure)
 
 
-def test_a_figure_of_other_code_is_stale_until_its_coarse_result_is_confirmed(figure: Path) -> None:
-    spoil(figure / "fig6.1.json", lambda section: section["made_of"].update({"taxel.neuron": "other"}))
-    assert kept.stale_figures(figure) == {"fig6.1": ["taxel.neuron"]}
-    assert kept.confirm("fig6.1", figure) == "confirmed"
-    assert kept.stale_figures(figure) == {}
-
-
-def test_a_figure_whose_coarse_result_is_another_one_stays_stale(figure: Path) -> None:
-    spoil(figure / "fig6.1.json", lambda section: section["made_of"].update({"taxel.neuron": "other"}))
-    spoil(figure / "coarse" / "fig6.1.json", lambda result: result["said"].update({"spikes": [1.0]}))
-    with pytest.raises(ProblemError, match="its coarse result is another one"):
+@pytest.mark.parametrize("part", ["said", "parameters", "unread"])
+def test_a_coarse_result_that_is_another_one_is_found_and_stays(figure: Path, part: str) -> None:
+    file = figure / "coarse" / "fig6.1.json"
+    spoil(file, lambda result: result.update({"commit": "4567def", "date": "2020-01-01", "machine": "another"}))
+    before = file.read_text()
+    kept.confirm("fig6.1", figure)
+    assert file.read_text() == before
+    spoil(file, lambda result: result[part].update({"spikes": [1.0]}))
+    before = file.read_text()
+    with pytest.raises(ProblemError, match=r"fig6\.1: its coarse result is another one"):
         kept.confirm("fig6.1", figure)
-    assert kept.stale_figures(figure) == {"fig6.1": ["taxel.neuron"]}
+    assert file.read_text() == before
 
 
 def test_a_result_that_is_rounded_otherwise_is_the_same(figure: Path) -> None:
@@ -116,7 +116,7 @@ def test_a_result_that_is_rounded_otherwise_is_the_same(figure: Path) -> None:
         return change
 
     spoil(figure / "coarse" / "fig6.1.json", moved(1e-13))
-    assert kept.confirm("fig6.1", figure) == "confirmed"
+    kept.confirm("fig6.1", figure)
     spoil(figure / "coarse" / "fig6.1.json", moved(1e-7))
     with pytest.raises(ProblemError, match="its coarse result is another one"):
         kept.confirm("fig6.1", figure)
@@ -131,12 +131,9 @@ def scaled(value: Any, by: float) -> Any:
     return value * by if isinstance(value, float) else value
 
 
-def test_all_stale_figures_are_tried_and_those_that_moved_named(figure: Path) -> None:
+def test_all_kept_figures_are_tried_and_those_that_moved_named(figure: Path) -> None:
     for name in ("fig6.2", "fig6.1"):
-        section = json.loads((figure / "fig6.1.json").read_text()) | {
-            "name": name,
-            "made_of": {"taxel.neuron": "other"},
-        }
+        section = json.loads((figure / "fig6.1.json").read_text()) | {"name": name}
         (figure / f"{name}.json").write_text(json.dumps(section))
         kept.keep_coarse(name, figure)
     spoil(figure / "coarse" / "fig6.1.json", lambda result: result["said"].update({"spikes": [1.0]}))
@@ -144,35 +141,17 @@ def test_all_stale_figures_are_tried_and_those_that_moved_named(figure: Path) ->
     assert isinstance(ended.exception, ProblemError)
     assert "not confirmed: fig6.1;" in str(ended.exception)
     assert "fig6.2: confirmed" in ended.output
-    assert kept.stale_figures(figure) == {"fig6.1": list(load("fig6.1").made_of)}
 
 
-def test_a_figure_whose_sources_were_not_recorded_is_stale(figure: Path) -> None:
-    spoil(figure / "fig6.1.json", lambda section: section.pop("made_of"))
-    assert kept.stale_figures(figure) == {"fig6.1": ["its sources were not recorded"]}
-
-
-def test_a_stale_figure_is_marked_on_the_page(tmp_path: Path) -> None:
-    load("fig6.1").run(tmp_path, size="toy", quiet=True)
-    assert "Stale" not in write_page(tmp_path).read_text()
-    spoil(tmp_path / "fig6.1" / "summary.json", lambda section: section["made_of"].update({"taxel.neuron": "other"}))
-    page = write_page(tmp_path).read_text()
-    assert "Stale: made by other code than today's</summary>" in page
-    assert "Changed since: taxel.neuron.<" in page
-
-
-@pytest.mark.parametrize(
-    ("changed", "stale", "counts"),
-    [
-        ("taxel._core.neuron_run", {"fig6.1", "fig6.9", "fig6.11"}, {"fig4.3", "drops"}),
-        ("taxel._core.circuit_volts", {"fig4.6"}, {"fig6.1", "stdp"}),
-        ("taxel.learn.cone_x", {"fig6.9", "fig6.7"}, {"fig4.3", "drops", "codes"}),
-        ("taxel/detect/recipes/touch.toml", {"touch"}, {"fig6.1", "fig6.9"}),
-    ],
-)
-def test_a_change_makes_those_stale_that_use_it(changed: str, stale: set[str], counts: set[str]) -> None:
-    uses = {name for name in stale | counts if changed in load(name).made_of}
-    assert uses == stale
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("name", kept.kept_figures(figures.FIGURES))
+def test_a_study_gives_its_kept_coarse_result(name: str) -> None:
+    data = Path(os.environ["TAXEL_DATA"]) if "TAXEL_DATA" in os.environ else None
+    why = load(name).cannot_run(data)
+    if why is not None:
+        pytest.skip(why)
+    kept.confirm(name, figures.FIGURES, data=data)
 
 
 def test_a_printed_table_loses_no_cell_to_the_width(capsys: pytest.CaptureFixture[str]) -> None:

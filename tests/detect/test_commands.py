@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats.making import write_gaitpdb
+from matplotlib.figure import Figure
 from shell import call
 from test_readout import ARRAY, recipe, tare, touches
 
@@ -16,6 +17,7 @@ import taxel
 from taxel import _core
 from taxel.cli import main
 from taxel.cli._recordings import references
+from taxel.report.svg import picture
 
 
 @pytest.fixture(scope="module")
@@ -494,18 +496,19 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     assert "contact, chosen: tau 1.5" in out
 
 
-def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path) -> None:
+def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr("taxel.report.listening.picture", lambda figure: drawn.append(figure) or picture(figure))
     file, readout = write_gaitpdb(tmp_path), tmp_path / "gait.json"
     assert call(capsys, "train", file, "--labels", "notes", "--folds", 0, "-o", readout)[0] == 0
     assert call(capsys, "detect", file, "--readout", readout, "--report", tmp_path / "r")[0] == 0
     page = (tmp_path / "r" / "report.html").read_text()
     felt = page[page.index("The sum over time") : page.index("<h2>contact</h2>")]
-    assert re.findall(r'"title":"[^"]*GaCo99_01 (\w+)"', felt) == ["left", "right"]
-    for foot, curve in zip(
-        taxel.open(file), re.findall(r'"y":(\[[^]]*\]),"color":"[^"]*","width":0.9', felt), strict=True
-    ):
-        frames = foot.frames()
-        assert json.loads(curve) == pytest.approx(frames.values.sum(axis=(1, 2))), foot.label
+    assert re.findall(r">[^<>]*GaCo99_01 (\w+)</text>", felt) == ["left", "right"]
+    for foot, axes in zip(taxel.open(file), drawn[-1].axes, strict=True):
+        curve = axes.lines[0]
+        assert curve.get_label().startswith("sum, ")
+        assert curve.get_ydata() == pytest.approx(foot.frames().values.sum(axis=(1, 2))), foot.label
 
 
 def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:
@@ -513,13 +516,13 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
     code, out, _ = call(capsys, *arguments, tmp_path / "with", "--truth", folder / "truth.csv")
     page = (tmp_path / "with" / "report.html").read_text()
     assert (code, f"report: {tmp_path / 'with' / 'report.html'}" in out) == (0, True)
-    assert page.count('<div class="charts">') == 2 * 3, "potential, errors, weights of each label"
+    assert page.count('<div class="picture"><svg') == 2 * 3, "potential, errors, weights of each label"
     assert "<h2>contact</h2>" in page
     assert "taxel view" not in page, "a .npz cannot be viewed"
     assert "The worst" in page
     assert call(capsys, *arguments, tmp_path / "without")[0] == 0
     page = (tmp_path / "without" / "report.html").read_text()
-    assert page.count('<div class="charts">') == 2 * 2
+    assert page.count('<div class="picture"><svg') == 2 * 2
     assert "The worst" not in page
     code, _, error = call(capsys, *arguments, tmp_path / "without")
     assert (code, "exists already" in error) == (2, True)

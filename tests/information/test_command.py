@@ -49,7 +49,7 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     assert "10 ms " in said
     assert "wire version" in said
     text = page.read_text()
-    assert text.count('<div class="charts">') == 2
+    assert text.count('<div class="picture"><svg') == 2
     assert "keeps 95 %" in text
     assert "{{" not in text
     again = run(recording, "--labels", labels, *QUICK, "--report", page)

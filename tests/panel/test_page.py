@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import http.client
 import re
 from pathlib import Path
 
 import pytest
+from panel.protocol import SOON
 
-import taxel
-from taxel import _core
+from taxel.live import Panel
 
 ROOT = Path(__file__).resolve().parents[2]
 WEB = ROOT / "crates/taxel-panel/web"
@@ -20,15 +21,14 @@ SERVED = sorted(
 )
 
 
-@pytest.mark.parametrize("name", SERVED)
-def test_a_file_is_handed_out_as_it_lies_in_the_folder(name: str) -> None:
-    assert _core.page_file(name) == (WEB / name).read_bytes()
-
-
-@pytest.mark.parametrize("name", ["", "uPlot.js", "vendor", "vendor/../registers.js", "../Cargo.toml"])
-def test_no_other_name_is_known(name: str) -> None:
-    with pytest.raises(taxel.ProblemError, match=r"no file of the panel: must be one of .*vendor/uPlot\.js"):
-        _core.page_file(name)
+def test_each_file_is_served_as_it_lies_in_the_folder_and_nothing_else(panel: Panel) -> None:
+    line = http.client.HTTPConnection(*panel.address, timeout=SOON)
+    for name in (*SERVED, "uPlot.js", "vendor", "REGISTERS.JS", "vendor/../registers.js"):
+        line.request("GET", f"/{name}")
+        answer = line.getresponse()
+        found = answer.read()
+        assert (answer.status, found) == ((200, (WEB / name).read_bytes()) if name in SERVED else (404, b"")), name
+    line.close()
 
 
 def test_every_part_that_the_program_looks_for_is_in_the_page() -> None:

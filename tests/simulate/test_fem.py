@@ -13,7 +13,6 @@ import pytest
 from refusal import refused
 
 from taxel import FormatError, ProblemError
-from taxel.report import installed_sources
 from taxel.simulate.fem import (
     DRAGON_SKIN_10,
     TABLE_5_1,
@@ -205,13 +204,18 @@ def test_courses_are_kept_under_a_digest_of_what_made_them(tmp_path, slanted):
     assert asked not in kept
 
 
-def test_all_of_the_solver_counts_for_what_is_kept(tmp_path):
-    parts = installed_sources().parts("taxel.simulate.fem.indentation")
-    folder = Path(press.__code__.co_filename).parent
-    solver = {f"taxel.simulate.fem.{file.stem}" for file in folder.glob("[!_]*.py")}
-    # Not who keeps courses, nor who samples them.
-    assert solver - parts.keys() == {f"taxel.simulate.fem.{name}" for name in ("conditions", "grid", "kept")}
-    assert KeptCourses(tmp_path).code == installed_sources().digest("taxel.simulate.fem.indentation")
+def test_a_kept_course_is_used_again_by_the_same_code_alone(tmp_path, slanted, monkeypatch):
+    def kept(code: str) -> KeptCourses:
+        monkeypatch.setattr("taxel.simulate.fem.kept.code_version", lambda: code)
+        return KeptCourses(tmp_path)
+
+    asked = slanted.indentation
+    kept("0123abc").add(slanted)
+    assert asked in kept("0123abc")
+    assert asked not in kept("4567def")
+    assert asked in KeptCourses(tmp_path, "0123abc")
+    with pytest.raises(ProblemError, match="code"):
+        KeptCourses(tmp_path, 7)
 
 
 CHANGES = [("friction", 0.6), ("height_mm", 5.5), ("silicone", Yeoh(3600)), ("step_um", 24.0), ("penalty", 51.0)]

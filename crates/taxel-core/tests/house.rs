@@ -86,7 +86,6 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
                 "recording",
                 "rivals",
                 "simulate",
-                "sources",
                 "test_hooks",
                 "wire",
                 "wire_v2",

@@ -1,7 +1,5 @@
 //! The panel's files, inside the program: a table of exact names, so that no request can leave it.
 
-use taxel_core::{Error, Result};
-
 /// A file of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Asset {
@@ -33,14 +31,8 @@ pub const ASSETS: &[Asset] = assets! {
 };
 
 /// Gives the file of exactly this name.
-///
-/// # Errors
-/// `Problem` where there is none; it lists those that are.
-pub fn asset(name: &str) -> Result<&'static Asset> {
-    ASSETS.iter().find(|asset| asset.name == name).ok_or_else(|| {
-        let known: Vec<&str> = ASSETS.iter().map(|asset| asset.name).collect();
-        Error::Problem(format!("{name:?} is no file of the panel: must be one of {}", known.join(", ")))
-    })
+pub fn asset(name: &str) -> Option<&'static Asset> {
+    ASSETS.iter().find(|asset| asset.name == name)
 }
 
 #[cfg(test)]
@@ -75,8 +67,8 @@ mod tests {
     #[test]
     fn only_exact_names_are_known() {
         for name in ["", "/", "vendor", "vendor/../registers.js", "REGISTERS.JS", "../Cargo.toml", "registers.js\0"] {
-            assert!(asset(name).is_err(), "{name:?}");
+            assert!(asset(name).is_none(), "{name:?}");
         }
-        assert!(asset("registers.js").is_ok_and(|asset| asset.media.starts_with("text/javascript")));
+        assert!(asset("registers.js").is_some_and(|asset| asset.media.starts_with("text/javascript")));
     }
 }

@@ -12,7 +12,7 @@ use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use tokio::sync::watch;
 
-use super::assets::ASSETS;
+use super::assets::asset;
 use super::connections::LimitedListener;
 use super::handler::RequestHandler;
 use super::hub::Hub;
@@ -246,7 +246,7 @@ async fn answer(gate: &Arc<Gate>, request: Request) -> Response {
         return socket(gate, &host, request).await;
     }
     let name = if path == "/" { "index.html" } else { path.strip_prefix('/').unwrap_or_default() };
-    match ASSETS.iter().find(|asset| asset.name == name) {
+    match asset(name) {
         Some(asset) => ([(header::CONTENT_TYPE, asset.media)], asset.bytes).into_response(),
         None => StatusCode::NOT_FOUND.into_response(),
     }

@@ -28,7 +28,6 @@ mod pictures;
 mod recording;
 mod rivals;
 mod simulate;
-mod sources;
 mod wire;
 mod wire_v2;
 
@@ -59,7 +58,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;
-    sources::register(module)?;
     wire::register(module)?;
     wire_v2::register(module)?;
     Ok(())

@@ -13,7 +13,6 @@ use taxel_core::rest::Value;
 use taxel_core::wire::Command;
 use taxel_live::address::of_host;
 use taxel_live::recording::{Note, Remarks};
-use taxel_panel::assets::asset;
 use taxel_panel::{
     Activity, BoardLines, Cut, Detected, EditOutcome, LabelConflict, LabelEdit, LabelRow, LabelTable, Opening,
     Panel as Server, PanelOptions, PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource, PicturesRead,
@@ -22,17 +21,11 @@ use taxel_panel::{
 
 use crate::convert::{ArrayParts, array, from_array, slice, to_array};
 use crate::enter::enter;
-use crate::errors::{ProblemError, core};
+use crate::errors::ProblemError;
 use crate::held::from_touches;
 use crate::live::Live;
 use crate::parameters::parsed;
 use crate::threaded::Threaded;
-
-/// Gives a file of the panel's page by its name below `web/`, as bytes.
-#[pyfunction]
-fn page_file(name: &str) -> PyResult<&'static [u8]> {
-    Ok(asset(name).map_err(core)?.bytes)
-}
 
 /// Calls the methods of a Python object, `PanelRequests` in `_core.pyi`; the text of an exception is the reason of a refusal.
 struct PythonHandler(Py<PyAny>);
@@ -398,6 +391,5 @@ impl Panel {
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Panel>()?;
-    module.add_function(wrap_pyfunction!(page_file, module)?)
+    module.add_class::<Panel>()
 }

@@ -13,24 +13,21 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO
 
 import typer
 
 from taxel._base.child_process import ChildProcess
+from taxel._base.commit import checkout_of
 from taxel._base.files import write_whole
 from taxel._base.messages import counted
-from taxel._base.provenance import installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._say import say
 
-__all__ = ["bench", "changed_parts", "doubts_of", "goals_of", "made_of"]
+__all__ = ["bench", "doubts_of", "goals_of"]
 
-#: How the parts of a result begin that are compiled.
-_COMPILED = "taxel._core."
 #: How the rows begin that were measured with AVX2 alone (benchmarks/_instructions.py).
 _AVX2 = "AVX2: "
 _VERDICTS = ("reached", "not reached", "not measured")
@@ -54,8 +51,8 @@ def bench(
         bool,
         typer.Option(
             "--goals",
-            help="List the goals of the saved results, what speaks against times, and changed code; "
-            "exit code 1 where a goal is not reached or not measured.",
+            help="List the goals of the saved results, and what speaks against times; exit code 1 where a goal is not "
+            "reached or not measured.",
         ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
@@ -84,8 +81,8 @@ def bench(
         if not _list_goals(folder, files, names):
             raise typer.Exit(1)
         return
-    changed = [] if quick else _changed(folder)
-    if changed:
+    checkout = None if quick else checkout_of(folder)
+    if checkout is not None and (changed := checkout.changed):
         raise ProblemError(
             f"{', '.join(changed[:3])}{' ...' * (len(changed) > 3)}: changed since the last commit, "
             "which a result names; commit first, or give --quick"
@@ -97,7 +94,6 @@ def bench(
         result["date"] = time.strftime("%Y-%m-%d", time.gmtime())
         result["machine"]["others"] = others.cores()
         if not quick:
-            result["made_of"] = made_of(files[stem], benchmark)
             place = folder / "results" / f"{stem}.json"
             place.parent.mkdir(exist_ok=True)
             lost = sorted(result.get("left out", {}).keys() - _saved(place).get("left out", {}).keys())
@@ -114,33 +110,6 @@ def bench(
             say(json.dumps(result))
         else:
             say(*_table(stem, result, benchmark))
-
-
-def made_of(file: Path, benchmark: Any) -> dict[str, str]:
-    """Return the digest of every part that a benchmark's result depends on.
-
-    These are the benchmark without its `goals`, what it imports of taxel, of the studies and of its own folder, the
-    Rust sources of the compiled names that are used, and files of the checkout that its `READS` names by patterns.
-    """
-    beside = sorted(file.parent.glob("*.py"))
-    parts = installed_sources("taxel_studies", *beside, without=("goals", "_goals")).parts(file.stem)
-    checkout = file.resolve().parents[1]
-    read = sorted(path for pattern in getattr(benchmark, "READS", ()) for path in checkout.glob(pattern))
-    digests = {str(path.relative_to(checkout)): sha256(path.read_bytes()).hexdigest()[:12] for path in read}
-    return parts | digests
-
-
-def changed_parts(result: Mapping[str, Any], now: Mapping[str, str]) -> list[str]:
-    """Return what a result was made of that is another today; names of the compiled part are counted."""
-    before = result.get("made_of")
-    if before is None:
-        return ["its sources were not recorded"]
-    parts = sorted(part for part in before.keys() | now.keys() if before.get(part) != now.get(part))
-    # A change in the compiled part counts for all names whose Rust module has the changed one below it.
-    compiled = sum(part.startswith(_COMPILED) for part in parts)
-    own = [part for part in parts if not part.startswith(_COMPILED)]
-    more = [f"{len(own) - 5} more"] * (len(own) > 5) + [counted(compiled, "compiled name")] * bool(compiled)
-    return [*own[:5], *more]
 
 
 def goals_of(benchmark: Any, result: Mapping[str, Any]) -> list[Any]:
@@ -198,17 +167,15 @@ def _saved(place: Path) -> dict[str, Any]:
 def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> bool:
     """Print the goals, those first that are not reached; return whether all are reached."""
     verdicts: list[str] = []
-    stale, absent = 0, 0
+    absent = 0
     for name in names:
         result = _saved(folder / "results" / f"{name}.json")
         if not result:
             absent += 1
             say(f"{name}: no result", "")
             continue
-        benchmark = _load(files[name])
-        goals, changed = goals_of(benchmark, result), changed_parts(result, made_of(files[name], benchmark))
+        goals = goals_of(_load(files[name]), result)
         goals.sort(key=lambda goal: _ORDER.index(_verdict(goal)))
-        stale += bool(changed)
         verdicts += [_verdict(goal) for goal in goals]
         machine = result.get("machine", {})
         commit = f"commit {result.get('commit', 'unknown')}" + f", {result.get('date')}" * ("date" in result)
@@ -217,11 +184,9 @@ def _list_goals(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
         reached = sum(goal.reached for goal in goals)
         say(f"{name}: {reached} of {counted(len(goals), 'goal')} reached")
         say(*_wrapped("; ".join(about)))
-        say(*_wrapped(f"of earlier code; changed: {', '.join(changed)}" if changed else "of this code"))
         say(*(line for goal in goals for line in _row(goal, result)), "")
     counts = [f"{verdicts.count(one)} {one}" for one in _VERDICTS]
     say(f"{counted(len(verdicts), 'goal')}: {', '.join(counts)}")
-    say(f"{counted(len(names), 'benchmark')}: {stale} with a result of earlier code")
     return not absent and set(verdicts) <= {_VERDICTS[0]}
 
 
@@ -279,19 +244,6 @@ def _run(file: Path, *, quick: bool) -> dict[str, Any]:
         raise ProblemError(f"{file.stem}: ended with status {child.returncode}, without a result")
     result: dict[str, Any] = json.loads(printed.splitlines()[-1])
     return result
-
-
-def _changed(folder: Path) -> list[str]:
-    """Return the files of the folder's checkout that differ from its last commit, without the results."""
-    # A repository can name a program that git runs to watch files.
-    git = ["git", "-c", "core.fsmonitor=false", "-C", str(folder)]
-    status = subprocess.run(
-        [*git, "status", "--porcelain", "--untracked-files=no", "--", ":/", ":!./results"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return [line[3:] for line in status.stdout.splitlines()]
 
 
 def _put(text: str, file: BinaryIO) -> None:

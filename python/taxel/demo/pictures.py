@@ -15,7 +15,7 @@ from taxel._base.messages import counted
 from taxel.demo.evaluation import Evaluation
 from taxel.demo.judging import LABELS, Judged
 from taxel.events import Events
-from taxel.report.charts import INK
+from taxel.report.svg import INK
 from taxel.simulate import Contact
 from taxel.spikes import to_ms, to_us
 from taxel.wire import FRAME_US

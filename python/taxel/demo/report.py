@@ -22,8 +22,8 @@ from taxel.demo.judging import GOALS, LABELS, Judged, Row
 from taxel.demo.naming import ANSWERED_MS, QUESTIONS, estimates
 from taxel.demo.script import script
 from taxel.live import delays
-from taxel.report.charts import STYLE, chart
 from taxel.report.page import render
+from taxel.report.svg import STYLE, picture
 from taxel.simulate import Scene
 from taxel.spikes import to_ms, to_us
 from taxel.wire import FRAME_US
@@ -145,7 +145,7 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
     evaluation = material.evaluation
     with mpl.rc_context(STYLE):
         figures_of = _figures(material, values)
-        drawn = {name: chart(figure) for name, figure in figures_of.items()}
+        drawn = {name: picture(figure) for name, figure in figures_of.items()}
         for figure in figures_of.values():
             plt.close(figure)
     return render(

@@ -3,13 +3,13 @@
 import warnings
 from typing import Any
 
+from taxel._base.commit import code_version
 from taxel._base.files import write_whole
-from taxel._base.provenance import Sources, installed_sources
 from taxel.detect import Example, Outcome
 from taxel.report.information import write_information
 from taxel.report.listening import write_listening
 
-__all__ = ["Sources", "installed_sources", "write_information", "write_listening", "write_whole"]
+__all__ = ["code_version", "write_information", "write_listening", "write_whole"]
 
 
 def __getattr__(name: str) -> Any:

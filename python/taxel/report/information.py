@@ -14,8 +14,8 @@ from taxel._base.arguments import instance
 from taxel._base.files import write_whole
 from taxel._base.messages import escaped
 from taxel.information import Answer, Point
-from taxel.report.charts import STYLE, chart
 from taxel.report.page import render
+from taxel.report.svg import STYLE, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +51,7 @@ def write_information(path: str | os.PathLike[str], answer: Answer, *, overwrite
     """
     checked = instance("answer", answer, Answer)
     with mpl.rc_context(STYLE):
-        drawn = {"curves": chart(_curves(checked)), "confusion": chart(_confusion(checked))}
+        drawn = {"curves": picture(_curves(checked)), "confusion": picture(_confusion(checked))}
     text = render(
         "report/information.html.j2",
         answer=checked,

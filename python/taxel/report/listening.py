@@ -30,8 +30,8 @@ from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.contents import Contents
 from taxel.recording.pressure import series
-from taxel.report.charts import INK, STYLE, chart
 from taxel.report.page import render
+from taxel.report.svg import INK, STYLE, picture
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def _of_neuron(
 def _drawn(figure: Figure | None) -> Markup | None:
     if figure is None:
         return None
-    drawn = chart(figure)
+    drawn = picture(figure)
     plt.close(figure)
     return drawn
 

@@ -1,4 +1,4 @@
-"""Courses of indentations stored in a folder, each under a digest of all that it depends on."""
+"""Courses of indentations stored in a folder, used again only by the code that computed them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from taxel._base.arguments import instance
 from taxel._base.arguments import path as checked_path
-from taxel._base.provenance import installed_sources
+from taxel._base.commit import code_version
 from taxel.simulate.fem.indentation import Course, Indentation, press
 
 __all__ = ["KeptCourses"]
@@ -21,11 +21,9 @@ class KeptCourses:
     ----------
     folder : path
         Must be there.
-
-    Attributes
-    ----------
-    code : str
-        The digest of the solver's sources (`taxel.report.Sources`): courses of other code are not found.
+    code : str, optional
+        Which code runs: courses of other code are not found. As `taxel.report.code_version` returns it, also where this
+        is not given; in a checkout with local changes each `KeptCourses` then has courses of its own.
 
     Raises
     ------
@@ -42,11 +40,11 @@ class KeptCourses:
     (False, True)
     """
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: str | Path, code: str | None = None) -> None:
         self.folder = Path(checked_path("folder", folder))
         if not self.folder.is_dir():
             raise FileNotFoundError(2, "No such folder", str(self.folder))
-        self.code = installed_sources().digest(press.__module__)
+        self.code = code_version() if code is None else instance("code", code, str)
 
     def path(self, asked: Indentation) -> Path:
         """Return the path of a course's file: its name has object and path, and a digest of the rest."""

@@ -1,0 +1,59 @@
+"""A study that is run again uses the results of the same commit, and no others."""
+
+from __future__ import annotations
+
+import subprocess
+from itertools import count
+from pathlib import Path
+
+import pytest
+
+from taxel.report import code_version
+from taxel_studies import load
+from taxel_studies.runner import Workers
+
+#: A package that no test imports.
+NAME = "taxel_toy_study"
+
+
+def test_a_resumed_study_uses_the_results_of_the_same_commit_without_local_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / f"{NAME}.py"
+
+    def git(*arguments: str) -> None:
+        command = ["git", "-C", str(tmp_path), "-c", "user.name=n", "-c", "user.email=e@localhost", *arguments]
+        subprocess.run(command, check=True, capture_output=True)
+
+    def commit() -> None:
+        git("add", str(file))
+        git("commit", "-q", "-m", "one")
+
+    def saved() -> int:
+        load("fig6.11").run(tmp_path / "report", size="toy", changes={"realisations": 1}, quiet=True)
+        return len((tmp_path / "report" / "fig6.11" / "results.jsonl").read_text().splitlines())
+
+    git("init", "-q")
+    file.write_text("first = 1\n")
+    commit()
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("taxel_studies.study.code_version", lambda *packages: code_version(NAME))
+    each = saved()
+    assert saved() == each
+    file.write_text("second = 2\n")
+    assert [saved(), saved()] == [2 * each, 3 * each]
+    commit()
+    assert [saved(), saved()] == [4 * each, 4 * each]
+    git("checkout", "-q", "HEAD~1")
+    assert saved() == 4 * each
+
+
+def test_the_processes_of_a_run_share_what_they_save_also_with_local_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = count()
+    monkeypatch.setattr("taxel_studies.study.code_version", lambda *packages: f"0123abc, {next(calls)}")
+    for runs in (1, 2):
+        section = load("drops").run(tmp_path, size="toy", changes={"drops": 2}, workers=Workers(2), quiet=True)
+        assert len(list((tmp_path / "courses").iterdir())) == runs * section["realisations"]
+        assert section["commit"] == f"0123abc, {runs - 1}"

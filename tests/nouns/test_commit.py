@@ -1,0 +1,176 @@
+"""Which code runs: a commit where it is that of the files, else a version, else a text that no other call returns."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from taxel._base.commit import checkout_of
+from taxel.report import code_version
+
+#: A package that no test imports.
+NAME = "taxel_toy_code"
+
+
+class Repository:
+    """A small repository, with a package in a folder of it."""
+
+    def __init__(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.root, self.file = root, root / "python" / NAME / "__init__.py"
+        self.write("python", NAME, "__init__.py")
+        self.git("init", "-q")
+        self.commit()
+        monkeypatch.syspath_prepend(str(root / "python"))
+
+    def write(self, *parts: str, text: str = "first\n") -> None:
+        path = self.root.joinpath(*parts)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"# {text}")
+
+    def git(self, *arguments: str) -> str:
+        command = ["git", "-C", str(self.root), "-c", "user.name=n", "-c", "user.email=e@localhost", *arguments]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    def commit(self) -> str:
+        self.git("add", "-A")
+        self.git("commit", "-q", "--allow-empty", "-m", "one")
+        return self.git("rev-parse", "--short", "HEAD")
+
+    def version(self) -> str:
+        return code_version(NAME)
+
+
+@pytest.fixture
+def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Repository]:
+    return Repository(tmp_path, monkeypatch)
+
+
+def installed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Install the package into a folder, as version 1.2."""
+    (folder / NAME).mkdir(parents=True)
+    (folder / NAME / "__init__.py").write_text("")
+    (folder / f"{NAME}-1.2.dist-info").mkdir()
+    (folder / f"{NAME}-1.2.dist-info" / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {NAME}\nVersion: 1.2\n")
+    monkeypatch.syspath_prepend(str(folder))
+
+
+def never_again(repository: Repository) -> bool:
+    """Whether each call returns another text."""
+    return len({repository.version() for _ in range(3)}) == 3
+
+
+def test_a_clean_checkout_is_its_commit(repository: Repository) -> None:
+    first = repository.git("rev-parse", "--short", "HEAD")
+    assert [repository.version(), repository.version()] == [first, first]
+    repository.write("python", NAME, "__init__.py", text="second\n")
+    second = repository.commit()
+    assert repository.version() == second != first
+    repository.git("checkout", "-q", first)
+    assert repository.version() == first
+
+
+@pytest.mark.parametrize("staged", [False, True])
+@pytest.mark.parametrize("change", ["edit", "remove", "add"])
+def test_with_local_changes_no_two_calls_are_the_same(repository: Repository, change: str, staged: bool) -> None:
+    repository.write("crates", "more.rs")
+    first = repository.commit()
+    if change == "remove":
+        (repository.root / "crates" / "more.rs").unlink()
+    else:
+        repository.write("crates", "more.rs" if change == "edit" else "other.rs", text="second\n")
+    if staged:
+        repository.git("add", "-A")
+    elif change == "add":
+        repository.git("add", "--intent-to-add", "crates")
+    assert never_again(repository)
+    assert repository.version().startswith(f"{first} with local changes, ")
+
+
+def test_results_and_files_that_git_does_not_track_are_no_changes(repository: Repository) -> None:
+    repository.write("benchmarks", "results", "figures", "one.json")
+    first = repository.commit()
+    repository.write("benchmarks", "results", "figures", "one.json", text="second\n")
+    repository.write("notes.txt")
+    assert repository.version() == first
+    repository.write("python", NAME, "benchmarks", "results", "one.py")
+    repository.git("add", "-A")
+    assert never_again(repository)
+
+
+def test_an_installed_package_is_its_version_also_within_a_strangers_repository(
+    repository: Repository, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    installed(repository.root / ".venv" / "site-packages", monkeypatch)
+    assert repository.version() == f"{NAME} 1.2"
+    repository.write("python", NAME, "__init__.py", text="second\n")
+    assert repository.version() == f"{NAME} 1.2"
+    installed(tmp_path_factory.mktemp("alone"), monkeypatch)
+    assert repository.version() == f"{NAME} 1.2"
+
+
+def test_packages_of_one_checkout_are_one_commit_and_of_several_named_each(
+    repository: Repository, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert code_version(NAME, NAME) == code_version(NAME)
+    first = repository.version()
+    folder = tmp_path_factory.mktemp("alone")
+    monkeypatch.setattr("taxel._base.commit.metadata.version", lambda name: "3")
+    (folder / f"{NAME}_other.py").write_text("")
+    monkeypatch.syspath_prepend(str(folder))
+    assert code_version(NAME, f"{NAME}_other") == f"{first} + {NAME}_other 3"
+
+
+def test_where_git_or_the_installation_does_not_say_nothing_is_used_again(
+    repository: Repository, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setenv("PATH", str(repository.root))
+        assert never_again(repository)
+    (repository.root / ".git" / "HEAD").write_text("nonsense\n")
+    assert never_again(repository)
+    alone = tmp_path_factory.mktemp("alone")
+    (alone / NAME).mkdir()
+    (alone / NAME / "__init__.py").write_text("")
+    monkeypatch.syspath_prepend(str(alone))
+    assert never_again(repository)
+
+
+def test_a_repository_without_a_commit_is_not_clean(tmp_path: Path) -> None:
+    subprocess.run(["git", "-C", tmp_path, "init", "-q"], check=True)
+    (tmp_path / "one.py").write_text("")
+    assert checkout_of(tmp_path / "one.py") is None
+    subprocess.run(["git", "-C", tmp_path, "add", "one.py"], check=True)
+    checkout = checkout_of(tmp_path / "one.py")
+    assert checkout is not None
+    assert (checkout.commit, bool(checkout.changed)) == ("unknown", True)
+
+
+def test_a_repository_runs_no_program_of_its_own(repository: Repository) -> None:
+    program = repository.root / "watch"
+    program.write_text(f"#!/bin/sh\ntouch {repository.root}/was-run\n")
+    program.chmod(0o755)
+    hook = repository.root / ".git" / "hooks" / "post-index-change"
+    hook.parent.mkdir(exist_ok=True)
+    hook.write_text(program.read_text())
+    hook.chmod(0o755)
+    repository.git("config", "core.fsmonitor", str(program))
+    repository.file.touch()
+    repository.version()
+    assert not (repository.root / "was-run").exists()
+
+
+def test_another_repository_that_the_environment_names_does_not_count(
+    repository: Repository, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = repository.version()
+    other = Repository(tmp_path_factory.mktemp("other"), monkeypatch)
+    other.write("python", NAME, "__init__.py", text="second\n")
+    assert other.commit() != first
+    monkeypatch.setenv("GIT_DIR", str(other.root / ".git"))
+    monkeypatch.setenv("GIT_WORK_TREE", str(other.root))
+    checkout = checkout_of(repository.file)
+    assert checkout is not None
+    assert checkout.commit == first

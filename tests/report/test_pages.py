@@ -1,0 +1,177 @@
+"""Pages of reports: their figures are SVG in the page's colours, and a page needs nothing but itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from taxel.report.page import render
+from taxel.report.svg import INK, STYLE, picture
+
+
+def axes_of(**how):
+    figure = Figure(**how)
+    return figure, figure.subplots()
+
+
+def test_a_figure_takes_the_pages_colours_and_keeps_its_own():
+    with mpl.rc_context(STYLE):
+        figure, axes = axes_of()
+        axes.plot([1, 2, 3], [1, 3, 2], color=INK, label="a line")
+        axes.plot([1, 2, 3], [2, 1, 3], color="#b5423c")
+        axes.legend()
+        axes.set_xlabel("time, s")
+        html = picture(figure)
+    assert html.startswith('<div class="picture"><svg')
+    assert {"--ink", "--card"} == set(re.findall(r"var\((--\w+)\)", html))
+    assert "#b5423c" in html
+    assert not re.search(f"{INK}|#000000|#ffffff", html)
+    assert ">time, s</text>" in html
+    assert ">a line</text>" in html
+
+
+@pytest.mark.parametrize("draw", ["bar", "plot", "scatter", "vlines"])
+def test_a_figure_of_many_marks_stays_small_and_keeps_its_words(draw):
+    y = np.random.default_rng(1).normal(size=12_000)
+    x = np.arange(len(y))
+    with mpl.rc_context(STYLE):
+        figure, axes = axes_of(figsize=(6.5, 2.2), layout="constrained")
+        {
+            "bar": lambda: axes.bar(x, y),
+            "plot": lambda: axes.plot(x, y, "."),
+            "scatter": lambda: axes.scatter(x, y),
+            "vlines": lambda: axes.vlines(x, 0.0, y),
+        }[draw]()
+        axes.set_ylabel("weight, mV")
+        html = picture(figure)
+    assert html.startswith('<div class="picture light"><svg')
+    assert len(html) < 300_000
+    assert "<image" in html
+    assert ">weight, mV</text>" in html
+
+
+def test_text_of_a_figure_is_text_in_the_page():
+    figure, axes = axes_of()
+    axes.set_title("</text><script>alert(1)</script>")
+    html = picture(figure)
+    assert "<script" not in html
+    assert "&lt;/text&gt;&lt;script&gt;alert(1)&lt;/script&gt;</text>" in html
+
+
+def page(*figures):
+    drawn = {"contact": {"potential": picture(figures[0]), "weights": picture(figures[1]), "errors": None}}
+    drawn["contact"]["moved"] = None
+    return render(
+        "report/listening.html.j2",
+        title="a page",
+        felt="",
+        judged="",
+        readout="none",
+        labels=["contact"],
+        drawn=drawn,
+        rows=[],
+        beside=[],
+        begun=[],
+        held_out=[],
+        outside=[],
+        worst=[],
+        viewed=["'a walk.mcap'"],
+        scored=False,
+    )
+
+
+def some():
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    left.plot([1, 2, 3], [3, 1, 2], label="a line")
+    left.legend()
+    right.imshow(np.eye(4))
+    figure.subplots_adjust()
+    other, axes = axes_of(figsize=(12.0, 3.0))
+    axes.bar([1, 2], [3, 4])
+    axes.set(yscale="log", ylim=(0.1, 10))
+    return figure, other
+
+
+def test_a_page_needs_nothing_but_itself():
+    text = page(*some())
+    assert not re.search(r"""(?:src|href)\s*=\s*["'](?!data:|#)""", text)
+    assert not re.search(r"@import|url\((?!data:|#)", text)
+    assert "<script" not in text
+    assert "prefers-color-scheme: dark" in text
+    assert "<code>taxel view &#39;a walk.mcap&#39;</code>." in text
+
+
+def opened(text, tmp_path, width=800):
+    """Return a page as a browser of this width, px, holds it after some seconds."""
+    place = tmp_path / "page.html"
+    place.write_text(text, encoding="utf-8")
+    asked = [
+        "--headless",
+        f"--window-size={width},900",
+        "--disable-gpu",
+        "--virtual-time-budget=4000",
+        f"--user-data-dir={tmp_path / 'profile'}",
+    ]
+    asked += ["--no-sandbox"] * (os.geteuid() == 0)
+    command = [shutil.which("chromium"), *asked, "--dump-dom", place.as_uri()]
+    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
+@pytest.mark.parametrize("width", [1400, 500])
+def test_a_browser_shows_figures_as_large_as_they_were_drawn_and_no_page_is_too_wide(tmp_path, width):
+    measured = (
+        "<p id=said></p><script>document.getElementById('said').textContent = JSON.stringify([innerWidth, "
+        "document.documentElement.scrollWidth, ...[...document.querySelectorAll('.picture svg')].map((e) => "
+        "Math.round(e.getBoundingClientRect().width))])</script></body>"
+    )
+    seen = opened(page(*some()).replace("</body>", measured), tmp_path, width)
+    inner, wide, *shown = json.loads(re.search(r'<p id="said">(.*?)</p>', seen)[1])
+    assert wide <= inner == width
+    # 6.4 and 12 inches of 96 pixels, which a narrow window makes smaller down to 34 rem.
+    least, room = 34 * 16, shown[1]
+    assert shown[0] == min(614, max(least, room))
+    assert (room == least) if width == 500 else (least < room <= 1152)
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
+@pytest.mark.parametrize("name", ["pick_test gripper_left_tactile", "a" * 60 + ".mcap", "s.mcap"])
+@pytest.mark.parametrize("width", [1400, 1100])
+def test_no_table_of_a_report_is_cut(tmp_path, name, width):
+    score = {"events": 1500, "found": 1400, "missed": 100, "false": 100}
+    score["error"] = score["delay"] = "-11.55 ± 105.4 (median -11.92, 95 % in -103.46 to 120.62)"
+    row = {"recording": name, "label": "contact", "detections": 1500, "score": score}
+    moment = {"label": "contact", "t": 123_456_789.0, "what": "missed"}
+    text = render(
+        "report/listening.html.j2",
+        title="t",
+        felt="",
+        readout="r",
+        judged="",
+        scored=True,
+        labels=[],
+        drawn={},
+        aligned={},
+        rows=[row],
+        held_out=[row],
+        worst=[(name, moment, 123.456789)],
+        begun=[(name, "2026-01-02 03:04:05 UTC")],
+        viewed=[],
+        outside=[],
+        beside=[("contact", "neuron", score), ("contact", "the area above 12 taxels for 3 ms", score)],
+    )
+    measured = (
+        "<p id=said></p><script>document.getElementById('said').textContent = JSON.stringify([innerWidth, "
+        "...[...document.querySelectorAll('.scroll')].map((e) => e.scrollWidth - e.clientWidth)])</script></body>"
+    )
+    seen = opened(text.replace("</body>", measured), tmp_path, width)
+    assert json.loads(re.search(r'<p id="said">(.*?)</p>', seen)[1]) == [width, 0, 0, 0, 0]
