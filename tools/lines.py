@@ -38,7 +38,7 @@ def code_lines(file: Path) -> int:
     rust = file.suffix == ".rs"
     kept = []
     for kind, text in get_lexer_for_filename(file.name, stripnl=False).get_tokens(file.read_text(encoding="utf-8")):
-        comment = kind in Comment and kind not in Comment.Preproc or kind in String.Doc
+        comment = (kind in Comment and kind not in Comment.Preproc) or kind in String.Doc
         literal = rust and (kind in String or kind in String.Char)
         kept.append(re.sub(r"[^\n]", "" if comment else "x", text) if comment or literal else text)
     text = "".join(kept)
