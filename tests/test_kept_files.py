@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel.detect import Example, Recipe, train
+from taxel.detect import Example, Recipe, fit
 
 KEPT = Path(__file__).parent / "data" / "kept"
 SAID = json.loads((KEPT / "said.json").read_text())
@@ -50,7 +50,7 @@ def test_a_recipe_trains_the_same_weights(events):
     example = Example(events, {"contact": [2_000_000, 3_000_000, 4_000_000]}, taxel.Tare.load(KEPT / "tare.json"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        readout = train([example], recipe)
+        readout = fit([example], recipe)
     weights = readout.neurons["contact"].weights
     assert np.allclose(weights, SAID["weights"], rtol=0, atol=1e-5)
 

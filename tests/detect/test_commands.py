@@ -97,7 +97,7 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
 
 def test_the_command_and_the_function_train_the_same(trained: Path) -> None:
     examples = [taxel.detect.Example(*touches(seed), tare()) for seed in (1, 2)]
-    assert taxel.Readout.load(trained) == taxel.detect.train(examples, recipe())
+    assert taxel.Readout.load(trained) == taxel.detect.fit(examples, recipe())
 
 
 def test_the_recording_of_a_folder_that_does_not_fit_is_named(tmp_path: Path, trained: Path, capsys) -> None:
@@ -606,19 +606,19 @@ def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_pa
 
 
 def test_an_example_may_be_a_recording(folder: Path) -> None:
-    from taxel.detect import Example, train
+    from taxel.detect import Example, fit
 
     one = taxel.open(folder / "1.npz")
     labels = taxel.Labels(folder / "labels.csv").of(one)
     trained = [
-        train([Example(source, labels, tare())], taxel.detect.Recipe.load(folder / "recipe.toml"))
+        fit([Example(source, labels, tare())], taxel.detect.Recipe.load(folder / "recipe.toml"))
         for source in (one, one.events)
     ]
     assert trained[0] == trained[1]
     with pytest.raises(
         taxel.ProblemError, match=r"example 0 is .*: must be an Example of a Recording, Events, Frames or SpikeTrains"
     ):
-        train([Example("1.npz", labels)], taxel.detect.Recipe.load(folder / "recipe.toml"))
+        fit([Example("1.npz", labels)], taxel.detect.Recipe.load(folder / "recipe.toml"))
 
 
 def test_times_since_1970_are_written_from_the_beginning_on(folder: Path, trained: Path, capsys, tmp_path: Path):

@@ -327,7 +327,7 @@ def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path
     grid = Frames(values, np.arange(400) * 1000)
     recipe = Recipe(LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
     example = Example(grid, {"contact": [100_000, 250_000]}, Tare.take(grid, stop_us=50_000))
-    taxel.detect.train([example], recipe).save(tmp_path / "readout.json")
+    taxel.detect.fit([example], recipe).save(tmp_path / "readout.json")
     said = call(capsys, "detect", tmp_path / "flat.npy", "--readout", tmp_path / "readout.json", "--tare", "0.05")[2]
     assert "1 x 12 taxels: the readout was trained on 3 x 4; give --array 3x4, or rows and columns in a layout" in said
 

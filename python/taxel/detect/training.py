@@ -33,7 +33,7 @@ from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
-__all__ = ["Trained", "train"]
+__all__ = ["Trained", "fit"]
 
 
 #: Parameters of a learner that its rows do not depend on. Bounds could be among them, but that those of a train without
@@ -84,7 +84,7 @@ class Trained(NamedTuple):
     alignments: Mapping[str, Alignment]
 
 
-def train(
+def fit(
     examples: Sequence[Example],
     recipe: Recipe,
     *,
@@ -123,14 +123,14 @@ def train(
     >>> from taxel.encode import LevelCrossing
     >>> frames = Frames([[[v]] for v in (0.0, 0.0, 9.0, 9.0, 0.0, 0.0)], range(0, 60_000, 10_000), unit="N")
     >>> recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
-    >>> train([Example(frames, {"contact": [20_000]})], recipe)
+    >>> fit([Example(frames, {"contact": [20_000]})], recipe)
     Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
     """
     return trained(examples, recipe, progress).readout
 
 
 def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str], object] | None) -> Trained:
-    """Train a readout as `train` does, and return how its labels were aligned as well."""
+    """Train a readout as `fit` does, and return how its labels were aligned as well."""
     sound, clocks = checked(examples), [clock_of(one) for one in examples]
     report = (lambda _: None) if progress is None else callback("progress", progress)
     recipe = in_pictures(instance("recipe", recipe, Recipe), sound, clocks)
@@ -220,7 +220,7 @@ def readout_of(
 
 
 def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
-    """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
+    """Fit the learner of each of a recipe's labels on encoded examples; see `fit`."""
     learners, delays, alignments, ranges = {}, {}, {}, {}
     points = dict(recipe.neurons)
     for label in _labels_to_learn(examples.patterns, recipe):
