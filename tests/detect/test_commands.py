@@ -16,8 +16,8 @@ from test_readout import ARRAY, recipe, tare, touches
 import taxel
 from taxel import _core
 from taxel.cli import main
-from taxel.cli._recordings import references
 from taxel.report.svg import picture
+from taxel.tasks.labels import references
 
 
 @pytest.fixture(scope="module")
@@ -433,7 +433,7 @@ def test_a_note_behind_the_last_picture_is_left_out_and_said(tmp_path: Path, lat
     taxel.convert(frames, tmp_path / "mat.npz")
     (tmp_path / "mat.notes.csv").write_text(f"label,t_us\ntouch,400000\ntouch,{990_000 + late_us}\n")
     with pytest.warns(UserWarning, match="1 of the 2 events of the notes of ") if left_out else nullcontext():
-        [events] = references("notes", "--labels", [taxel.open(tmp_path / "mat.npz")])
+        [events] = references("notes", [taxel.open(tmp_path / "mat.npz")])
     assert len(events["touch"]) == 1 + (not left_out)
 
 

@@ -23,6 +23,7 @@ from taxel import Array, Calibration, Frames
 from taxel.cli._opening import FileOptions
 from taxel.cli.view import _opening
 from taxel.live import Panel
+from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import recordings_in
 
 KINDS = ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")
@@ -87,8 +88,8 @@ def test_the_command_that_trains_in_a_shell_has_the_options_and_quotes_what_need
 
 def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
     bag, _ = palms(tmp_path, "grasp.bag")
-    opened_as, joined = [], FileOptions.joined
-    monkeypatch.setattr(FileOptions, "joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
+    opened_as, joined = [], OpenOptions.joined
+    monkeypatch.setattr(OpenOptions, "joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
     for shown in (bag, Path("grasp.bag")):
         monkeypatch.chdir(tmp_path)
         opened_as.clear()

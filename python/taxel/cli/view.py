@@ -90,7 +90,7 @@ def view(
                 port=panel_port,
                 opens=reading,
                 layout=files.layout,
-                options=files.words(),
+                options=files.opener.words(),
                 rate_hz=files.rate_hz,
             )
         )
@@ -123,13 +123,13 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         return None
     first = every[0]
     bag = is_bag(first)
-    if bag and not files.names_topic(first):
+    if bag and not files.opener.names_topic(first):
         raise ProblemError(*listed(first, topics(first, files.types, files.ros), as_json=False))
-    if not files.words() and calibration is None and not bag:
+    if not files.opener.words() and calibration is None and not bag:
         return None
 
     def opens(file: Path) -> list[Recording]:
-        opened = files.joined(file)
+        opened = files.opener.joined(file)
         if calibration is None:
             return opened
         return [Recording(calibrated_by(one._contents, calibration)) for one in opened]

@@ -12,7 +12,7 @@ from taxel.recording.fates import after
 from taxel.recording.notes import Zeroing
 from taxel.recording.recording import Recording
 
-__all__ = ["cut", "region"]
+__all__ = ["cut", "region", "span_us"]
 
 
 def cut(
@@ -138,3 +138,11 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
         ),
         columns=None if of.columns is None else of.columns[left:right],
     )
+
+
+def span_us(recording: Recording) -> tuple[int, int]:
+    """Return the first and the last time of a recording; refuse an empty one."""
+    times = recording.events.t if recording.has_events else recording.frames().t
+    if not len(times):
+        raise ProblemError(f"{recording.path}: holds nothing")
+    return int(times.min()), int(times.max())
