@@ -17,7 +17,7 @@ use tokio::sync::{Notify, OwnedMutexGuard};
 
 use super::clients::{Broadcast, Clients};
 use super::folder::Folder;
-use super::handler::{Reply, RequestHandler, UserPresets};
+use super::handler::{Reply, RequestHandlers, UserPresets};
 use super::labels::LabelTables;
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::live_source::LiveSource;
@@ -46,7 +46,7 @@ pub(super) struct BoardState {
 /// See the module.
 pub(super) struct Hub {
     options: PanelOptions,
-    handler: Arc<dyn RequestHandler>,
+    handlers: Arc<RequestHandlers>,
     live: Mutex<Option<Arc<LiveSource>>>,
     /// Labels of the readout that runs.
     readout: Mutex<Option<Vec<String>>>,
@@ -65,16 +65,12 @@ pub(super) struct Hub {
 }
 
 impl Hub {
-    pub(super) fn new(
-        options: PanelOptions,
-        live: Option<Handle>,
-        handler: Box<dyn RequestHandler>,
-    ) -> Result<Arc<Self>> {
+    pub(super) fn new(options: PanelOptions, live: Option<Handle>, handlers: RequestHandlers) -> Result<Arc<Self>> {
         let board = BoardState { control: options.control.clone(), ..BoardState::default() };
         let hub = Arc::new(Self {
             folder: Folder::new(options.folder.clone()),
             options,
-            handler: handler.into(),
+            handlers: Arc::new(handlers),
             live: Mutex::default(),
             readout: Mutex::default(),
             board: Mutex::new(board),
@@ -151,10 +147,10 @@ impl Hub {
     /// Makes a request of the program that started the panel, in a thread where it may block.
     pub(super) async fn ask<T: Send + 'static>(
         &self,
-        request: impl FnOnce(&dyn RequestHandler) -> Reply<T> + Send + 'static,
+        request: impl FnOnce(&RequestHandlers) -> Reply<T> + Send + 'static,
     ) -> Reply<T> {
-        let handler = Arc::clone(&self.handler);
-        let answer = tokio::task::spawn_blocking(move || request(&*handler)).await;
+        let handlers = Arc::clone(&self.handlers);
+        let answer = tokio::task::spawn_blocking(move || request(&handlers)).await;
         answer.unwrap_or_else(|_| Err("failed within taxel; please report it".to_owned()))
     }
 
@@ -220,7 +216,7 @@ impl Hub {
 
     /// Sends the new lines of the board's serial line to the clients.
     async fn read_board_lines(&self) {
-        if let Ok(new) = self.ask(|handler| handler.board_lines()).await {
+        if let Ok(new) = self.ask(|handlers| handlers.board.board_lines()).await {
             for line in new.lines {
                 self.clients.send_json(&json!({ "type": "board_line", "at_ns": now_ns(), "text": line }));
             }
@@ -297,7 +293,7 @@ impl Hub {
     /// The recordings of the folder.
     pub(super) async fn recordings_message(&self) -> Value {
         let folder = self.folder.path().to_owned();
-        let names = self.ask(move |handler| handler.recordings(&folder)).await.unwrap_or_else(|reason| {
+        let names = self.ask(move |handlers| handlers.files.recordings(&folder)).await.unwrap_or_else(|reason| {
             self.clients.send_json(&messages::warning(reason));
             vec![]
         });

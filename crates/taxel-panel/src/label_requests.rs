@@ -41,7 +41,7 @@ pub(super) async fn read(hub: &Hub, recording: &str, us: i64) -> Answer {
 /// What changes with the table; the reason where that cannot be determined.
 async fn stamp(hub: &Hub, recording: &str) -> String {
     match hub.folder.file(&file_of(recording)) {
-        Ok(table) => hub.ask(move |handler| handler.label_stamp(&table)).await.unwrap_or_else(|reason| reason),
+        Ok(table) => hub.ask(move |handlers| handlers.labels.stamp(&table)).await.unwrap_or_else(|reason| reason),
         Err(error) => error.to_string(),
     }
 }
@@ -53,7 +53,7 @@ async fn reread(hub: &Hub, recording: &str, stamp: String, us: i64) -> Answer<bo
     hub.labels.opens(recording, stamp, us);
     let table = hub.folder.file(&file_of(recording))?;
     let name = recording.to_owned();
-    let (read, exists) = hub.ask(move |handler| Ok((handler.read_labels(&table, &name)?, table.exists()))).await?;
+    let (read, exists) = hub.ask(move |handlers| Ok((handlers.labels.read(&table, &name)?, table.exists()))).await?;
     let there = exists || !read.conflict.is_empty();
     Ok(hub.labels.replace(recording, there.then(|| read.in_view(us))))
 }
@@ -171,7 +171,7 @@ async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdi
     let requests: Vec<Vec<_>> = edits.iter().flatten().map(in_file).collect();
     let recording = name.to_owned();
     let (outcomes, read): (Vec<EditOutcome>, LabelTable) =
-        hub.ask(move |handler| handler.change_labels(&table, &recording, &requests)).await?;
+        hub.ask(move |handlers| handlers.labels.change(&table, &recording, &requests)).await?;
     let mut outcomes = outcomes.into_iter();
     let mut answers = vec![];
     for request in edits {
@@ -207,7 +207,7 @@ pub(super) async fn settle(hub: &Hub, shown: Option<&Shown>, request: &Request<'
         Refusal::of("conflict_id", "this conflict is settled, or the file has changed since: look at it again")
     })?;
     let (recording, conflict) = (name.clone(), conflict.in_file(us));
-    let read = hub.ask(move |handler| handler.settle_labels(&table, &recording, &conflict, restore)).await?;
+    let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, &conflict, restore)).await?;
     hub.labels.replace(&name, Some(read.in_view(us)));
     hub.clients.send(Broadcast::Labels(name));
     Ok(())

@@ -157,7 +157,7 @@ struct KnownTable {
     labels: Option<Vec<Label>>,
     conflict: LabelConflict,
     conflict_id: u64,
-    /// What [`RequestHandler::label_stamp`](super::RequestHandler::label_stamp) returned, or its reason, before it was read.
+    /// What [`LabelRequests::stamp`](super::LabelRequests::stamp) returned, or its reason, before it was read.
     stamp: String,
     /// One us of the file in the view.
     us: i64,

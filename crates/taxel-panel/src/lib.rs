@@ -3,7 +3,7 @@
 //! One thread serves all clients. It works on copies of the events ([`taxel_live::pipeline::ViewerEvents`]) and sends a picture
 //! only when a client has asked for one, so that a client that reads slowly, or never, delays nothing but its own
 //! pictures. What takes long or belongs to other parts of the program (the board's serial line, cutting, label tables) is
-//! left to the program that started the panel, through [`RequestHandler`].
+//! left to the program that started the panel, through [`RequestHandlers`].
 
 mod array_state;
 pub mod assets;
@@ -40,8 +40,9 @@ mod weights;
 
 pub use array_state::RestSource;
 pub use handler::{
-    BoardLines, Cut, Detected, EditOutcome, LabelConflict, LabelEdit, LabelRow, LabelTable, Opening, PicturesRead,
-    PresetValue, ReadFile, Reply, RequestHandler, UnhealthyTaxels, UserPreset, UserPresets,
+    BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, LabelConflict, LabelEdit, LabelRequests,
+    LabelRow, LabelTable, Opening, PicturesRead, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
+    TrainingRequests, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
 pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource};

@@ -67,7 +67,7 @@ fn of_a_board(path: &Path) -> Result<Option<Arc<RecordingIndex>>> {
 /// Reads a file by the program that started the panel; also returns how long the rest of the file takes, s.
 async fn read(hub: &Hub, path: &Path, trial: Option<&str>, opening: Opening) -> Result<(Indexed, Option<f64>)> {
     let (file, trial) = (path.to_owned(), trial.map(str::to_owned));
-    let answer: Reply<ReadFile> = hub.ask(move |handler| handler.read(&file, trial.as_deref(), opening)).await;
+    let answer: Reply<ReadFile> = hub.ask(move |handlers| handlers.files.read(&file, trial.as_deref(), opening)).await;
     match answer.map_err(|reason| problem!("{reason}"))? {
         ReadFile::Events(mcap) => {
             let index = tokio::task::spawn_blocking(move || RecordingIndex::open(&mcap)).await;

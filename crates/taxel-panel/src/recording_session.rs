@@ -67,7 +67,7 @@ async fn write_record_register(hub: &Hub, record: bool) {
         return;
     }
     let command = Command { register: 7, value: if record { RECORD } else { 0 } };
-    match hub.ask(move |handler| handler.command(command)).await {
+    match hub.ask(move |handlers| handlers.board.command(command)).await {
         Ok(_) => {
             hub.board().registers.record = record;
             hub.clients.send_json(&hub.registers_message());

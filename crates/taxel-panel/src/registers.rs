@@ -26,11 +26,11 @@ pub(super) async fn read(hub: &Hub) -> Answer {
     }
     let before = hub.board().registers.channels;
     // The number of channels is no register: it is in the board's greeting. A board without one has as many as it had.
-    let channels = hub.ask(|handler| handler.channels()).await.unwrap_or(before);
+    let channels = hub.ask(|handlers| handlers.board.channels()).await.unwrap_or(before);
     let mut words = [0; 8];
     for register in READABLE {
         let command = Command { register: 6, value: register.into() };
-        words[usize::from(register)] = hub.ask(move |handler| handler.command(command)).await?;
+        words[usize::from(register)] = hub.ask(move |handlers| handlers.board.command(command)).await?;
     }
     hold(hub, Registers::of_words(&words, channels));
     if channels != before {
@@ -77,7 +77,7 @@ async fn write(hub: &Hub, target: Registers, all: bool) -> Answer {
         commands.extend(others.map(|register| Command { register, value: target.word(register) }));
     }
     for command in commands {
-        if let Err(reason) = hub.ask(move |handler| handler.command(command)).await {
+        if let Err(reason) = hub.ask(move |handlers| handlers.board.command(command)).await {
             // What the board holds now is not certain, so its registers are read; the refusal is that of the write.
             let _ = read(hub).await;
             return Err(reason.into());
@@ -134,7 +134,7 @@ async fn reread_presets(hub: &Hub) -> Answer {
 }
 
 async fn read_presets(hub: &Hub) -> Answer {
-    let read = hub.ask(|handler| handler.read_presets()).await?;
+    let read = hub.ask(|handlers| handlers.presets.read()).await?;
     *hub.presets() = read;
     Ok(())
 }
@@ -142,7 +142,7 @@ async fn read_presets(hub: &Hub) -> Answer {
 async fn write_presets(hub: &Hub, turn: OwnedMutexGuard<()>) -> Answer {
     let UserPresets { presets, .. } = hub.presets().clone();
     // The lock is held until the file is written, also if the client disconnects.
-    let (written, turn) = hub.ask(move |handler| Ok((handler.write_presets(&presets), turn))).await?;
+    let (written, turn) = hub.ask(move |handlers| Ok((handlers.presets.write(&presets), turn))).await?;
     written?;
     drop(turn);
     hub.clients.send_json(&hub.presets_message());

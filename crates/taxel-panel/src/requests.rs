@@ -48,10 +48,10 @@ pub(super) async fn carry_out(
         "cut" => return cut(&hub, shown, &request).await.map(Some),
         "train" => return train(&hub, shown).await.map(Some),
         "training" => {
-            let text = hub.ask(|handler| handler.training_progress()).await?;
+            let text = hub.ask(|handlers| handlers.training.progress()).await?;
             return Ok(Some(json!({ "type": "training", "text": text })));
         }
-        "train_stop" => hub.ask(|handler| handler.end_training()).await?,
+        "train_stop" => hub.ask(|handlers| handlers.training.end()).await?,
         "read_out" => return read_out(&hub, shown, &request).await,
         "recordings" => return Ok(Some(hub.recordings_message().await)),
         "rest" => rest(&hub, &request)?,
@@ -60,13 +60,13 @@ pub(super) async fn carry_out(
         "delta_intensity" => {
             check_restart(&hub)?;
             let on = request.flag("on")?;
-            hub.ask(move |handler| handler.set_differences(on)).await?;
+            hub.ask(move |handlers| handlers.board.set_differences(on)).await?;
         }
         "listen" => {
             check_restart(&hub)?;
             let (host, port) = (request.text("host", 255)?.to_owned(), request.whole("port", 0, 65_535)?);
             let port = u16::try_from(port).unwrap_or(u16::MAX);
-            hub.ask(move |handler| handler.listen(&host, port)).await?;
+            hub.ask(move |handlers| handlers.board.listen(&host, port)).await?;
         }
         "control" => control(&hub, &request).await?,
         _ => return Err(format!("type {what:?} is none of the protocol's").into()),
@@ -94,7 +94,7 @@ async fn control(hub: &Hub, request: &Request<'_>) -> Answer {
     let place = request.optional_text("place", 255)?.map(str::to_owned);
     let connected = {
         let place = place.clone();
-        hub.ask(move |handler| handler.connect(place.as_deref())).await
+        hub.ask(move |handlers| handlers.board.connect(place.as_deref())).await
     };
     let connects = place.is_some();
     {
@@ -109,7 +109,7 @@ async fn control(hub: &Hub, request: &Request<'_>) -> Answer {
 
 async fn places(hub: &Hub) -> Answer<Value> {
     let serial = tokio::task::spawn_blocking(ports).await.map_err(|_| Refusal::bug("places:"))??;
-    let addresses = hub.ask(|handler| handler.addresses()).await?;
+    let addresses = hub.ask(|handlers| handlers.board.addresses()).await?;
     let addresses: Vec<_> = addresses.into_iter().map(|(host, name)| json!({ "host": host, "name": name })).collect();
     Ok(json!({ "type": "places", "serial": serial, "addresses": addresses }))
 }
@@ -176,7 +176,7 @@ async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
     let name = &shown.ok_or("train: open a recording with labels first")?.name;
     let readout = readout_of(name);
     let (recording, out) = (hub.folder.file(name)?, hub.folder.file(&readout)?);
-    let text = hub.ask(move |handler| handler.train(&recording, &out)).await?;
+    let text = hub.ask(move |handlers| handlers.training.train(&recording, &out)).await?;
     hub.clients.send_json(&hub.recordings_message().await);
     Ok(json!({ "type": "trained", "name": name, "readout": readout, "text": text }))
 }
@@ -192,12 +192,12 @@ async fn read_out(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> An
     let path = hub.folder.file(readout).map_err(|error| Refusal::of("readout", error))?;
     let Some(Shown { name, trial, .. }) = shown.cloned() else {
         check_restart(hub)?;
-        hub.ask(move |handler| handler.read_out(&path)).await?;
+        hub.ask(move |handlers| handlers.board.read_out(&path)).await?;
         return Ok(None);
     };
     let recording = hub.folder.file(&name)?;
     let Detected { labels, detections } =
-        hub.ask(move |handler| handler.detect(&recording, trial.as_deref(), &path)).await?;
+        hub.ask(move |handlers| handlers.training.detect(&recording, trial.as_deref(), &path)).await?;
     let one = |(label, t, known)| json!({ "label": label, "t_us": t, "known_us": known });
     let found: Vec<_> = detections.into_iter().map(one).collect();
     Ok(Some(json!({
@@ -218,7 +218,7 @@ async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
         Some(Shown { indexed: Indexed::Events(index), .. }) => (index.header().array.clone(), index.activity.clone()),
         Some(Shown { name, trial, indexed: indexed @ Indexed::Pictures(_) }) => {
             let (path, trial, taxels) = (hub.folder.file(name)?, trial.clone(), taxels(indexed.index().array()));
-            let found = hub.ask(move |handler| handler.health_of_pictures(&path, trial.as_deref())).await?;
+            let found = hub.ask(move |handlers| handlers.files.health_of_pictures(&path, trial.as_deref())).await?;
             let UnhealthyTaxels { dead, stuck, noisy, untold } = found;
             return Ok(json!({
                 "type": "health", "source": name, "taxels": taxels, "heard": taxels, "dead": dead, "stuck": stuck,
@@ -234,7 +234,7 @@ async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
     let taxels = taxels(&array);
     let with_events = activity.events.iter().filter(|&&n| n > 0).count();
     let UnhealthyTaxels { dead, stuck, noisy, untold } =
-        hub.ask(move |handler| handler.health(&array, &activity)).await?;
+        hub.ask(move |handlers| handlers.files.health(&array, &activity)).await?;
     Ok(json!({
         "type": "health", "source": name, "taxels": taxels, "heard": with_events, "dead": dead, "stuck": stuck,
         "noisy": noisy, "untold": untold,
@@ -257,7 +257,9 @@ async fn cut(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> Answer<
     let in_file = |t: i64| -(-t).div_euclid(us);
     let (start_us, stop_us) = (in_file(start_us), in_file(stop_us));
     let lost = hub
-        .ask(move |handler| handler.cut(&Cut { path: &path, trial: trial.as_deref(), out: &out, start_us, stop_us }))
+        .ask(move |handlers| {
+            handlers.files.cut(&Cut { path: &path, trial: trial.as_deref(), out: &out, start_us, stop_us })
+        })
         .await?;
     hub.clients.send_json(&hub.recordings_message().await);
     Ok(json!({ "type": "cut", "name": to, "lost": lost }))

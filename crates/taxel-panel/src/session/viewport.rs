@@ -510,7 +510,7 @@ impl Viewport {
         let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;
         let (file, out) =
             (hub.folder.file(&name).map_err(refused)?, hub.folder.file(&readout_of(&name)).map_err(refused)?);
-        let train = hub.ask(move |handler| handler.train_command(&file, &out)).await?;
+        let train = hub.ask(move |handlers| handlers.training.command(&file, &out)).await?;
         let mut answer = vec![indexed.opened(&name, bytes, &train, begun)];
         let index = indexed.index();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
