@@ -92,9 +92,7 @@ SOUND: dict[str, Sound] = {
         port=0,
         host="127.0.0.1",
         opens=taxel.open,
-        layout=None,
-        options=["--rate-hz", "100"],
-        rate_hz=100.0,
+        options=taxel.tasks.OpenOptions(rate_hz=100.0),
     ),
     "taxel.live.send": plain(
         taxel.live.send,

@@ -1,17 +1,15 @@
-"""The progress and the warnings of a task: what one callback gets, how long it takes, what is said once."""
+"""The progress of a task: what its callback gets, and about how long all takes."""
 
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from time import perf_counter
 from typing import TypeAlias
 
 from taxel._base.arguments import callback
 
-__all__ = ["Progress", "Steps", "collected", "lines_to"]
+__all__ = ["Progress", "Steps", "lines_to"]
 
 #: Called with what is done next, how much of it is done, and all of it (0 if that is not known).
 Progress: TypeAlias = Callable[[str, int, int], object]
@@ -32,16 +30,6 @@ def lines_to(progress: Progress | None) -> Callable[[str], object]:
         show(step, int(fold[1]) - 1 if fold else 0, int(fold[2]) if fold else 0)
 
     return line
-
-
-@contextmanager
-def collected() -> Iterator[list[str]]:
-    """Collect the warnings of a task as texts, each once, in a list that is filled at the end."""
-    texts: list[str] = []
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield texts
-    texts += dict.fromkeys(str(one.message) for one in caught if issubclass(one.category, UserWarning))
 
 
 class Steps:

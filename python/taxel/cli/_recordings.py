@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from taxel._base.arguments import short
 from taxel._base.documents import NotTomlError, of_toml
-from taxel._base.messages import escaped
-from taxel._base.progress import Steps, collected
+from taxel._base.messages import collected, escaped
+from taxel._base.progress import Steps
 from taxel._core import ProblemError
 from taxel.cli._say import say
 

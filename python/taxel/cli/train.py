@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from taxel._base.messages import collected
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP, SET_HELP, TARE_HELP, assignments, progress, say_warnings, try_report
@@ -139,7 +140,6 @@ def train(
 def _try_rules(place: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:
     """Check that plain rules can be written, before the work whose result they hold."""
     from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel._base.progress import collected  # noqa: PLC0415
     from taxel.tasks.labels import references  # noqa: PLC0415
 
     if place is None:

@@ -89,9 +89,7 @@ def view(
                 host=panel_host,
                 port=panel_port,
                 opens=reading,
-                layout=files.layout,
-                options=files.opener.words(),
-                rate_hz=files.rate_hz,
+                options=files.opener,
             )
         )
         external = viewers(shown, panel, to or (), spikes, 1.0 if speed is None else speed)

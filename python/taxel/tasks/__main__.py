@@ -44,8 +44,8 @@ from typing import Any, NoReturn, TypeAlias
 
 from taxel._base.arguments import mapping, shown
 from taxel._base.files import try_whole
-from taxel._base.messages import escaped
-from taxel._base.progress import Progress, collected
+from taxel._base.messages import collected, escaped
+from taxel._base.progress import Progress
 from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import Error, ProblemError
 from taxel.detect import load

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several
-from taxel._base.progress import collected
+from taxel._base.messages import collected
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration, Load

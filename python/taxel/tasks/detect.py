@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from taxel._base.arguments import finite, instance, number
-from taxel._base.messages import counted, warn
-from taxel._base.progress import Progress, collected, lines_to
+from taxel._base.messages import collected, counted, warn
+from taxel._base.progress import Progress, lines_to
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, score
 from taxel.detect.advice import drifted

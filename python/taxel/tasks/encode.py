@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from taxel._base.arguments import callback, instance, mapping, parameters, text
-from taxel._base.messages import counted
-from taxel._base.progress import Progress, collected
+from taxel._base.messages import collected, counted
+from taxel._base.progress import Progress
 from taxel.encode import Encoder
 from taxel.recording import Recording
 from taxel.spikes import SpikeTrains

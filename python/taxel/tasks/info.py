@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taxel._base.arguments import instance
-from taxel._base.progress import collected
+from taxel._base.messages import collected
 from taxel.recording import Recording
 from taxel.recording.pressure import Series, series
 from taxel.recording.summary import summary

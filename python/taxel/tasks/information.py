@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from taxel._base.arguments import callback, instance, several, whole
-from taxel._base.messages import counted
-from taxel._base.progress import Progress, collected
+from taxel._base.messages import collected, counted
+from taxel._base.progress import Progress
 from taxel._core import ProblemError
 from taxel.encode import Encoder
 from taxel.information import Answer, LabelledTrial, answer, folds, notes_as_trials, read_trials, recordings_as_trials

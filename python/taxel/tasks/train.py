@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
-from taxel._base.messages import warn
-from taxel._base.progress import Progress, collected, lines_to
+from taxel._base.messages import collected, warn
+from taxel._base.progress import Progress, lines_to
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, PlainScore, Recipe, choose, judge, recipes, score
 from taxel.detect.advice import advised, fallen
