@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from taxel._base.messages import collected
+from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP, SET_HELP, TARE_HELP, assignments, progress, say_warnings, try_report
@@ -171,5 +172,17 @@ def _of_label(place: Path, label: str) -> Path:
 
 def _next(training: Training, out: Path, tare: str | None) -> str:
     """Return the command that detects by a readout, with the --tare, if any, of the training."""
-    again = tare if tare is not None and training.readout._needs_tare else None
-    return f"taxel detect RECORDING --readout {quote(str(out))}" + (f" --tare {quote(again)}" if again else "")
+    again = tare or ("" if _are_quiet(training.recordings) else training.beginning())
+    option = f" --tare {quote(again)}" if again and training.readout._needs_tare else ""
+    return f"taxel detect RECORDING --readout {quote(str(out))}{option}"
+
+
+def _are_quiet(recordings: Sequence[Recording]) -> bool:
+    """Return whether a detection finds the rest of each recording by itself."""
+    from taxel.tasks import rest  # noqa: PLC0415  the command line starts quickly
+
+    try:
+        with collected():
+            return all(rest(one) for one in recordings)
+    except ProblemError:
+        return False

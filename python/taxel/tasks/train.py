@@ -149,8 +149,8 @@ def _examples(
     ]
 
 
-def _taken(examples: Sequence[Example]) -> tuple[tuple[int, int], ...]:
-    """Return from when to when each recording's tare was taken, us, from its beginning on.
+def _taken(examples: Sequence[Example]) -> tuple[tuple[int, int, int], ...]:
+    """Return from when to when each recording's tare was taken, and how long it lasts, us.
 
     Of those whose rest is 0 by their unit nothing.
     """
@@ -159,7 +159,7 @@ def _taken(examples: Sequence[Example]) -> tuple[tuple[int, int], ...]:
         source = recorded(one.source)
         if one.tare is not None and one.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
             first = int(source.t[0])
-            spans.append((one.tare.start_us - first, one.tare.stop_us - first))
+            spans.append((one.tare.start_us - first, one.tare.stop_us - first, int(source.t[-1]) - first))
     return tuple(spans)
 
 

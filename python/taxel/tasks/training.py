@@ -93,8 +93,8 @@ class Training:
         What may help each label of which many are missed or false, and the cause.
     outcomes : sequence of taxel.detect.Outcome
         What the readout detects in its own training data.
-    tares_us : sequence of (int, int), us
-        From when to when the tare of each recording was taken from it, from its beginning on; none of given tares.
+    tares_us : sequence of (int, int, int), us
+        From when to when the tare of each recording was taken from it, and how long it lasts; none of given tares.
     warned : tuple of str
         The warnings of the training.
     """
@@ -106,7 +106,7 @@ class Training:
     why: str
     advice: Mapping[str, Advice]
     outcomes: Sequence[Outcome]
-    tares_us: Sequence[tuple[int, int]]
+    tares_us: Sequence[tuple[int, int, int]]
     warned: tuple[str, ...] = ()
 
     @property
@@ -189,14 +189,21 @@ class Training:
             lines += ["", "all recordings:", *repr(self.scored.together).split("\n")]
         return lines
 
+    def beginning(self) -> str:
+        """Return the seconds at rest at the beginning of each recording, for ``--tare``; "" where none is needed."""
+        if not self.tares_us or any(begin > 0 for begin, *_ in self.tares_us):
+            return "SECONDS" if self.tares_us else ""
+        # More than half of a recording is refused.
+        return f"{min(min(end, lasts // 2) for _, end, lasts in self.tares_us) / 1e6:g}"
+
     def _tares(self) -> Iterator[str]:
         """Yield the line of which tares were taken from the recordings."""
         if not self.tares_us:
             return
-        lengths = [to_ms(end - begin) for begin, end in self.tares_us]
+        lengths = [to_ms(end - begin) for begin, end, _ in self.tares_us]
         said = f"of each of {len(lengths)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long"
         if len(lengths) == 1:
-            said = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0]))
+            said = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
         yield f"tare: {said}; --tare gives another"
 
     def _scores(self, label: str) -> Iterator[str]:

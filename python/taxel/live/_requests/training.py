@@ -60,9 +60,7 @@ class TrainingRequests:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
             self._steps = Steps()
             # A process of its own, so that it takes no time from what arrives.
-            self._training = ChildProcess(
-                "taxel.tasks", ["train"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-            )
+            self._training = ChildProcess("taxel.tasks", ["train"], stdin=PIPE, stdout=PIPE, text=True)
         try:
             said = self._answer(self._training, request | {"out": str(out), "overwrite": True})
             code = self._training.returncode
