@@ -79,7 +79,6 @@ def calibrate(
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {start} and --to {stop} s: --from must not be after --to")
     options = CalibrateOptions(law, assignments(set_ or []), table, unit, each, exponent, tare, date, note)
-    options.check(loaded=load is not None or loads is not None)
     opened = files.opener.one(recording)
     place = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)

@@ -72,7 +72,6 @@ def detect(
     if report is not None:
         try_report(report)
     options = DetectOptions(tare, frame_us, window_ms)
-    options.check()  # before the recordings are read
     loaded = load(readout)
     with progress(as_json) as update:
         update(f"reading {recording}", 0, 0)

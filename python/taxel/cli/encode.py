@@ -42,7 +42,6 @@ def encode(
 
     try_whole(out, overwrite=overwrite)
     options = EncodeOptions(encoder, assignments(values or []), tare)
-    options.chosen()  # before the recording is read
     with progress(as_json) as update:
         update(f"reading {recording}", 0, 0)
         encoded = encode_by(files.opener.one(recording), options, progress=update)

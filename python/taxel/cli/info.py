@@ -84,7 +84,7 @@ def info(
         return
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {file}", 0, 0)
-        if file.exists() and is_bag(file) and not files.opener.names_topic(file):
+        if file.exists() and is_bag(file) and not files.opener._names_topic(file):
             say(*listed(file, topics(file, files.types, files.ros), as_json))
             return
         opened = files.opener.open(file)

@@ -88,7 +88,6 @@ def information(
         seed,
         [name for name in classifiers.split(",") if name],
     )
-    options.chosen()  # before the recordings are read
     known, trials = _Known(), ""
     try:
         # `progress` prints the warnings; the bar shows the steps.

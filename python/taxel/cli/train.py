@@ -105,7 +105,6 @@ def train(
         key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
     }
     options = TrainOptions(recipe, changes, tare, folds, search, window_ms)
-    options.check()  # before the recordings are read
     with progress(as_json) as update:
         update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3), 0, 0)
         opened = files.opener.all(recordings)

@@ -121,7 +121,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         return None
     first = every[0]
     bag = is_bag(first)
-    if bag and not files.opener.names_topic(first):
+    if bag and not files.opener._names_topic(first):
         raise ProblemError(*listed(first, topics(first, files.types, files.ros), as_json=False))
     if not files.opener.words() and calibration is None and not bag:
         return None

@@ -8,7 +8,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import instance, several
+from taxel._base.arguments import instance, several, text
+from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout
@@ -51,18 +52,20 @@ class OpenOptions:
     rate_hz: float | None = None
     limit: int | None = None
 
-    def open(self, path: Path) -> Recording | list[Recording]:
+    def open(self, path: str | os.PathLike[str]) -> Recording | list[Recording]:
         """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
 
         Raises
         ------
         ProblemError : an `array` that differs from the sensor that a file holds; a `rate_hz` of one with times
         """
-        arrays = [of_size(size, of_wire=False) for size in self.array or ()]
+        place = Path(checked_path("path", path))
+        given = [] if self.array is None else several("array", self.array)
+        arrays = [of_size(text("array", size), of_wire=False) for size in given]
         opened = open_any(
-            path,
+            place,
             array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
-            layout=self.layout or self._instead_of_layout(path),
+            layout=self.layout or self._instead_of_layout(place),
             topic=self.topic,
             field=self.field,
             types=self.types,
@@ -86,7 +89,7 @@ class OpenOptions:
                 words += [f"--{name.replace('_', '-')}", str(each)]
         return words
 
-    def names_topic(self, bag: Path) -> bool:
+    def _names_topic(self, bag: Path) -> bool:
         """Return whether these options, or the layout file of a ROS bag, say which topic to open."""
         place = self.layout or Layout.beside(bag)
         return bool(self.topic) or (place is not None and "topic" in Layout.read(Path(place)).ros)
@@ -116,24 +119,24 @@ class OpenOptions:
         wire = of_size(self.array[0])
         return type(recording)(on_array(recording._contents, Array(*own.shape, wire.pitch_mm, own.exists, wire.name)))
 
-    def joined(self, path: Path) -> list[Recording]:
+    def joined(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
         opened = self.open(path)
         return joined(opened if isinstance(opened, list) else [opened])
 
-    def all(self, paths: Sequence[Path]) -> list[Recording]:
+    def all(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
 
         Each sensor of a file with several is a recording of its own (`Recording.title`).
         """
-        opened = (self.open(path) for path in paths)
+        opened = (self.open(path) for path in several("paths", paths))
         every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
         return [one for each in every for one in sensors(each)]
 
     def _timed(self, recording: Recording) -> Recording:
         return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
 
-    def one(self, path: Path) -> Recording:
+    def one(self, path: str | os.PathLike[str]) -> Recording:
         """Open a file that holds one recording, with its feet joined.
 
         Raises

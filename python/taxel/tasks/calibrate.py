@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, several
+from taxel._base.arguments import flag, instance, mapping, several
 from taxel._base.messages import collected
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -20,7 +20,7 @@ from taxel.formats import text
 from taxel.frames import Frames
 from taxel.recording import Recording
 from taxel.recording.pressure import readings
-from taxel.tasks.rest import GivenTare, given_tare
+from taxel.tasks.rest import GivenTare, check_tare, given_tare
 
 __all__ = ["CalibrateOptions", "Calibrated", "KnownLoad", "calibrate", "read_loads"]
 
@@ -85,22 +85,14 @@ class CalibrateOptions:
     date: str | None = None
     note: str = ""
 
-    def check(self, *, loaded: bool) -> None:
-        """Refuse options that contradict each other, before the recording is read; `loaded`: loads are given."""
-        for wrong, why in (
-            (
-                not loaded and not self.law and self.table is None,
-                "nothing to calibrate by: give --load, --loads, --table or --law",
-            ),
-            (self.law and self.table is not None, "--law and --table: one of the two"),
-            (bool(self.sensor) and not self.law, "--set: values of the law; give --law with it"),
-            (
-                not loaded and (self.each or self.exponent is not None),
-                "--each and --exponent belong to a fit: give --load",
-            ),
-        ):
-            if wrong:
-                raise ProblemError(why)
+    def __post_init__(self) -> None:
+        """Refuse options that contradict each other, before the recording is read."""
+        flag("law", self.law), flag("each", self.each), mapping("sensor", self.sensor)
+        check_tare(self.tare)
+        if self.law and self.table is not None:
+            raise ProblemError("--law and --table: one of the two")
+        if self.sensor and not self.law:
+            raise ProblemError("--set: values of the law; give --law with it")
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +156,10 @@ def calibrate(
     instance("recording", recording, Recording)
     asked = CalibrateOptions() if options is None else instance("options", options, CalibrateOptions)
     known = read_loads(loads) if isinstance(loads, str | os.PathLike) else several("loads", loads)
-    asked.check(loaded=bool(known))
+    if not known and not asked.law and asked.table is None:
+        raise ProblemError("nothing to calibrate by: give --load, --loads, --table or --law")
+    if not known and (asked.each or asked.exponent is not None):
+        raise ProblemError("--each and --exponent belong to a fit: give --load")
     with collected() as warnings:
         made = _calibrated(recording, [instance("loads", one, KnownLoad) for one in known], asked)
     return replace(Calibrated(made), warnings=tuple(warnings))
@@ -194,7 +189,7 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     measured = [_load(read.frames, one) for one in known]
     if measured:
         calibration = Calibration.fit(measured, start=calibration, exponent=options.exponent, each=options.each, **how)
-    assert calibration is not None  # `check` refuses options without any of the three
+    assert calibration is not None  # one of the three is given
     return calibration
 
 

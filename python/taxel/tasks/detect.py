@@ -27,7 +27,7 @@ from taxel.recording.open_options import sensors_of
 from taxel.recording.rest import FORCE_UNITS, of_pictures
 from taxel.spikes import SpikeTrains
 from taxel.tasks.labels import GivenLabels, references
-from taxel.tasks.rest import GivenTare, TakenRest, rest
+from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
 
 __all__ = ["DetectOptions", "Detected", "Detecting", "detect"]
 
@@ -54,8 +54,9 @@ class DetectOptions:
     frame_us: float | None = None
     window_ms: float = 50.0
 
-    def check(self) -> None:
+    def __post_init__(self) -> None:
         """Refuse values that no recordings could make valid, before these are read."""
+        check_tare(self.tare)
         finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
         number("window_ms", self.window_ms, "ms")
 
@@ -189,7 +190,6 @@ def detect(
     """
     detector("readout", readout)
     asked = DetectOptions() if options is None else instance("options", options, DetectOptions)
-    asked.check()
     update = lines_to(progress)
     opened = sensors_of(recordings)
     with collected() as warnings:

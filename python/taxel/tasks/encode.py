@@ -15,7 +15,7 @@ from taxel._base.progress import Progress
 from taxel.encode import Encoder
 from taxel.recording import Recording
 from taxel.spikes import SpikeTrains
-from taxel.tasks.rest import GivenTare, given_or_by_unit
+from taxel.tasks.rest import GivenTare, check_tare, given_or_by_unit
 
 __all__ = ["EncodeOptions", "Encoded", "encode", "encoder_of"]
 
@@ -43,7 +43,12 @@ class EncodeOptions:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     tare: GivenTare | None = None
 
-    def chosen(self) -> Encoder:
+    def __post_init__(self) -> None:
+        """Refuse what is no encoder, before the recording is read."""
+        check_tare(self.tare)
+        self._chosen()
+
+    def _chosen(self) -> Encoder:
         """Return the encoder, without the tare."""
         return encoder_of(text("encoder", self.encoder), self.parameters)
 
@@ -101,7 +106,7 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
     asked = instance("options", options, EncodeOptions)
     instance("recording", recording, Recording)
     with collected() as warnings:
-        encoder = asked.chosen()
+        encoder = asked._chosen()
         rest = given_or_by_unit(asked.tare, recording)
         encoder = encoder if rest is None else encoder.with_tare(rest)
         events = recording.has_events

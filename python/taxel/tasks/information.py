@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from taxel._base.arguments import callback, instance, several, whole
+from taxel._base.arguments import callback, instance, mapping, several, text, whole
 from taxel._base.messages import collected, counted
 from taxel._base.progress import Progress
 from taxel._core import ProblemError
@@ -49,10 +49,15 @@ class InformationOptions:
     seed: int = 0
     classifiers: Sequence[str] = ("neighbours",)
 
-    def chosen(self) -> Encoder | None:
+    def __post_init__(self) -> None:
+        """Refuse what is no encoder, before the recordings are read."""
+        self._chosen()
+
+    def _chosen(self) -> Encoder | None:
         """Return the encoder; None of that which the answer chooses by itself."""
-        if self.encoder not in ("change_events", "fa1"):
+        if text("encoder", self.encoder) not in ("change_events", "fa1"):
             raise ProblemError(f"encoder is {self.encoder}: must be change_events or fa1, which have one train a taxel")
+        mapping("parameters", self.parameters)
         if self.encoder == "change_events" and not self.parameters:
             return None
         return encoder_of(self.encoder, self.parameters)
@@ -113,7 +118,7 @@ def information(
     """
     asked = InformationOptions() if options is None else instance("options", options, InformationOptions)
     show = (lambda *_: None) if progress is None else callback("progress", progress)
-    encoder, opened = asked.chosen(), sensors_of(recordings)
+    encoder, opened = asked._chosen(), sensors_of(recordings)
     with collected() as warnings:
         trials = _trials(labels, opened, asked.window_ms)
         if labels is None and len({trial.label for trial in trials}) == 1:

@@ -165,6 +165,12 @@ def given_tare(tare: GivenTare, recording: Recording) -> Tare:
     return measured
 
 
+def check_tare(tare: GivenTare | None) -> None:
+    """Refuse what is neither a tare nor a path nor seconds."""
+    if tare is not None:
+        seconds_of(tare)
+
+
 def seconds_of(tare: GivenTare) -> float | None:
     """Return the seconds that a given tare says; None of a tare or a file."""
     if isinstance(tare, Tare | os.PathLike):

@@ -89,7 +89,6 @@ def train(
     ('contact',)
     """
     asked = TrainOptions() if options is None else instance("options", options, TrainOptions)
-    asked.check()
     update = lines_to(progress)
     with collected() as warnings:
         training = _train(sensors_of(recordings), labels, asked, update)
@@ -110,12 +109,12 @@ def _train(
         recipe, why = recipes.chosen(recorded(opened[0]), names)
         update(f"recipe {recipe}, chosen for {why}")
         options = replace(options, recipe=recipe)
-    plan = options.plan(names)
+    plan = options._plan(names)
     assert plan is not None
     if options.search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
         raise ProblemError("--search: the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
     examples = _examples(opened, labelled, options.tare, plan)
-    plan = options.plan(names, measured_floor(examples))
+    plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     return _Work(opened, examples, options, update).training(plan)
 

@@ -16,7 +16,7 @@ from taxel.detect.recipe import changed, with_floor
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.spikes import to_ms
-from taxel.tasks.rest import GivenTare
+from taxel.tasks.rest import GivenTare, check_tare
 
 __all__ = ["TrainOptions", "Training"]
 
@@ -56,16 +56,17 @@ class TrainOptions:
     search: bool = False
     window_ms: float = 50.0
 
-    def check(self) -> None:
+    def __post_init__(self) -> None:
         """Refuse values that no recordings and labels could make valid, before these are read."""
         mapping("changes", self.changes)
+        check_tare(self.tare)
         flag("search", self.search)
         number("window_ms", self.window_ms, "ms")
         if self.folds is not None and whole("folds", self.folds, 0) == 1:
             raise ProblemError("--folds 1: must be 2 or more, or 0 for none")
-        self.plan()
+        self._plan()
 
-    def plan(self, labels: Sequence[str] | None = None, noise_floor: float | None = None) -> Recipe | None:
+    def _plan(self, labels: Sequence[str] | None = None, noise_floor: float | None = None) -> Recipe | None:
         """Return the recipe that is named, or that of the encoder that is; None of neither."""
         if self.recipe is None and "encoder.name" in self.changes:
             values = changed({}, self.changes)
