@@ -108,8 +108,6 @@ def test_verdicts_of_all_counts_are_on_the_page(seed: int) -> None:
     if draw.random() < 0.3:
         del counts["missing"]
     assert_listed(of_counts(counts))
-    counts["converted"] = "the .npz does not say what was lost"
-    assert of_counts(counts) == counts["converted"]
 
 
 @pytest.mark.parametrize("kind", [".mcap", ".npz", ".h5"])

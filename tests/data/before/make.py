@@ -1,4 +1,4 @@
-"""Write the files of this folder with the taxel that the README names; what a later commit writes says nothing about it.
+"""Write the files of this folder with the taxel that the README names.
 
 `PYTHONPATH=tests python tests/data/before/make.py`, in the empty folder.
 """
@@ -77,16 +77,18 @@ def live() -> None:
     array = taxel.Array(16, 16, 2.0, name="corner")
     board = Board(Registers(array=array, lines=16, wire_version=2), array=array, version_2=Version2(board=5))
     draw = np.random.default_rng(3)
-    with Live(0, host=LOOPBACK, array=array, record=HERE / "version_2.mcap", compression="zstd") as running:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-            for k in range(200):
-                for one in board.frame((40 + 30 * (draw.random(256) < 0.02)).astype(np.uint16)):
-                    # Lost, damaged, twice, or as it is.
-                    fate = draw.choice(4, p=[0.05, 0.05, 0.05, 0.85])
-                    changed = one[:-1] + bytes([one[-1] ^ 1]) if fate == 1 else one
-                    for _ in range((0, 1, 2, 1)[fate]):
-                        link.sendto(changed, running.address)
-                        time.sleep(0.0005)
+    with (
+        Live(0, host=LOOPBACK, array=array, record=HERE / "version_2.mcap", compression="zstd") as running,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        for _ in range(200):
+            for one in board.frame((40 + 30 * (draw.random(256) < 0.02)).astype(np.uint16)):
+                # Lost, damaged, twice, or as it is.
+                fate = draw.choice(4, p=[0.05, 0.05, 0.05, 0.85])
+                changed = one[:-1] + bytes([one[-1] ^ 1]) if fate == 1 else one
+                for _again in range((0, 1, 2, 1)[fate]):
+                    link.sendto(changed, running.address)
+                    time.sleep(0.0005)
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
     sources = {
