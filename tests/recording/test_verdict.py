@@ -114,7 +114,8 @@ def test_verdicts_of_all_counts_are_on_the_page(seed: int) -> None:
 def test_remarks_go_to_files_and_back_beside_the_verdict(tmp_path: Path, kind: str) -> None:
     frames = taxel.Frames([[[1.0, 2.0]], [[3.0, 4.0]]], [0, 10_000])
     said = ("at the bag's times", "2 messages of another length left out")
-    of = Contents(tmp_path / "a.bag", "a.bag", "ros", frames.array, frames=frames, remarks=said, verdict="nothing lost")
+    fine = taxel.Verdict.from_dict({"status": "complete", "text": "nothing lost"})
+    of = Contents(tmp_path / "a.bag", "a.bag", "ros", frames.array, frames=frames, remarks=said, verdict=fine)
     taxel.convert(taxel.Recording(of), tmp_path / f"a{kind}")
     back = taxel.open(tmp_path / f"a{kind}")
     made = ("converted from a.bag",) * (kind == ".mcap")
