@@ -47,7 +47,10 @@ impl Tare {
             return Err(problem!("tare: rest of the taxel at {} is not finite", self.array.place_of(place)));
         }
         if self.noise.len() != self.array.len() {
-            return Err(problem!("tare: noise of {} taxels for {rows} x {columns}: must be one each", self.noise.len()));
+            return Err(problem!(
+                "tare: noise of {} taxels for {rows} x {columns}: must be one each",
+                self.noise.len()
+            ));
         }
         match self.noise.iter().position(|noise| noise.is_some_and(|n| !(n >= 0.0 && n.is_finite()))) {
             Some(place) => {
