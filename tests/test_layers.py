@@ -77,7 +77,6 @@ THOUSANDS = {
     "taxel.information.codes": "Hz",
     "taxel.information.wire_rate": "kbit/s",
     "taxel.report.listening": "seconds",
-    "taxel.simulate.fem": "N/m, kPa",
     "taxel.live._to_foxglove": "ns",
 }
 

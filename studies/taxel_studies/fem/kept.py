@@ -6,10 +6,8 @@ import hashlib
 import json
 from pathlib import Path
 
-from taxel._base.arguments import instance
-from taxel._base.arguments import path as checked_path
-from taxel._base.commit import code_version
-from taxel.simulate.fem.indentation import Course, Indentation, press
+from taxel.report import code_version
+from taxel_studies.fem.indentation import Course, Indentation, press
 
 __all__ = ["KeptCourses"]
 
@@ -41,17 +39,16 @@ class KeptCourses:
     """
 
     def __init__(self, folder: str | Path, code: str | None = None) -> None:
-        self.folder = Path(checked_path("folder", folder))
+        self.folder = Path(folder)
         if not self.folder.is_dir():
             raise FileNotFoundError(2, "No such folder", str(self.folder))
-        self.code = code_version() if code is None else instance("code", code, str)
+        self.code = code_version("taxel", "taxel_studies") if code is None else code
 
     def path(self, asked: Indentation) -> Path:
         """Return the path of a course's file: its name has object and path, and a digest of the rest."""
-        i = instance("asked", asked, Indentation)
-        all_of_it = json.dumps([i.to_dict(), self.code], sort_keys=True)
+        all_of_it = json.dumps([asked.to_dict(), self.code], sort_keys=True)
         digest = hashlib.sha256(all_of_it.encode()).hexdigest()[:16]
-        return self.folder / f"{i.diameter_mm:g}mm-{i.modulus_kpa:g}kPa-{i.angle_deg:g}deg-{digest}.npz"
+        return self.folder / f"{asked.diameter_mm:g}mm-{asked.modulus_kpa:g}kPa-{asked.angle_deg:g}deg-{digest}.npz"
 
     def __contains__(self, asked: Indentation) -> bool:
         return self.path(asked).exists()

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from taxel._core import ProblemError
-from taxel.simulate.fem.material import Yeoh
-from taxel.simulate.fem.mesh import Mesh
+from taxel import ProblemError
+from taxel_studies.fem.material import Yeoh
+from taxel_studies.fem.mesh import Mesh
 
 __all__ = ["Solids"]
 

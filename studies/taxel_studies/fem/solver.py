@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from taxel.simulate.fem.contact import Contact, Touch
-from taxel.simulate.fem.interruptible import interruptible
-from taxel.simulate.fem.solids import Solids
+from taxel_studies.fem.contact import Contact, Touch
+from taxel_studies.fem.interruptible import interruptible
+from taxel_studies.fem.solids import Solids
 
 __all__ = ["State", "Stopped", "march"]
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from refusal import refused
+from tests.refusal import refused
 
 from taxel import FormatError, ProblemError
-from taxel.simulate.fem import (
+from taxel_studies.fem import (
     DRAGON_SKIN_10,
     TABLE_5_1,
     Condition,
@@ -26,8 +27,8 @@ from taxel.simulate.fem import (
     paths,
     press,
 )
-from taxel.simulate.fem.contact import Contact
-from taxel.simulate.fem.solids import Solids
+from taxel_studies.fem.contact import Contact
+from taxel_studies.fem.solids import Solids
 
 #: Chosen so that the tests take seconds, not minutes.
 COARSE = {"mesh_mm": 0.25, "step_um": 25.0}
@@ -185,6 +186,28 @@ def test_a_stop_is_heard():
         press(Indentation(**COARSE), progress=stop)
 
 
+def test_ctrl_c_ends_a_press_on_fine_elements():
+    """The child process reports when the press is about to begin; it would take minutes."""
+    code = """if True:
+        from taxel_studies.fem import Indentation, press
+        try:
+            print("begun", flush=True)
+            press(Indentation(mesh_mm=0.02, base_mesh_mm=0.02))
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+    """
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as child:
+        try:
+            assert child.stdout.readline() == "begun\n"
+            with pytest.raises(subprocess.TimeoutExpired):
+                child.wait(1.5)  # still in the call
+            child.send_signal(signal.SIGINT)
+            assert child.wait(20) == 0
+            assert child.stdout.read() == "interrupted\n"
+        finally:
+            child.kill()
+
+
 # Kept courses
 
 
@@ -206,7 +229,7 @@ def test_courses_are_kept_under_a_digest_of_what_made_them(tmp_path, slanted):
 
 def test_a_kept_course_is_used_again_by_the_same_code_alone(tmp_path, slanted, monkeypatch):
     def kept(code: str) -> KeptCourses:
-        monkeypatch.setattr("taxel.simulate.fem.kept.code_version", lambda: code)
+        monkeypatch.setattr("taxel_studies.fem.kept.code_version", lambda *packages: code)
         return KeptCourses(tmp_path)
 
     asked = slanted.indentation
@@ -214,8 +237,6 @@ def test_a_kept_course_is_used_again_by_the_same_code_alone(tmp_path, slanted, m
     assert asked in kept("0123abc")
     assert asked not in kept("4567def")
     assert asked in KeptCourses(tmp_path, "0123abc")
-    with pytest.raises(ProblemError, match="code"):
-        KeptCourses(tmp_path, 7)
 
 
 CHANGES = [("friction", 0.6), ("height_mm", 5.5), ("silicone", Yeoh(3600)), ("step_um", 24.0), ("penalty", 51.0)]
@@ -262,12 +283,9 @@ def test_75_paths_serve_the_300_conditions():
         (lambda: Indentation(mesh_mm=0.6), "at most a quarter of the diameter"),
         (lambda: Indentation(mesh_mm=1e-9), "at least a 500th of the diameter"),
         (lambda: Indentation(step_um=1e-9), "at most 100 000 steps"),
-        (lambda: Indentation(silicone=3600), "silicone"),
         (lambda: Yeoh(0), "must be above 0"),
-        (lambda: Yeoh("soft"), "c10_pa"),
         (lambda: Table((), (1.0,), (1.0,), (1.0,)), "must be one at least"),
         (lambda: Table((1.0, 1.0), (1.0,), (1.0,), (1.0,)), "none twice"),
-        (lambda: press(None), "indentation"),
     ],
 )
 def test_nonsense_is_one_clear_error(make, said):

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from taxel._base.arguments import number
-from taxel._core import ProblemError
-from taxel.simulate.fem.indentation import Indentation
+from taxel import ProblemError
+from taxel_studies.fem.indentation import Indentation
 
 __all__ = ["TABLE_5_1", "Condition", "Table", "paths"]
 
@@ -39,7 +38,7 @@ class Table:
 
     Raises
     ------
-    ProblemError : an empty variable, a value twice, or what is no number
+    ProblemError : an empty variable, or a value twice
 
     Examples
     --------
@@ -53,8 +52,8 @@ class Table:
     angles_deg: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        for name, unit in (("diameters_mm", "mm"), ("moduli_kpa", "kPa"), ("depths_mm", "mm"), ("angles_deg", "deg")):
-            values = tuple(number(f"{name}[{k}]", v, unit) for k, v in enumerate(getattr(self, name)))
+        for name in ("diameters_mm", "moduli_kpa", "depths_mm", "angles_deg"):
+            values = tuple(map(float, getattr(self, name)))
             if not values or len(set(values)) < len(values):
                 raise ProblemError(f"{name} are {values}: must be one at least, and none twice")
             object.__setattr__(self, name, values)

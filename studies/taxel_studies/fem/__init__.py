@@ -6,12 +6,12 @@ conditions of Table 5.1.
 
 from __future__ import annotations
 
-from taxel.simulate.fem.conditions import TABLE_5_1, Condition, Table, paths
-from taxel.simulate.fem.grid import SamplingGrid
-from taxel.simulate.fem.indentation import Course, Indentation, bodies, press
-from taxel.simulate.fem.kept import KeptCourses
-from taxel.simulate.fem.material import DRAGON_SKIN_10, Yeoh
-from taxel.simulate.fem.mesh import Mesh
+from taxel_studies.fem.conditions import TABLE_5_1, Condition, Table, paths
+from taxel_studies.fem.grid import SamplingGrid
+from taxel_studies.fem.indentation import Course, Indentation, bodies, press
+from taxel_studies.fem.kept import KeptCourses
+from taxel_studies.fem.material import DRAGON_SKIN_10, Yeoh
+from taxel_studies.fem.mesh import Mesh
 
 __all__ = [
     "DRAGON_SKIN_10",

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number, shown, whole
-from taxel._core import ProblemError
-from taxel.simulate.fem.indentation import Course
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from taxel import ProblemError
+from taxel_studies.fem.indentation import Course
+from taxel_studies.runner import whole
 
 __all__ = ["SamplingGrid"]
 
@@ -51,9 +53,9 @@ class SamplingGrid:
     quantity: str = "nominal"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "taxels", whole("taxels", self.taxels, 1, 10_000))
+        object.__setattr__(self, "taxels", whole("taxels", self.taxels, 1))
         for name, least in (("pitch_mm", 0.0), ("duration_ms", 0.0), ("shift_mm", -1.0)):
-            value = number(name, getattr(self, name), name.rsplit("_", 1)[-1])
+            value = float(getattr(self, name))
             if not (value > least and np.isfinite(value)) or value < 0:
                 raise ProblemError(f"{name} is {value:g}: must be {'above 0' if least == 0 else '0 or more'}")
             object.__setattr__(self, name, value)
@@ -65,10 +67,9 @@ class SamplingGrid:
         ------
         ProblemError : a period of which the duration is no whole number
         """
-        period = number("period_ms", period_ms, "ms")
-        count = round(self.duration_ms / period) if period > 0 else 0
-        if count < 1 or abs(count * period - self.duration_ms) > 1e-9 * self.duration_ms:
-            raise ProblemError(f"period_ms is {shown(period_ms)}: must go whole times into {self.duration_ms:g} ms")
+        count = round(self.duration_ms / period_ms) if period_ms > 0 else 0
+        if count < 1 or abs(count * period_ms - self.duration_ms) > 1e-9 * self.duration_ms:
+            raise ProblemError(f"period_ms is {period_ms:g}: must go whole times into {self.duration_ms:g} ms")
         return count
 
     def places_mm(self) -> NDArray[np.float64]:
@@ -107,14 +108,11 @@ class SamplingGrid:
         -----
         Along the path by a monotone cubic, across by a cubic spline (the thesis has MATLAB's spline).
         """
-        from scipy.interpolate import CubicSpline, PchipInterpolator  # noqa: PLC0415  loads slowly
-
-        instance("course", course, Course)
-        depth, count = number("depth_mm", depth_mm, "mm"), self.steps(period_ms)
+        count = self.steps(period_ms)
         reached = float(course.path_mm[-1])
-        if not 0 < depth <= reached * (1 + 1e-12):
+        if not 0 < depth_mm <= reached * (1 + 1e-12):
             why = f" ({course.fault})" if course.fault else ""
-            raise ProblemError(f"depth_mm is {depth:g}: the course goes from 0 to {reached:g} mm{why}")
+            raise ProblemError(f"depth_mm is {depth_mm:g}: the course goes from 0 to {reached:g} mm{why}")
         random = np.random.default_rng(whole("seed", seed, 0))
         number_of = whole("samples", samples, 1)
         phase = random.uniform(0, period_ms, number_of)
@@ -129,6 +127,6 @@ class SamplingGrid:
         for first in range(0, number_of, _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
             t = phase[part, None] + np.arange(count) * period_ms
-            path = np.minimum(t * (depth / self.duration_ms), reached)
+            path = np.minimum(t * (depth_mm / self.duration_ms), reached)
             drawn[part, 1:] = along(path) @ across(places + shift[part, None]).transpose(0, 2, 1)
         return drawn

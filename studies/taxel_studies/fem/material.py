@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import number
-from taxel._core import ProblemError
+from taxel import ProblemError
 
 __all__ = ["DRAGON_SKIN_10", "Yeoh"]
 
@@ -51,7 +50,7 @@ class Yeoh:
 
     def __post_init__(self) -> None:
         for name in ("c10_pa", "c20_pa", "c30_pa"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "Pa"))
+            object.__setattr__(self, name, float(getattr(self, name)))
         if not np.isfinite([self.c10_pa, self.c20_pa, self.c30_pa]).all():
             raise ProblemError(
                 f"c10, c20 and c30 are {self.c10_pa:g}, {self.c20_pa:g} and {self.c30_pa:g} Pa: must be finite"
@@ -62,7 +61,7 @@ class Yeoh:
     @classmethod
     def of_modulus(cls, modulus_kpa: float) -> Yeoh:
         """Return the neo-Hookean solid of a small-strain modulus, in kPa."""
-        return cls(1000 * number("modulus_kpa", modulus_kpa, "kPa") / 6)
+        return cls(1000 * modulus_kpa / 6)
 
     @property
     def modulus_kpa(self) -> float:

@@ -12,15 +12,14 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, instance, number
-from taxel._base.files import write_whole
-from taxel._core import FormatError, ProblemError
-from taxel.simulate.fem.contact import Contact
-from taxel.simulate.fem.interruptible import interruptible
-from taxel.simulate.fem.material import DRAGON_SKIN_10, Yeoh
-from taxel.simulate.fem.mesh import Mesh, block, half_disc
-from taxel.simulate.fem.solids import Solids
-from taxel.simulate.fem.solver import State, Stopped, march
+from taxel import FormatError, ProblemError
+from taxel.report import write_whole
+from taxel_studies.fem.contact import Contact
+from taxel_studies.fem.interruptible import interruptible
+from taxel_studies.fem.material import DRAGON_SKIN_10, Yeoh
+from taxel_studies.fem.mesh import Mesh, block, half_disc
+from taxel_studies.fem.solids import Solids
+from taxel_studies.fem.solver import State, Stopped, march
 
 __all__ = ["Course", "Indentation", "bodies", "press"]
 
@@ -80,14 +79,12 @@ class Indentation:
     def __post_init__(self) -> None:
         for one in fields(self):
             if one.name != "silicone":
-                unit = one.name.rsplit("_", 1)[-1] if "_" in one.name else None
-                object.__setattr__(self, one.name, number(one.name, getattr(self, one.name), unit))
-                value = getattr(self, one.name)
+                value = float(getattr(self, one.name))
+                object.__setattr__(self, one.name, value)
                 if not math.isfinite(value):
                     raise ProblemError(f"{one.name} is {value:g}: must be finite")
                 if one.name not in ("angle_deg", "friction") and value <= 0:
                     raise ProblemError(f"{one.name} is {value:g}: must be above 0")
-        instance("silicone", self.silicone, Yeoh)
         diameter, height = f"the diameter, {self.diameter_mm:g} mm", f"the height, {self.height_mm:g} mm"
         finest, coarsest = min(self.mesh_mm, self.base_mesh_mm), max(self.mesh_mm, self.base_mesh_mm)
         for wrong, message in (
@@ -287,9 +284,7 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
     >>> bool(abs(course.reaction[-1] - course.base[-1]).max() < 1e-6)
     True
     """
-    i = instance("indentation", indentation, Indentation)
-    if progress is not None:
-        callback("progress", progress)
+    i = indentation
     ground, indenter = bodies(i)
     solids = interruptible(lambda: Solids([(ground, i.silicone), (indenter, Yeoh.of_modulus(i.modulus_kpa))]))
     top, arc = indenter.held + solids.first[1], indenter.touching + solids.first[1]
