@@ -8,8 +8,8 @@ from scipy.interpolate import CubicSpline
 
 from taxel import Frames, ProblemError
 from taxel.encode import FA1
-from taxel_studies.fem import Course, Indentation, KeptCourses, SamplingGrid, press
 from taxel_studies import contact, contact_choices, fig5_5, fig5_7, indented, load
+from taxel_studies.fem import Course, Indentation, KeptCourses, SamplingGrid, press
 from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Row
 
