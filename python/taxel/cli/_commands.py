@@ -1,21 +1,23 @@
-"""Commands that are loaded when they are used: ours, and those of other distributions.
+"""The commands: ours and those of other distributions, each imported only when it is used.
 
-Each of another distribution is an entry point of the group ``taxel.commands``.
+A command of another distribution is an entry point of the group ``taxel.commands`` that names a `typer.Typer`; its line
+in the list of commands is the distribution's description, for which nothing is imported.
 """
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
-from taxel._base.messages import installing
+from taxel._base.messages import escaped, first_line
 from taxel._core import ProblemError
 
-__all__ = ["WithAdded"]
+__all__ = ["OWN", "Commands", "added"]
 
 #: Our commands, each a module of this name, and what they do, in the order of the work.
 OWN = {
@@ -37,59 +39,60 @@ OWN = {
     "export": "Write a readout for other simulators and for chips.",
     "information": "Estimate how many bits labelled touches hold.",
     "bridge": "Publish a board to other computers.",
-    "bench": "Compare the speed of taxel with other libraries.",
 }
-#: Each command of another distribution, what it does, and how it is installed.
-ADDED = {"study": ("Run a study: a protocol, its parameters, a report.", installing("studies"))}
 
 
-class WithAdded(TyperGroup):
-    """A group of commands that loads each only when it is used, because each imports what it needs."""
+def added() -> dict[str, EntryPoint]:
+    """Return the commands of other distributions by name; none has the name of ours."""
+    return {point.name: point for point in sorted(entry_points(group="taxel.commands")) if point.name not in OWN}
 
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Name all commands, those not loaded yet among them, ours in the order of the work."""
-        return [*OWN, *ADDED, *sorted({*super().list_commands(ctx)} - {*OWN, *ADDED})]
+
+class Commands(TyperGroup):
+    """All commands; each imports what it needs when it is used."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  click's argument
+        """Name all commands, ours first, in the order of the work."""
+        return [*OWN, *added()]
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002  click's arguments
-        """Write a line a command, without loading it."""
-        about = {**OWN, **{name: line for name, (line, _) in ADDED.items()}}
-        more = {name: command for name, command in self.commands.items() if name not in about}
+        """Write a line a command, without importing it."""
         with formatter.section("Commands"):
-            formatter.write_dl([*about.items(), *((name, one.get_short_help_str(60)) for name, one in more.items())])
+            formatter.write_dl([*OWN.items(), *((name, _description(point)) for name, point in added().items())])
 
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command; for an added one that is not installed, a command that prints how to install it."""
-        if cmd_name in (*OWN, *ADDED) and cmd_name not in self.commands:
-            self.add_command(_own(cmd_name) if cmd_name in OWN else _loaded(cmd_name), cmd_name)
-        if cmd_name not in self.commands:
-            # The error for an unknown name suggests the closest of those that are loaded.
-            for name in OWN:
-                self.get_command(ctx, name)
-        return super().get_command(ctx, cmd_name)
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command that was typed; the error for an unknown name suggests close ones, without importing any."""
+        typed = args[0]
+        if typed not in OWN and typed not in (names := self.list_commands(ctx)):
+            near = ", ".join(map(repr, get_close_matches(typed, names)))
+            ctx.fail(f"No such command {typed!r}." + f" Did you mean {near}?" * bool(near))
+        return super().resolve_command(ctx, args)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002  click's argument
+        """Import a command.
+
+        Raises
+        ------
+        ProblemError : a command of another distribution that cannot be imported
+        """
+        if cmd_name in OWN:
+            command = typer.main.get_command(import_module(f"taxel.cli.{cmd_name}").app)
+        elif point := added().get(cmd_name):
+            command = _imported(point)
+        else:
+            return None
+        command.name = cmd_name
+        return command
 
 
-def _own(name: str) -> Any:
-    """Import the module of a command, which registers it with the app; a second group of the app has it at once."""
-    import_module(f"taxel.cli.{name}")
-    app = import_module("taxel.cli._app").app
-    groups = [one.typer_instance for one in app.registered_groups if one.name == name]
-    alone = groups[0] if groups else type(app)()
-    if not groups:
-        alone.registered_commands = [one for one in app.registered_commands if one.callback.__name__ == name]
-    command = typer.main.get_command(alone)
-    command.name = name
-    return command
+def _description(point: EntryPoint) -> str:
+    return escaped((point.dist and point.dist.metadata["Summary"]) or "")
 
 
-def _loaded(name: str) -> Any:
-    for point in entry_points(group="taxel.commands", name=name):
+def _imported(point: EntryPoint) -> Any:
+    try:
         return typer.main.get_command(point.load())
-    about, install = ADDED[name]
-    missing = typer.Typer(rich_markup_mode=None)
-
-    @missing.command(help=f"{about} It is not installed: {install}", context_settings={"ignore_unknown_options": True})
-    def _(arguments: list[str] | None = typer.Argument(None, hidden=True)) -> None:  # noqa: B008  typer's way
-        del arguments
-        raise ProblemError(f"taxel {name} is not installed: {install}")
-
-    return typer.main.get_command(missing)
+    except Exception as error:  # another distribution's code may raise any error
+        of = f" of {point.dist.name} {point.dist.version}" if point.dist else ""
+        raise ProblemError(
+            f"taxel {point.name}: {point.value}{of} cannot be used: {type(error).__name__}: {first_line(error)}"
+        ) from error

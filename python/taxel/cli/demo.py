@@ -9,12 +9,14 @@ from typing import Annotated
 import typer
 
 from taxel._base.files import try_whole
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED
 
-__all__ = ["demo"]
+__all__ = ["app", "demo"]
+
+app = App()
 
 
 @app.command()
