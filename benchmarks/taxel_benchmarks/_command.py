@@ -21,7 +21,6 @@ import typer
 import taxel_benchmarks
 from taxel import ProblemError
 from taxel.cli import App, say
-from taxel.report import code_version, write_whole
 
 __all__ = ["app", "bench", "doubts_of", "goals_of", "load"]
 
@@ -63,6 +62,8 @@ def bench(
 
     Example: taxel bench wire_decode
     """
+    from taxel.report import code_version, write_whole  # noqa: PLC0415  the command line starts quickly
+
     # The modules that benchmarks share have names that begin with an underscore.
     files = {path.stem: path for folder in taxel_benchmarks.__path__ for path in sorted(Path(folder).glob("[!_]*.py"))}
     if name is None and not goals:
