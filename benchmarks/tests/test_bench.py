@@ -287,6 +287,14 @@ def test_a_benchmark_runs_in_a_process_of_its_own_on_no_other_calls(folder: Path
     assert "fast: ended with status 1" in bench().stderr
 
 
+def test_help_comes_before_what_measures_and_what_draws() -> None:
+    code = "import sys; from taxel.cli import main\ntry: main(['bench', '--help'])\nfinally: print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = done.stdout.splitlines()[-1].split()
+    assert "taxel_benchmarks._command" in loaded
+    assert {"scipy", "matplotlib", "taxel_benchmarks._rounds"} & {*loaded} == set()
+
+
 def test_a_benchmark_without_goals_is_refused(folder: Path, capsys) -> None:
     text = (folder / "fast.py").read_text()
     (folder / "fast.py").write_text(text.replace("def goals", "def judged"))
