@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import platform
-import subprocess
 import time
 from collections.abc import Callable, Mapping, Sequence
 from importlib import metadata
@@ -95,15 +94,10 @@ def thread_seconds() -> dict[str, float]:
 
 def stamp(*packages: str) -> dict[str, Any]:
     """Return machine, versions and commit; `taxel bench` writes a result of a clean commit only."""
+    from taxel.report import code_version  # noqa: PLC0415  what a benchmark measures is loaded by itself
+
     versions = {"python": platform.python_version()}
     versions |= {package: version(package) for package in ("taxel", "numpy", *packages)}
-    ran = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=Path(__file__).parent,
-    )
     return {
         "machine": {
             "cpu": processor(),
@@ -112,7 +106,7 @@ def stamp(*packages: str) -> dict[str, Any]:
             "system": platform.platform(),
         },
         "versions": versions,
-        "commit": ran.stdout.strip() or "unknown",
+        "commit": code_version("taxel", "taxel_benchmarks"),
     }
 
 
