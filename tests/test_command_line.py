@@ -76,6 +76,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("cut", "walk.npz", "a.npz", "-o", "b.npz"), "OUT is given twice: a.npz and b.npz"),
         (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
         (("bogus",), "No such command 'bogus'; see taxel --help"),
+        (("trian",), "No such command 'trian'. Did you mean 'train'?; see taxel --help"),
         (
             ("encode", "walk.npz", "s.npz", "--encoder", "level_crossing", "--set", "levels=40"),
             "levels is 40: must be a list",
