@@ -111,7 +111,7 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("python/taxel/encode/binary.py", False),
         ("python/taxel/encode/__init__.py", True),
         ("tests/encode/test_binary.py", False),
-        ("benchmarks/encode_binary.py", False),
+        ("benchmarks/taxel_benchmarks/encode_binary.py", False),
     ]
     assert [(p.path, bool(p.after)) for p in of(LEARNER)] == [
         ("crates/taxel-core/src/learn/rivals/echo.rs", False),
