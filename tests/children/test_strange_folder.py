@@ -17,8 +17,8 @@ import taxel
 from taxel import Array, Frames
 from taxel.cli._commands import OWN, added
 from taxel.live import Viewer
-from taxel.live._requests import RequestHandler
-from taxel.live._shown_files import Opening
+from taxel.live._requests.training import TrainingRequests
+from taxel.live._shown_files import Opening, ShownFiles
 
 from .marked import TAXEL
 
@@ -139,7 +139,7 @@ def test_a_training_of_the_page_runs_no_code_of_a_strange_folder(
     here: Path, beside: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(here)
-    handler = RequestHandler(lambda *_: None, lambda _: None, lambda _: None, None, Opening())
+    handler = TrainingRequests(Opening(), ShownFiles())
     assert "contact, neuron: " in handler.train(beside / "a.h5", here / "r.json")
     check_nothing_ran(here, beside)
 
