@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from taxel import _core, wire
+from taxel._base.arguments import buffer_bytes
 from taxel.array import Array
 from taxel.events import Events
-from taxel.wire.buffer import buffer_bytes
 
 
 @dataclass(frozen=True, eq=False)
