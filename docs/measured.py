@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import importlib
 import json
-import sys
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from taxel.cli.bench import doubts_of, goals_of
+from taxel_benchmarks._command import doubts_of, goals_of
 from taxel_studies import STUDIES
 
 DOCS = Path(__file__).resolve().parent
@@ -27,8 +26,6 @@ KNOWN = "known at first impacts, ms"
 
 def page() -> str:
     """Return the page's text."""
-    if str(BENCHMARKS) not in sys.path:
-        sys.path.insert(0, str(BENCHMARKS))
     figures = [RESULTS / "figures" / f"{name}.json" for name in STUDIES]
     template = Environment(
         loader=FileSystemLoader(DOCS), undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True
@@ -50,8 +47,8 @@ def benchmark(file: Path) -> dict[str, Any]:
     """Return what the page shows of a benchmark's result: a row for each ratio and each goal."""
     result, name = json.loads(file.read_text(encoding="utf-8")), file.stem
     goals = {}
-    if (BENCHMARKS / f"{name}.py").exists():
-        goals = {goal.what: goal for goal in goals_of(importlib.import_module(name), result)}
+    if (BENCHMARKS / "taxel_benchmarks" / f"{name}.py").exists():
+        goals = {goal.what: goal for goal in goals_of(importlib.import_module(f"taxel_benchmarks.{name}"), result)}
     rows = []
     for what, figure in (result.get("ratios", {}) | {what: goal.figure for what, goal in goals.items()}).items():
         goal, spread = goals.get(what), result.get("spread", {}).get(what)

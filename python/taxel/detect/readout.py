@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import floats, instance, mapping, number, parameters, several, shown, text, whole
 from taxel._base.messages import escaped
+from taxel._base.saved import read
 from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
-from taxel.detect.detector import _Detector, detector, read, tare_text
+from taxel.detect.detector import _Detector, detector, tare_text
 from taxel.detect.exchange import Parts, read_nir, write_nir
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.trained import TrainedNeuron

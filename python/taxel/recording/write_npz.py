@@ -26,7 +26,7 @@ EVENTS = ("t", "x", "y", "p")
 COLUMNS = (*EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
 #: The columns that are a single text, and how many characters they may have; NumPy's have 4 bytes.
 TEXTS = {"about": ABOUT // 6, "unit": UNIT}
-#: The entry with the checksum over all columns; earlier versions wrote none, and ignore it.
+#: The entry with the checksum over all columns; a file without it opens unverified.
 DIGEST = "digest"
 #: Bytes of a column that are taken into the checksum at once.
 PIECE_BYTES = 1 << 20
