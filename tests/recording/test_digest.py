@@ -15,8 +15,9 @@ import pytest
 
 import taxel
 from taxel._core import FormatError
-from taxel.recording.npz import columns_of, contents_of
+from taxel.recording.read_npz import contents_of
 from taxel.recording.verdict import Verdict
+from taxel.recording.write_npz import columns_of
 
 from .making import record, some_events, some_frames
 

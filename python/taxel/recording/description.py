@@ -17,9 +17,9 @@ from taxel.array import Array
 from taxel.detections import Detections
 from taxel.formats.checks import sensor
 from taxel.labels import Note
+from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import BoardChange, Zeroing
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 

@@ -27,7 +27,7 @@ from taxel.recording.description import (
     notes_of,
     zeroings_of,
 )
-from taxel.recording.notes import Datagrams, Samples
+from taxel.recording.raw import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
