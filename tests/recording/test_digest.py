@@ -15,8 +15,9 @@ import pytest
 
 import taxel
 from taxel._core import FormatError
-from taxel.recording.npz import columns_of, contents_of
+from taxel.recording.read_npz import contents_of
 from taxel.recording.verdict import Verdict
+from taxel.recording.write_npz import columns_of
 
 from .making import record, some_events, some_frames
 
@@ -106,7 +107,7 @@ def test_what_is_not_as_written_is_refused_but_opens_without_its_checksum(
     within(path, change)
     with pytest.raises(FormatError, match=f"^{re.escape(str(path))}: {DAMAGED}$"):
         taxel.open(path)
-    # As files of before, and those that are changed on purpose.
+    # As of files that are changed on purpose.
     within(path, lambda columns: columns.pop("digest"))
     assert len(taxel.open(path).events) == 3000
 

@@ -20,9 +20,9 @@ from taxel.recording.contents import FIELDS, Contents, Once
 from taxel.recording.cut import region
 from taxel.recording.fates import CARRIED, CHANGED, FATES, LINES, LOST
 from taxel.recording.merge import merged
-from taxel.recording.notes import Samples
 from taxel.recording.on_clock import on_clock
 from taxel.recording.pictures import calibrated, pictures
+from taxel.recording.raw import Samples
 from taxel.recording.recording import one_source, with_notes
 from taxel.recording.stored import stored
 from taxel.wire import Registers

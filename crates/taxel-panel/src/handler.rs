@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use taxel_core::Array;
 use taxel_core::wire::Command;
 
@@ -25,13 +26,16 @@ pub struct BoardLines {
 }
 
 /// A value in a preset of the user, whose file may have been edited by hand.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
 pub enum PresetValue {
     /// Of a register of one bit.
     Flag(bool),
     /// Of any other register, in its own unit.
     Number(i64),
     /// Anything else in the file, which no register accepts.
+    #[cfg_attr(feature = "development", schemars(skip))]
     Other(String),
 }
 
@@ -48,7 +52,8 @@ pub struct UserPresets {
 }
 
 /// A label of a recording.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 pub struct LabelRow {
     /// Its text; empty where a note of the recording is to count no more, and no label does in its place.
     pub label: String,
@@ -61,6 +66,7 @@ pub struct LabelRow {
     /// Time of the recording's own note that it replaces, us.
     pub replaces_us: Option<i64>,
     /// Its time by the host's clock, ns since 1970, where its table has one and nobody has moved it since.
+    #[serde(skip)]
     pub host_ns: Option<i64>,
 }
 
@@ -106,7 +112,8 @@ pub struct LabelTable {
 pub type EditOutcome = Result<Vec<Option<LabelRow>>, String>;
 
 /// Taxels (column, row) that do not work as they should.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 pub struct UnhealthyTaxels {
     /// That did nothing while they were touched, and hold 0 as far as is known.
     pub dead: Vec<(u16, u16)>,

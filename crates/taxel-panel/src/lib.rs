@@ -18,6 +18,7 @@ mod indexed;
 mod keyframe_index;
 mod label_requests;
 mod labels;
+mod limited;
 mod limits;
 mod live_source;
 mod load;
@@ -29,6 +30,7 @@ mod player;
 mod presets;
 mod recorder;
 mod recording_session;
+mod refusal;
 mod registers;
 mod request;
 mod requests;
@@ -37,6 +39,16 @@ mod session;
 mod taxel_history;
 mod time_columns;
 mod weights;
+
+/// The JSON schemas of the requests (`requests`) and of the messages that are text (`messages`), for `tools/messages.py`.
+#[cfg(feature = "development")]
+#[must_use]
+pub fn message_schemas() -> String {
+    let settings = schemars::generate::SchemaSettings::draft2020_12;
+    let requests = settings().into_generator().into_root_schema_for::<request::Request>();
+    let messages = settings().for_serialize().into_generator().into_root_schema_for::<messages::Message>();
+    serde_json::json!({ "requests": requests, "messages": messages }).to_string()
+}
 
 pub use array_state::RestSource;
 pub use handler::{

@@ -1,6 +1,6 @@
 //! Reading and writing the board's registers.
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 use taxel_core::wire::registers::PRESETS;
 use taxel_core::wire::{Command, Registers};
 use taxel_live::locked::lock;
@@ -9,7 +9,7 @@ use tokio::sync::OwnedMutexGuard;
 use super::handler::UserPresets;
 use super::hub::Hub;
 use super::presets;
-use super::request::{Answer, Refusal, Request};
+use super::refusal::{Answer, Refusal};
 
 const NOT_CONNECTED: &str = "the board's serial line is not connected: give --control, or connect it here";
 
@@ -35,7 +35,7 @@ pub(super) async fn read(hub: &Hub) -> Answer {
     hold(hub, Registers::of_words(&words, channels));
     if channels != before {
         // Other presets fit it.
-        hub.clients.send_json(&hub.presets_message());
+        hub.clients.send_message(&hub.presets_message());
     }
     Ok(())
 }
@@ -59,7 +59,7 @@ fn hold(hub: &Hub, registers: Registers) {
         live.handle.wrote(registers);
         lock(&live.state).set_noise_floor(registers.noise_floor.into());
     }
-    hub.clients.send_json(&hub.registers_message());
+    hub.clients.send_message(&hub.registers_message());
 }
 
 /// Writes the registers that differ from those that the board holds, or `all` of them.
@@ -88,8 +88,7 @@ async fn write(hub: &Hub, target: Registers, all: bool) -> Answer {
 }
 
 /// `set`: writes single registers.
-pub(super) async fn set(hub: &Hub, request: &Request<'_>) -> Answer {
-    let values = request.object("values")?;
+pub(super) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
     let names: Vec<String> = values.keys().cloned().collect();
     let mut wanted = vec![];
     for (name, value) in values {
@@ -145,8 +144,8 @@ async fn write_presets(hub: &Hub, turn: OwnedMutexGuard<()>) -> Answer {
     let (written, turn) = hub.ask(move |handlers| Ok((handlers.presets.write(&presets), turn))).await?;
     written?;
     drop(turn);
-    hub.clients.send_json(&hub.presets_message());
-    hub.clients.send_json(&hub.registers_message());
+    hub.clients.send_message(&hub.presets_message());
+    hub.clients.send_message(&hub.registers_message());
     Ok(())
 }
 

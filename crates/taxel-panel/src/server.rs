@@ -247,7 +247,10 @@ async fn answer(gate: &Arc<Gate>, request: Request) -> Response {
     }
     let name = if path == "/" { "index.html" } else { path.strip_prefix('/').unwrap_or_default() };
     match asset(name) {
-        Some(asset) => ([(header::CONTENT_TYPE, asset.media)], asset.bytes).into_response(),
+        Some(asset) => match asset.read() {
+            Ok(bytes) => ([(header::CONTENT_TYPE, asset.media)], bytes).into_response(),
+            Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, format!("{name}: {error}")).into_response(),
+        },
         None => StatusCode::NOT_FOUND.into_response(),
     }
 }

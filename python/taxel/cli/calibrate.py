@@ -10,12 +10,14 @@ import typer
 
 from taxel._base.files import beside, named
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import TARE_HELP, assignments, progress, say_warnings
 from taxel.cli._say import say
 
-__all__ = ["calibrate"]
+__all__ = ["app", "calibrate"]
+
+app = App()
 
 
 @app.command()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from taxel._base.times import begun
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP, TARE_HELP, progress, say_warnings, try_report
 from taxel.cli._say import say
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from taxel.detect import Outcome
     from taxel.tasks import Detected
 
-__all__ = ["detect"]
+__all__ = ["app", "detect"]
+
+app = App()
 
 #: Rows of the table that is printed; all go to --csv and --json.
 _ROWS = 40

@@ -11,7 +11,7 @@ import typer
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._bar import bar, duration
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings
@@ -20,7 +20,9 @@ from taxel.cli._say import say
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, Point
 
-__all__ = ["information"]
+__all__ = ["app", "information"]
+
+app = App()
 
 
 @app.command()

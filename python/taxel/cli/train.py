@@ -13,7 +13,7 @@ import typer
 
 from taxel._base.messages import collected
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP, SET_HELP, TARE_HELP, assignments, progress, say_warnings, try_report
 from taxel.cli._say import say
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from taxel.recording import Recording
     from taxel.tasks import Training
 
-__all__ = ["train"]
+__all__ = ["app", "train"]
+
+app = App()
 
 
 @app.command()

@@ -19,7 +19,8 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.notes import BoardChange, Datagrams, Samples, Zeroing
+from taxel.recording.changes import BoardChange, Zeroing
+from taxel.recording.raw import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
@@ -123,7 +124,7 @@ class Contents:
         The name of the clock of all times, if it is not the source's own.
     counts : mapping
         What was received and lost, by cause.
-    verdict : Verdict, or a line
+    verdict : Verdict
         What was lost; None if that is not known.
     remarks : tuple of str
         What else there is to know: by whose times it is, what was left out, what it was converted from.
@@ -176,7 +177,7 @@ class Contents:
     clock: Clock | None = None
     clock_of: str | None = None
     counts: Mapping[str, Any] = field(default_factory=dict)
-    verdict: str | None = None
+    verdict: Verdict | None = None
     remarks: tuple[str, ...] = ()
     datagrams: Datagrams | None = None
     payload: NDArray[np.uint8] | None = None

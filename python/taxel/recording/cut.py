@@ -7,9 +7,9 @@ import numpy as np
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
 from taxel.events import Events
+from taxel.recording.changes import Zeroing
 from taxel.recording.contents import Contents, once
 from taxel.recording.fates import after
-from taxel.recording.notes import Zeroing
 from taxel.recording.recording import Recording
 
 __all__ = ["cut", "region", "span_us"]

@@ -19,10 +19,10 @@ from taxel.detections import Detections
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.labels import Note
+from taxel.recording.changes import Zeroing
 from taxel.recording.contents import UNKNOWN, Contents, anything, named
 from taxel.recording.fates import after
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import Zeroing
 from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers

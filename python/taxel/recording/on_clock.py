@@ -19,6 +19,7 @@ from taxel.recording.contents import Contents, alone, once
 from taxel.recording.fates import after
 from taxel.recording.kinds import verdict_of
 from taxel.recording.read_mcap import ascending
+from taxel.recording.verdict import Verdict
 
 __all__ = ["HOST", "on_clock"]
 
@@ -100,7 +101,7 @@ def _moved(of: Contents, name: str, times: Times | None) -> Contents:
     def notes() -> tuple[Note, ...]:
         return tuple(replace(note, t=None if note.t is None else one(note.t)) for note in of.notes)
 
-    def verdict() -> str | None:
+    def verdict() -> Verdict | None:
         told = verdict_of(of)
         doubtful, steps = told.doubtful_after_us, told.steps_back
         at = steps[0]["after_us"] if doubtful is None and steps else doubtful

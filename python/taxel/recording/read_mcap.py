@@ -27,7 +27,7 @@ from taxel.recording.description import (
     notes_of,
     zeroings_of,
 )
-from taxel.recording.notes import Datagrams, Samples
+from taxel.recording.raw import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
@@ -248,7 +248,7 @@ class _Source:
     def counted(self) -> dict[str, Any]:
         """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""
         counts = self.ending.get("finished", {}).get("counts") or {}
-        return {} if self.header.get("converted") or counts.get("converted") else counts
+        return {} if self.header.get("converted") else counts
 
     def verdict(self, found: Callable[[], str] | None = None) -> Verdict:
         """Return what was lost at which stage; `found` decodes a board or a stream, and returns what it found."""
@@ -262,9 +262,8 @@ class _Source:
         if "finished" not in self.ending:
             return True
         counts = self.ending["finished"]["counts"]
-        converted = self.header.get("converted") or counts.get("converted")
         causes = DOUBTS if counts.get("steps_back") else (*DOUBTS, *STEPS)
-        return not converted and any(counts["decoder"].get(cause, 0) for cause in causes)
+        return not self.header.get("converted") and any(counts["decoder"].get(cause, 0) for cause in causes)
 
 
 def _counts_before(path: Path, header: dict[str, Any]) -> dict[str, Any]:

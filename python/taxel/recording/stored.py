@@ -15,10 +15,10 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import Contents, once, several, together
-from taxel.recording.csv import array_in_csv
 from taxel.recording.fates import after, sensor
 from taxel.recording.kinds import ENDINGS, verdict_of
 from taxel.recording.sidecars import calibration_beside, has_calibration
+from taxel.recording.write_csv import array_in_csv
 from taxel.recording.write_mcap import cut_raw, encoded
 
 __all__ = ["STAMP_US", "is_made", "stored"]

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
-from taxel.device import Cable
 from taxel.live._requests.board import BoardRequests
 from taxel.live._requests.files import FileRequests
 from taxel.live._requests.labels import LabelRequests
