@@ -8,6 +8,7 @@ import numpy as np
 
 import taxel
 from sound.things import ARRAY, BYTES, Sound, fresh, method, plain
+from taxel.recording.open_options import OpenOptions
 
 
 def listen(**arguments: Any) -> None:
@@ -92,7 +93,7 @@ SOUND: dict[str, Sound] = {
         port=0,
         host="127.0.0.1",
         opens=taxel.open,
-        options=taxel.tasks.OpenOptions(rate_hz=100.0),
+        options=OpenOptions(rate_hz=100.0),
     ),
     "taxel.live.send": plain(
         taxel.live.send,

@@ -129,21 +129,6 @@ SOUND: dict[str, Sound] = {
         seed=1,
         classifiers=[],
     ),
-    "taxel.tasks.OpenOptions": plain(
-        lambda **given: tasks.OpenOptions(**given).open(Path("here_events.npz")),
-        array=["4x4x2"],
-        layout=None,
-        topic=None,
-        field=None,
-        types=None,
-        ros=None,
-        rate_hz=None,
-        limit=10**9,
-    ),
-    "taxel.tasks.OpenOptions.open": plain(lambda path: tasks.OpenOptions().open(path), path="here_events.npz"),
-    "taxel.tasks.OpenOptions.joined": plain(lambda path: tasks.OpenOptions().joined(path), path="here_events.npz"),
-    "taxel.tasks.OpenOptions.one": plain(lambda path: tasks.OpenOptions().one(path), path="here_events.npz"),
-    "taxel.tasks.OpenOptions.all": plain(lambda paths: tasks.OpenOptions().all(paths), paths=["here_events.npz"]),
 }
 
 #: For each type that only taxel constructs, a call that returns an instance.

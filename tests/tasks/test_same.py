@@ -56,7 +56,8 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
     if place.is_file():
         page = requests().train(place, tmp_path / "page.json").splitlines()
         texts.add((tmp_path / "page.json").read_text())
-        assert page == [*training.lines(), *(f"warning: {text}" for text in training.warnings)]
+        following = f"written to page.json; next: taxel detect RECORDING --readout {tmp_path / 'page.json'}"
+        assert page == [*training.lines(), "", following, *(f"warning: {text}" for text in training.warnings)]
     assert len(texts) == 1
     assert json.loads(shell.stdout) == {"readout": str(tmp_path / "shell.json"), **training.to_dict()}
     assert process == json.loads(json.dumps(training.to_dict()))

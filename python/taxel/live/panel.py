@@ -52,7 +52,7 @@ class Panel:
     opens : function of a path, optional
         Opens the recording that is shown first, or of a folder each of its files, and returns its trials, and must heed
         `options`; default: `OpenOptions.joined`.
-    options : taxel.tasks.OpenOptions, optional
+    options : taxel.recording.open_options.OpenOptions, optional
         What the files do not hold themselves; the page trains on a file by them too. Labels of pictures that have times
         by its `rate_hz` are saved in numbers of pictures.
 

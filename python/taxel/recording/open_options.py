@@ -37,7 +37,7 @@ class OpenOptions:
         A folder of .msg or .idl files, for a ROS bag that lacks definitions.
     ros : str, optional
         The release of ROS whose messages a bag holds undefined, as "humble".
-    rate_hz : float, optional
+    rate_hz : float, Hz, optional
         Pictures a second, for recordings without times.
     limit : int, bytes, optional
         How much of a recording may be read into memory.

@@ -6,7 +6,6 @@ by its own methods. The command line and the page call these functions; ``python
 process of its own (`taxel.tasks.__main__`).
 """
 
-from taxel.recording.open_options import OpenOptions
 from taxel.tasks.calibrate import Calibrated, CalibrateOptions, KnownLoad, calibrate
 from taxel.tasks.detect import Detected, Detecting, DetectOptions, detect
 from taxel.tasks.encode import Encoded, EncodeOptions, encode
@@ -28,7 +27,6 @@ __all__ = [
     "Information",
     "InformationOptions",
     "KnownLoad",
-    "OpenOptions",
     "TakenRest",
     "TrainOptions",
     "Training",

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import flag, instance, mapping, several
+from taxel._base.arguments import finite, flag, instance, mapping, several
+from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import text as checked_text
 from taxel._base.messages import collected
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -40,6 +42,11 @@ class KnownLoad:
         Column and row of the only taxel that bears it.
     place : str
         Where it is stated, for errors.
+
+    Examples
+    --------
+    >>> KnownLoad(9.81, from_s=2, to_s=4).unit
+    'N'
     """
 
     load: float
@@ -48,6 +55,13 @@ class KnownLoad:
     to_s: float | None = None
     taxel: tuple[int, int] | None = None
     place: str = "load"
+
+    def __post_init__(self) -> None:
+        """Refuse times that are none; the load is checked where it is fitted."""
+        checked_text("place", self.place)
+        for name in ("from_s", "to_s"):
+            if getattr(self, name) is not None:
+                finite(name, getattr(self, name), "s")
 
 
 @dataclass(frozen=True)
@@ -66,13 +80,18 @@ class CalibrateOptions:
         Of the calibrated values, at a taxel.
     each : bool
         Whether a gain is fitted for each taxel.
-    exponent : float, optional
+    exponent : float, above 0, optional
         The exponent, given instead of fitted.
     tare : Tare, path or float (s), optional
         The rest of the taxels: a tare, its file, or the seconds at rest at the beginning. Default: that of a quiet
         stretch.
     date, note : str
         Date of the calibration (default: today), and which sensor and weights.
+
+    Examples
+    --------
+    >>> CalibrateOptions(law=True, sensor={"exponent": 1.0}, unit="kPa").each
+    False
     """
 
     law: bool = False
@@ -89,6 +108,8 @@ class CalibrateOptions:
         """Refuse options that contradict each other, before the recording is read."""
         flag("law", self.law), flag("each", self.each), mapping("sensor", self.sensor)
         check_tare(self.tare)
+        if self.table is not None:
+            checked_path("table", self.table)
         if self.law and self.table is not None:
             raise ProblemError("--law and --table: one of the two")
         if self.sensor and not self.law:
@@ -155,7 +176,8 @@ def calibrate(
     """
     instance("recording", recording, Recording)
     asked = CalibrateOptions() if options is None else instance("options", options, CalibrateOptions)
-    known = read_loads(loads) if isinstance(loads, str | os.PathLike) else several("loads", loads)
+    table = isinstance(loads, str | os.PathLike)
+    known = read_loads(checked_path("loads", loads)) if table else several("loads", loads)
     if not known and not asked.law and asked.table is None:
         raise ProblemError("nothing to calibrate by: give --load, --loads, --table or --law")
     if not known and (asked.each or asked.exponent is not None):

@@ -48,6 +48,11 @@ class DetectOptions:
         Length of the board's frame. Default: by the registers or the frames, else 192.
     window_ms : float, ms
         Largest distance of a detection from its event.
+
+    Examples
+    --------
+    >>> DetectOptions(tare=0.5).window_ms
+    50.0
     """
 
     tare: GivenTare | None = None

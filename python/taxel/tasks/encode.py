@@ -37,6 +37,11 @@ class EncodeOptions:
     tare : Tare, path or float (s), optional
         The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of the recording. Default: 0
         of pictures in a unit of force or pressure, else none.
+
+    Examples
+    --------
+    >>> EncodeOptions("level_crossing", {"levels": [40.0, 80.0]}).encoder
+    'level_crossing'
     """
 
     encoder: str
@@ -101,6 +106,16 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
     ------
     ProblemError : an encoder that is none, or that needs a tare; a tare that does not fit
     FormatError : a file that is no tare
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import taxel
+    >>> frames = taxel.Frames([[[0.0]], [[9.0]], [[0.0]]], [0, 10_000, 20_000], unit="N")
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "press.npz"
+    >>> _ = taxel.convert(frames, place)
+    >>> encode(taxel.open(place), EncodeOptions("level_crossing", {"levels": [5.0]})).trains.counts
+    array([1, 1])
     """
     show = (lambda *_: None) if progress is None else callback("progress", progress)
     asked = instance("options", options, EncodeOptions)

@@ -56,6 +56,16 @@ def info(recording: Recording, tare: GivenTare | None = None) -> Info:
     Raises
     ------
     ProblemError : a tare that does not fit
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import taxel
+    >>> frames = taxel.Frames([[[0.0]], [[9.0]], [[0.0]]], [0, 10_000, 20_000], unit="N")
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "press.npz"
+    >>> _ = taxel.convert(frames, place)
+    >>> info(taxel.open(place)).facts["pressure"]["peak"]
+    {'most': 9.0, 't_us': 10000}
     """
     instance("recording", recording, Recording)
     with collected() as warnings:

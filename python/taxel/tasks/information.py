@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from taxel._base.arguments import callback, instance, mapping, several, text, whole
+from taxel._base.arguments import path as checked_path
 from taxel._base.messages import collected, counted
 from taxel._base.progress import Progress
 from taxel._core import ProblemError
@@ -32,8 +33,15 @@ class InformationOptions:
     window_ms : float, ms, optional
     windows_ms, periods_ms : sequence of float, ms, optional
     taxels, pools : sequence of int, optional
-    draws, folds, shuffles, seed : int
+    draws, shuffles : int, 1 or more
+    folds : int, 2 or more
+    seed : int, 0 or more
     classifiers : sequence of {"neighbours", "cone_r", "tempotron"}
+
+    Examples
+    --------
+    >>> InformationOptions(window_ms=50.0, classifiers=[]).folds
+    10
     """
 
     encoder: str = "change_events"
@@ -119,6 +127,7 @@ def information(
     asked = InformationOptions() if options is None else instance("options", options, InformationOptions)
     show = (lambda *_: None) if progress is None else callback("progress", progress)
     encoder, opened = asked._chosen(), sensors_of(recordings)
+    labels = None if labels is None else checked_path("labels", labels)
     with collected() as warnings:
         trials = _trials(labels, opened, asked.window_ms)
         if labels is None and len({trial.label for trial in trials}) == 1:

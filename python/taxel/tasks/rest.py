@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import number
+from taxel._base.arguments import instance, number
 from taxel._base.arguments import path as checked_path
 from taxel._base.messages import warn
 from taxel._base.number_text import float_of
@@ -114,7 +114,7 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     >>> str(taken), taken.tare.rest[0, 0]
     ('its first quiet stretch, 0.000 to 0.500 s', np.float64(50.0))
     """
-    source = recorded(recording, hold=False)
+    source = recorded(instance("recording", recording, Recording), hold=False)
     begin_us = beginning_us(source.t[:1])
     if tare is not None:
         seconds = seconds_of(tare)

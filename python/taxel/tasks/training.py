@@ -47,6 +47,11 @@ class TrainOptions:
         Whether each neuron's parameters are chosen among those that the recipe lists, on held-out data.
     window_ms : float, ms
         Largest distance of a detection from its event.
+
+    Examples
+    --------
+    >>> TrainOptions("touch", {"neurons.contact.kappa": 1.5}, tare=0.05).changes
+    {'neurons.contact.kappa': 1.5}
     """
 
     recipe: str | None = None

@@ -27,6 +27,14 @@ _INTERRUPTED = 130
 _STOPPED = "the training was stopped: nothing was written"
 
 
+def _typed(path: Path) -> str:
+    """Return a path as it is typed in the folder where taxel was started."""
+    here = Path.cwd()
+    name = str(path.relative_to(here) if path.is_relative_to(here) else path)
+    # A name that begins with a dash is no option.
+    return f"./{name}" if name.startswith("-") else name
+
+
 class TrainingRequests:
     """Train readouts in a process of their own, one at a time, and run them on recordings.
 
@@ -71,7 +79,9 @@ class TrainingRequests:
         if said["type"] != "result":
             stopped = code < 0 or code == _INTERRUPTED
             raise ProblemError(_STOPPED if stopped else f"the training ended with code {code}")
-        return "\n".join([*said["lines"], *(f"warning: {text}" for text in said["result"]["warnings"])])
+        following = shlex.join(["taxel", "detect", "RECORDING", "--readout", _typed(out)])
+        lines = [*said["lines"], "", f"written to {out.name}; next: {following}"]
+        return "\n".join([*lines, *(f"warning: {text}" for text in said["result"]["warnings"])])
 
     def _answer(self, training: ChildProcess, request: dict[str, Any]) -> dict[str, Any]:
         """Ask for a training, wait until it has ended, and return the last line that it wrote."""
@@ -96,12 +106,8 @@ class TrainingRequests:
 
     def command(self, recording: Path, out: Path) -> str:
         """Return the command that trains the same in a shell, in the folder where taxel was started."""
-        here = Path.cwd()
-        near = (str(path.relative_to(here) if path.is_relative_to(here) else path) for path in (recording, out))
-        # A name that begins with a dash is no option.
-        named, written = (f"./{name}" if name.startswith("-") else name for name in near)
         words = self._opening.options_of(recording).words()
-        return shlex.join(["taxel", "train", named, "--labels", "notes", "-o", written, *words])
+        return shlex.join(["taxel", "train", _typed(recording), "--labels", "notes", "-o", _typed(out), *words])
 
     def end(self) -> None:
         """End the training that runs, if one does."""
