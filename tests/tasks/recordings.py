@@ -13,14 +13,20 @@ import taxel
 REST_US = 700_000
 
 
-def board(folder: Path, seed: int = 9) -> Path:
-    """Write a board's events; return the file."""
+def rested(seed: int) -> tuple[taxel.Events, dict[str, np.ndarray]]:
+    """Return a board's events, which begin with rest, and their labels."""
     events, truth = touches(seed)
     first = min(int(times[0]) for times in truth.values()) - 20_000
-    later = np.where(events.t >= first, REST_US, 0)
-    moved = taxel.Events(events.t + later, events.x, events.y, events.p, intensity=events.intensity, array=events.array)
-    taxel.convert(moved, folder / f"{seed}.mcap")
-    _labels(folder / f"{seed}.notes.csv", {label: np.add(times, REST_US) for label, times in truth.items()})
+    t = events.t + np.where(events.t >= first, REST_US, 0)
+    later = taxel.Events(t, events.x, events.y, events.p, intensity=events.intensity, array=events.array)
+    return later, {label: np.add(times, REST_US) for label, times in truth.items()}
+
+
+def board(folder: Path, seed: int = 9) -> Path:
+    """Write a board's events; return the file."""
+    events, truth = rested(seed)
+    taxel.convert(events, folder / f"{seed}.mcap")
+    _labels(folder / f"{seed}.notes.csv", truth)
     return folder / f"{seed}.mcap"
 
 

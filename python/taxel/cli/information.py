@@ -85,8 +85,8 @@ def information(
         _whole("--taxels", taxels),
         _whole("--pools", pools),
         draws,
-        folds,
         shuffles,
+        folds,
         seed,
         [name for name in classifiers.split(",") if name],
     )

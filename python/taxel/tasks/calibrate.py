@@ -43,6 +43,10 @@ class KnownLoad:
     place : str
         Where it is stated, for errors.
 
+    Raises
+    ------
+    ProblemError : times or a load that are none
+
     Examples
     --------
     >>> KnownLoad(9.81, from_s=2, to_s=4).unit
@@ -87,6 +91,10 @@ class CalibrateOptions:
         stretch.
     date, note : str
         Date of the calibration (default: today), and which sensor and weights.
+
+    Raises
+    ------
+    ProblemError : options that contradict each other, or values that are none
 
     Examples
     --------

@@ -49,6 +49,10 @@ class DetectOptions:
     window_ms : float, ms
         Largest distance of a detection from its event.
 
+    Raises
+    ------
+    ProblemError : values that no recordings could make valid
+
     Examples
     --------
     >>> DetectOptions(tare=0.5).window_ms

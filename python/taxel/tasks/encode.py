@@ -38,6 +38,10 @@ class EncodeOptions:
         The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of the recording. Default: 0
         of pictures in a unit of force or pressure, else none.
 
+    Raises
+    ------
+    ProblemError : an encoder or parameters that are none
+
     Examples
     --------
     >>> EncodeOptions("level_crossing", {"levels": [40.0, 80.0]}).encoder

@@ -38,6 +38,10 @@ class InformationOptions:
     seed : int, 0 or more
     classifiers : sequence of {"neighbours", "cone_r", "tempotron"}
 
+    Raises
+    ------
+    ProblemError : an encoder that is none of the two, or parameters that it has not
+
     Examples
     --------
     >>> InformationOptions(window_ms=50.0, classifiers=[]).folds
@@ -52,8 +56,8 @@ class InformationOptions:
     taxels: Sequence[int] | None = None
     pools: Sequence[int] | None = None
     draws: int = 5
-    folds: int = 10
     shuffles: int = 20
+    folds: int = 10
     seed: int = 0
     classifiers: Sequence[str] = ("neighbours",)
 

@@ -48,6 +48,10 @@ class TrainOptions:
     window_ms : float, ms
         Largest distance of a detection from its event.
 
+    Raises
+    ------
+    ProblemError : values that no recordings and labels could make valid; a recipe that is none
+
     Examples
     --------
     >>> TrainOptions("touch", {"neurons.contact.kappa": 1.5}, tare=0.05).changes
