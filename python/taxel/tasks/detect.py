@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import finite, instance, number
+from taxel._base.arguments import finite, instance
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, lines_to
 from taxel._core import ProblemError
@@ -67,7 +67,7 @@ class DetectOptions:
         """Refuse values that no recordings could make valid, before these are read."""
         check_tare(self.tare)
         finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
-        number("window_ms", self.window_ms, "ms")
+        finite("window_ms", self.window_ms, "ms", least=0.0)
 
 
 @dataclass(frozen=True, eq=False)

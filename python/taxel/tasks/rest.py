@@ -146,8 +146,7 @@ def given_tare(tare: GivenTare, recording: Recording) -> Tare:
     seconds = seconds_of(tare)
     if seconds is None:
         return Tare.load(checked_path("tare", tare))
-    if not 0 < seconds < np.inf:
-        raise ProblemError(f"--tare {tare}: must be seconds above 0, or a file")
+    check_tare(tare)
     source = recorded(recording)
     if not len(source):
         raise ProblemError(f"{recording.path}: holds nothing to take a tare from")
@@ -166,9 +165,10 @@ def given_tare(tare: GivenTare, recording: Recording) -> Tare:
 
 
 def check_tare(tare: GivenTare | None) -> None:
-    """Refuse what is neither a tare nor a path nor seconds."""
-    if tare is not None:
-        seconds_of(tare)
+    """Refuse what is neither a tare nor a path nor seconds above 0."""
+    seconds = None if tare is None else seconds_of(tare)
+    if seconds is not None and not 0 < seconds < np.inf:
+        raise ProblemError(f"--tare {tare}: must be seconds above 0, or a file")
 
 
 def seconds_of(tare: GivenTare) -> float | None:

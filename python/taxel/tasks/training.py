@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from taxel._base.arguments import flag, mapping, number, whole
+from taxel._base.arguments import finite, flag, mapping, whole
 from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
@@ -70,7 +70,7 @@ class TrainOptions:
         mapping("changes", self.changes)
         check_tare(self.tare)
         flag("search", self.search)
-        number("window_ms", self.window_ms, "ms")
+        finite("window_ms", self.window_ms, "ms", least=0.0)
         if self.folds is not None and whole("folds", self.folds, 0) == 1:
             raise ProblemError("--folds 1: must be 2 or more, or 0 for none")
         self._plan()
