@@ -263,7 +263,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
     (folder / "layout.toml" if beside else layout).write_text(text)
     given = {} if beside else {"layout": layout}
     for name in TABLES:
-        with Panel(folder / name, **given) as panel, Client(panel) as page:
+        with Panel(folder / name, options=OpenOptions(**given)) as panel, Client(panel) as page:
             shown_alike(page, [name], values)
     assert [one.name for one in taxel.open(folder, **given)] == list(TABLES)
     (folder / "labels.csv").write_text("recording,label,t_us\npalm,contact,100000\n")
@@ -296,15 +296,15 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
     rng = np.random.default_rng(4)
     trials = {}
     for number in range(1, 5):
-        raw = np.full((120, 60), 240) + rng.integers(-1, 2, (120, 60))
-        for begin in range(10, 110, 20):
+        raw = np.full((180, 60), 240) + rng.integers(-1, 2, (180, 60))
+        for begin in range(70, 170, 20):
             raw[begin : begin + 8, 20:40] -= 90
         trials[number] = np.clip(raw, 0, 255)
     file = write_icub(tmp_path, trials=trials)
     with viewed(tmp_path, file, "--rate-hz", 100) as page:
         for trial in ("ball/1", "ball/3"):
             opened(page, file.name, trial=trial)
-            for begin in range(10, 110, 20):
+            for begin in range(70, 170, 20):
                 assert page.ask("mark", label="touch", t_us=begin * 10_000)["type"] == "done"
         opened(page, file.name, trial="ball/3")
         labels = page.since_asked("labels")["labels"]
