@@ -16,6 +16,7 @@ from taxel import Array, Frames, Places
 from taxel.live import Panel
 from taxel.live import _shown_files as shown_files
 from taxel.live._shown_files import side_by_side
+from taxel.recording.contents import Contents, source_from
 from taxel.recording.opening import open_joined
 from taxel.recording.pressure import above_rest, force_n
 from taxel.recording.rest import ticks_by_unit
@@ -197,8 +198,8 @@ def test_an_encoder_that_does_not_fit_pictures_is_refused_with_the_reason(tmp_pa
 
 def test_pictures_without_times_are_numbered(tmp_path):
     frames = Frames(np.arange(12.0).reshape(4, 1, 3), np.arange(4), array=Array(1, 3))
-    trial = taxel.open(write_icub(tmp_path))[0]._contents
-    taxel.convert(taxel.Recording(trial.but(frames=frames, array=frames.array)), tmp_path / "grasp.npz")
+    trial = taxel.open(write_icub(tmp_path))[0]._contents.one
+    taxel.convert(taxel.Recording(Contents.of(source_from(frames, trial.origin, untimed=True))), tmp_path / "grasp.npz")
     with Panel(tmp_path / "grasp.npz") as panel, Client(panel) as page:
         about = opened(page, "grasp.npz")
         us = about["pictures"]["picture_us"]

@@ -1,4 +1,4 @@
-"""What recordings once lost without a word, case by case; in any chain of steps see test_fates.py."""
+"""What recordings once lost without a word, case by case; in any chain of steps see test_chains.py."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from taxel.encode import LevelCrossing
 from taxel.wire import Registers
 
 from .making import some_events, some_frames
+from .test_chains import write
 from .test_commands import run
-from .test_fates import write
 
 SLOW = 7.81
 

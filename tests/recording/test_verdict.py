@@ -11,7 +11,7 @@ import pytest
 
 import taxel
 from taxel import _core
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Contents, Losses, Origin, known, source_from
 
 from .making import record, some_events
 
@@ -116,8 +116,9 @@ def test_verdicts_of_all_counts_are_on_the_page(seed: int) -> None:
 def test_remarks_go_to_files_and_back_beside_the_verdict(tmp_path: Path, kind: str) -> None:
     frames = taxel.Frames([[[1.0, 2.0]], [[3.0, 4.0]]], [0, 10_000])
     said = ("at the bag's times", "2 messages of another length left out")
-    of = Contents(tmp_path / "a.bag", "a.bag", "ros", frames.array, frames=frames, remarks=said, verdict="nothing lost")
-    taxel.convert(taxel.Recording(of), tmp_path / f"a{kind}")
+    losses = Losses(remarks=said, verdict=known("nothing lost"))
+    of = source_from(frames, Origin(tmp_path / "a.bag", "a.bag", "ros"), losses=losses)
+    taxel.convert(taxel.Recording(Contents.of(of)), tmp_path / f"a{kind}")
     back = taxel.open(tmp_path / f"a{kind}")
     made = ("converted from a.bag",) * (kind == ".mcap")
     assert (back.verdict, back.remarks) == ("nothing lost", said + made)

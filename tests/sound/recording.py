@@ -6,10 +6,10 @@ from typing import Any
 
 import taxel
 from sound.things import ARRAY, EVENTS, FRAMES, TARE, Sound, plain
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Contents, Origin, source_from
 
 #: A recording of numbered pictures, without times.
-NUMBERED = Contents(Path("grasp"), "grasp", "icub", ARRAY, frames=FRAMES, untimed=True)
+NUMBERED = Contents.of(source_from(FRAMES, Origin(Path("grasp"), "grasp", "icub"), untimed=True))
 
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {

@@ -131,11 +131,10 @@ class FileOptions:
         if not self.array or recording.kind == "ros":
             return recording
         from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
-        from taxel.recording.layout import on_array  # noqa: PLC0415
 
         own, given = recording.array, geometry(self.array[0], of_wire=False)
         if _is_row_of(recording, given):
-            return type(recording)(on_array(recording._contents, given))
+            return _laid_on(recording, given)
         differs = given.pitch_mm is not None and (own.pitch_mm, own.places) != (given.pitch_mm, None)
         if own.shape != given.shape or differs:
             sizes = ", ".join(self.array)
@@ -145,7 +144,7 @@ class FileOptions:
             return recording
         # A size without a pitch says nothing of it, and events without one are of the board's wire.
         wire = geometry(self.array[0])
-        return type(recording)(on_array(recording._contents, Array(*own.shape, wire.pitch_mm, own.exists, wire.name)))
+        return _laid_on(recording, Array(*own.shape, wire.pitch_mm, own.exists, wire.name))
 
     def joined(self, path: Path) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
@@ -180,6 +179,15 @@ class FileOptions:
             some = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
             raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")
         return every[0]
+
+
+def _laid_on(recording: Recording, array: Array) -> Recording:
+    """Return a recording on another description of its sensor."""
+    from taxel.recording.contents import Contents  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.layout import on_array  # noqa: PLC0415
+
+    own = recording._contents
+    return type(recording)(Contents(on_array(own.one, array), own.sources))
 
 
 def _is_row_of(recording: Recording, given: Array) -> bool:

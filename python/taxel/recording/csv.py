@@ -28,7 +28,7 @@ from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Origin, Source, source_from
 from taxel.recording.npz import around
 
 __all__ = ["array_in_csv", "check_head", "read_csv", "write_csv"]
@@ -65,9 +65,8 @@ def array_in_csv(table: Events | Frames) -> Array:
     return Array(rows, columns, exists=None if exists.all() else exists)
 
 
-def write_csv(file: BinaryIO, contents: Contents) -> None:
+def write_csv(file: BinaryIO, table: Events | Frames) -> None:
     """Write a .csv."""
-    table = contents.table
     if isinstance(table, Frames):
         places = _places(table.array)
         names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
@@ -96,16 +95,14 @@ def write_csv(file: BinaryIO, contents: Contents) -> None:
         file.write("\n".join(map(",".join, zip(*(r.tolist() for r in rows), strict=True))).encode() + b"\n")
 
 
-def read_csv(path: Path, array: Array | None) -> Contents:
+def read_csv(path: Path, array: Array | None) -> Source:
     """Read a .csv of events or of pictures.
 
     Raises
     ------
     FormatError : another header, or an invalid value (names line and column)
     """
-    table = limited(path, _table(path, array))
-    events, frames = (table, None) if isinstance(table, Events) else (None, table)
-    return Contents(path, path.name, "csv", table.array, events=events, frames=frames)
+    return source_from(limited(path, _table(path, array)), Origin(path, path.name, "csv"))
 
 
 def check_head(path: Path) -> None:

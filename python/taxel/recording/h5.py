@@ -23,8 +23,8 @@ from taxel._base.files import open_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
-from taxel.recording.contents import Contents
-from taxel.recording.npz import DTYPES, TEXTS, chosen, columns_of, contents_of
+from taxel.recording.contents import Source
+from taxel.recording.npz import DTYPES, TEXTS, chosen, columns_of, source_of_columns
 
 __all__ = ["is_ours", "read_h5", "write_h5"]
 
@@ -59,14 +59,14 @@ def _holds(file: BinaryIO, word: bytes) -> bool:
     return False
 
 
-def write_h5(path: Path, contents: Contents, *, overwrite: bool) -> None:
+def write_h5(path: Path, source: Source, *, overwrite: bool) -> None:
     """Write a .h5, column after column in pieces.
 
     Raises
     ------
     As `taxel._base.h5_writing.write_h5`.
     """
-    columns = columns_of(contents)
+    columns = columns_of(source)
 
     def send(pipe: BinaryIO) -> None:
         for name, column in columns.items():
@@ -109,7 +109,7 @@ def _pieces(shape: Sequence[int], itemsize: int) -> Iterator[slice]:
         yield slice(start, min(start + step, shape[0]))
 
 
-def read_h5(path: Path, array: Array | None) -> Contents:
+def read_h5(path: Path, array: Array | None) -> Source:
     """Read a .h5 that taxel wrote.
 
     Raises
@@ -132,4 +132,4 @@ def read_h5(path: Path, array: Array | None) -> Contents:
             name: np.array(h5.text(name, TEXTS[name])) if name in TEXTS else h5.numbers(name, DTYPES.get(name))
             for name in names
         } or {name: np.empty(0) for name in list(h5.entries)[:8]}
-    return contents_of(path, "h5", columns, array)
+    return source_of_columns(path, "h5", columns, array)

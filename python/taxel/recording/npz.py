@@ -27,11 +27,11 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
-from taxel.recording.description import about_of, json_of
+from taxel.recording.contents import Origin, Source
+from taxel.recording.description import about_of, described_source, json_of
 from taxel.recording.layout import check_size
 
-__all__ = ["DTYPES", "TEXTS", "around", "chosen", "columns_of", "contents_of", "read_npz", "write_npz"]
+__all__ = ["DTYPES", "TEXTS", "around", "chosen", "columns_of", "read_npz", "source_of_columns", "write_npz"]
 
 _EVENTS = ("t", "x", "y", "p")
 _COLUMNS = (*_EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
@@ -52,18 +52,20 @@ _DIGEST = "digest"
 _PIECE_BYTES = 1 << 20
 
 
-def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
+def columns_of(source: Source) -> dict[str, NDArray[Any]]:
     """Return a recording as columns by name, with their checksum.
 
     Raises
     ------
     ProblemError : more markers, or a longer description, than are read again
     """
-    table = contents.table
+    table = source.table
     columns: dict[str, Any]
     if isinstance(table, Frames):
         if (count := len(table.unit)) > UNIT:
-            raise ProblemError(f"{contents.name}: a unit of {count} characters; a .npz and a .h5 hold at most {UNIT}")
+            raise ProblemError(
+                f"{source.origin.name}: a unit of {count} characters; a .npz and a .h5 hold at most {UNIT}"
+            )
         columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
     else:
         columns = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
@@ -73,12 +75,13 @@ def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
             columns["repaired"] = table.repaired
         if len(table.markers) > MARKERS:
             raise ProblemError(
-                f"{contents.name}: {len(table.markers)} markers; a .npz and a .h5 hold at most {MARKERS}"
+                f"{source.origin.name}: {len(table.markers)} markers; a .npz and a .h5 hold at most {MARKERS}"
             )
         columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
-    if contents.held is not None:
-        columns["held"] = contents.held
-    columns["about"] = np.array(json_of(contents))
+    held = source.settings.held()
+    if held is not None:
+        columns["held"] = held
+    columns["about"] = np.array(json_of(source))
     return {**columns, _DIGEST: _digest_of(columns)}
 
 
@@ -138,8 +141,8 @@ def _wrong_shape(name: str, there: Mapping[str, tuple[int, ...]]) -> str | None:
     return None if is_right else "one value an event, as many as t has"
 
 
-def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Contents:
-    """Return the contents of a file of columns; the arrays are not copied.
+def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Source:
+    """Return what a file of columns holds; the arrays are not copied.
 
     Parameters
     ----------
@@ -164,7 +167,7 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
             np.copyto(part, np.nan, where=np.isnan(part))
     columns = {name: frozen_whole(values) for name, values in columns.items()}
     about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
-    described = about.pop("array", None)
+    described = about.get("array")
     # A sensor of unknown pitch says nothing against the pitch of the file.
     says_less = array is not None and described is not None and not array._is_measured and described.fits(array)
     sensor = described if says_less else array or described
@@ -190,8 +193,7 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
         held = _held(columns["held"], table.array) if "held" in columns else None
     except (ProblemError, ValueError, TypeError, OverflowError) as error:
         raise FormatError(f"{path}: {first_line(error)}") from None
-    events, frames = (table, None) if isinstance(table, Events) else (None, table)
-    return Contents(path, path.name, kind, table.array, events=events, frames=frames, held=held, **about)
+    return described_source(table, held, Origin(path, path.name, kind), about)
 
 
 def _held(held: NDArray[Any], array: Array) -> NDArray[np.uint16]:
@@ -200,12 +202,12 @@ def _held(held: NDArray[Any], array: Array) -> NDArray[np.uint16]:
     return held
 
 
-def write_npz(file: BinaryIO, contents: Contents) -> None:
+def write_npz(file: BinaryIO, source: Source) -> None:
     """Write a .npz."""
-    np.savez_compressed(file, **cast(dict[str, Any], columns_of(contents)))
+    np.savez_compressed(file, **cast(dict[str, Any], columns_of(source)))
 
 
-def read_npz(path: Path, array: Array | None) -> Contents:
+def read_npz(path: Path, array: Array | None) -> Source:
     """Read a .npz that taxel wrote, or one with the columns ``t x y p`` or ``values t``.
 
     Raises
@@ -217,7 +219,7 @@ def read_npz(path: Path, array: Array | None) -> Contents:
     columns = read_arrays(path, (*_COLUMNS, _DIGEST), texts=TEXTS, dtypes=DTYPES, chosen=of_file) or {
         name: np.empty(0) for name in stored_names(path)[:8]
     }
-    return contents_of(path, "npz", columns, array)
+    return source_of_columns(path, "npz", columns, array)
 
 
 def around(x: NDArray[Any], y: NDArray[Any]) -> Array:

@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,20 @@ from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import Contents, several
+from taxel.recording.contents import (
+    Board,
+    Contents,
+    Losses,
+    Marks,
+    Origin,
+    Pictures,
+    Sensor,
+    Source,
+    Stream,
+    known,
+    several,
+    source_from,
+)
 from taxel.recording.csv import check_head, read_csv
 from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_own_table, kind_of
@@ -35,8 +48,8 @@ from taxel.recording.read_foreign import is_foreign, read_foreign
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.read_ros import Topics, read_ros
-from taxel.recording.recording import Recording, with_notes
-from taxel.recording.sidecars import with_sidecars
+from taxel.recording.recording import Recording, noted
+from taxel.recording.sidecars import labels_of, with_sidecars
 from taxel.recording.without_layout import refuse_without_layout
 
 __all__ = [
@@ -205,9 +218,9 @@ def _open_one(place: Path, how: How) -> Recording:
         if said is not None and is_foreign(place, said):
             if how.topics.are_given:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
-            contents = read_foreign(place, said)
+            contents = Contents.of(read_foreign(place, said))
             if how.array is not None:
-                contents = _on_given(contents, instance("array", how.array, Array))
+                contents = Contents.of(_on_given(contents.one, instance("array", how.array, Array)))
         elif (kind := kind_of(place)) == "ros":
             grid = said.grid() if how.array is None and said is not None else how.array
             contents = read_ros(place, how.topics.but(of_layout), grid)
@@ -216,7 +229,9 @@ def _open_one(place: Path, how: How) -> Recording:
         else:
             own = None if how.array is None else instance("array", how.array, Array)
             contents = _read(place, kind, own, how.pairing, how.differences)
-        return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
+        return Recording(
+            with_sidecars(contents if said is None else laid_out(contents, said, given=how.layout is not None))
+        )
     except MemoryError:
         raise FormatError(
             f"{place}: needs more memory than there is ({limits.available()} bytes are available): --limit BYTES "
@@ -224,16 +239,16 @@ def _open_one(place: Path, how: How) -> Recording:
         ) from None
 
 
-def _on_given(of: Contents, array: Array) -> Contents:
+def _on_given(of: Source, array: Array) -> Source:
     """Return pictures of another program on the given sensor: as many rows and columns, or a row of as many channels.
 
     Raises
     ------
     ProblemError : another number of taxels, rows or columns
     """
-    own = of.array
+    own = of.sensor.array
     if own.shape != (1, array.rows * array.columns):
-        check_size(of.path, own.shape, array)
+        check_size(of.origin.path, own.shape, array)
     says_more = array.shape != own.shape or (array._is_measured and not own._is_measured)
     return on_array(of, array) if says_more else of
 
@@ -243,8 +258,8 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
     if kind == "mcap":
         return read_mcap(place, pairing)
     if kind == "lsa":
-        return read_lsa(place, array or Array.thesis(), pairing, differences)
-    return {"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array)
+        return Contents.of(read_lsa(place, array or Array.thesis(), pairing, differences))
+    return Contents.of({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
 
 
 def _folder(folder: Path, how: How) -> list[Recording]:
@@ -286,8 +301,12 @@ def _kept(trials: Iterable[Trial]) -> Iterator[Trial]:
 
 def _kept_one(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
-    for one in recording._contents.sources.values() or [recording._contents]:
-        limits.keep(sum(_size(table) for table in (vars(one)["events"], vars(one)["frames"])))
+    for one in recording._contents.sources.values():
+        for table in (
+            one.changes.events if isinstance(one, Board) else None,
+            one.readings.frames if isinstance(one, Pictures) else None,
+        ):
+            limits.keep(0 if table is None or not table.is_read else _size(table()))
     return recording
 
 
@@ -331,7 +350,7 @@ def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recordin
 def _named_beside(place: Path, name: Path, recording: Recording) -> Recording:
     """Add the reference events of the folder to the notes of pictures that it names; the page opens them one by one."""
     table, own = place.parent / LABELS, recording._contents
-    if any(one.has_events for one in (own.sources or {own.label: own}).values()):
+    if any(one.has_events for one in own.sources.values()):
         return recording
     if not (table.is_file() and is_label_table(table)):
         return recording
@@ -343,23 +362,21 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     """Add the reference events of a recording, and of each of its sources, to the notes."""
     own = recording._contents
     if not own.is_several:
-        return recording.with_notes(_notes(labels, name, own))
-    sources: dict[str, Contents] = {}
-    for label, one in own.sources.items():
-        more = () if one.columns else _notes(labels, name, one)
-        sources[label] = with_notes(one.but(sources={}), tuple(more))
-    for label, one in sources.items():
-        sources[label] = one.but(sources=sources)
-    return Recording(several(sources))
+        return recording.with_notes(_notes(labels, name, own.one))
+    sources = {
+        label: one if isinstance(one, Stream) else noted(one, tuple(_notes(labels, name, one)))
+        for label, one in own.sources.items()
+    }
+    return Recording(Contents(several(sources), sources))
 
 
-def _notes(labels: Labels, name: Path, of: Contents) -> list[Note]:
+def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
-    clock = of.clock if of.clock is not None and len(of.clock.board_us) else None
-    times = labels._of(name, lambda: clock, of.label)
-    which, replaced, there = (of.path, of.label, trial_of(of.name, of.label)), set[int | None](), set[object]()
-    if beside(of.path).is_file():
-        set_here = Labels(beside(of.path))
+    clock = of.timing.clock() if of.timing.clock.holds() else None
+    times = labels._of(name, lambda: clock, of.origin.label)
+    which, replaced, there = labels_of(of.origin), set[int | None](), set[object]()
+    if beside(of.origin.path).is_file():
+        set_here = Labels(beside(of.origin.path))
         replaced, there = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
     return sorted(
         (
@@ -391,15 +408,20 @@ def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | N
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
-    table = trial.recorded
-    events, frames = (table, None) if isinstance(table, Events) else (None, table)
-    path = place if place.is_file() else place / trial.name
-    held: dict[str, Any] = {"events": events, "frames": frames, "source": trial.source, "notes": tuple(notes)}
     label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
-    held |= {"untimed": not trial.timed, "label": label, "lost": _beside_pictures(trial)}
-    contents = Contents(path, trial.name, kind, table.array, side=trial.foot, **held)
+    origin = Origin(place if place.is_file() else place / trial.name, trial.name, kind, label, trial.source)
+    contents = Contents.of(
+        source_from(
+            trial.recorded,
+            origin,
+            untimed=not trial.timed,
+            sensor=Sensor(trial.recorded.array, trial.foot),
+            marks=Marks(notes=known(tuple(notes))),
+            losses=Losses(lost=known(_beside_pictures(trial))),
+        )
+    )
     said = _layout(place, layout)
-    return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
+    return Recording(with_sidecars(contents if said is None else laid_out(contents, said, given=layout is not None)))
 
 
 def _beside_pictures(trial: Trial) -> tuple[str, ...]:
@@ -474,18 +496,18 @@ def joined(opened: Sequence[Recording]) -> list[Recording]:
     """
     groups: dict[tuple[str, str], dict[str, Contents]] = {}
     for recording in opened:
-        own = recording._contents
+        own = recording._contents.one.origin
         # In a folder the path of a trial ends with its name, and so with its foot.
         key = (str(own.path).removesuffix(f" {own.label}"), own.name.removesuffix(f" {own.label}"))
-        groups.setdefault(key, {})[own.label or own.name] = own
+        groups.setdefault(key, {})[own.label or own.name] = recording._contents
     together: list[Recording] = []
-    for (path, _), sources in groups.items():
-        if set(sources) == set(FEET):
-            both: dict[str, Contents] = {}
-            both.update({foot: sources[foot].but(path=Path(path), sources=both) for foot in FEET})
-            together.append(Recording(several(both)))
+    for (path, _), feet in groups.items():
+        if set(feet) == set(FEET):
+            both = {foot: feet[foot].one for foot in FEET}
+            both = {foot: replace(one, origin=replace(one.origin, path=Path(path))) for foot, one in both.items()}
+            together.append(Recording(Contents(several(both), both)))
         else:
-            together += [Recording(one) for one in sources.values()]
+            together += [Recording(one) for one in feet.values()]
     return together
 
 
