@@ -484,7 +484,7 @@ def applied(of: S, rule: Callable[[Part], Part | None], lines: Callable[[], Iter
     gone = [parts[name] for name, part in after.items() if part is None]
     # Only a part whose fields have defaults may be lost.
     none: Callable[[str], Any] = lambda name: type(parts[name])()  # type: ignore[call-arg]  # noqa: E731
-    kept = {name: none(name) if part is None else part for name, part in after.items()}
+    kept: dict[str, Any] = {name: none(name) if part is None else part for name, part in after.items()}
     return saying(replace(of, **kept), lambda: [*(line for part in gone for line in part.lines()), *lines()])
 
 
