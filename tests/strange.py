@@ -14,7 +14,9 @@ from formats import bags
 import taxel
 from taxel import Note
 from taxel.recording import Recording
-from taxel.recording.contents import Contents, Losses, Marks, Origin, known, source_from
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Marks, Origin
 
 #: What a terminal would obey, in a name: clear the screen, set its title; C1, DEL, directions, separators.
 SEQUENCE = "\x1b[2J\x1b]0;owned\x07\x9b31m\x7f\x08\u202e\u2066\u200e\u200f\u061c\u2028\u2029"

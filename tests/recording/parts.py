@@ -10,8 +10,9 @@ import numpy as np
 
 from taxel.calibration import Calibration
 from taxel.clock import Clock
-from taxel.recording.contents import UNKNOWN, Once, Source, parts_of
+from taxel.recording.contents import Source, parts_of
 from taxel.recording.notes import Datagrams, Samples
+from taxel.recording.once import UNKNOWN, Once
 
 #: What a line in `lost` says of a field that is lost: one of these.
 WORDS: dict[str, tuple[str, ...]] = {

@@ -13,7 +13,7 @@ import pytest
 
 import taxel
 from taxel import Array, Events, Note, _core
-from taxel.recording.contents import Once
+from taxel.recording.once import Once
 from taxel.wire import Registers
 
 ARRAY = Array(8, 10, 2.0, name="mat")

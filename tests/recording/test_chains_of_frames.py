@@ -17,18 +17,9 @@ from numpy.typing import NDArray
 
 import taxel
 from taxel import Array, Frames, Note, _core
-from taxel.recording.contents import (
-    Contents,
-    Losses,
-    Marks,
-    Origin,
-    Readings,
-    Sensor,
-    Source,
-    alone,
-    known,
-    source_from,
-)
+from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Marks, Origin, Readings, Sensor
 
 #: The kinds of files that hold frames.
 KINDS = (".mcap", ".npz", ".h5", ".csv")

@@ -16,8 +16,9 @@ import pytest
 
 import taxel
 from taxel._core import FormatError
-from taxel.recording.contents import Contents, known
+from taxel.recording.contents import Contents
 from taxel.recording.npz import columns_of, source_of_columns
+from taxel.recording.once import known
 from taxel.recording.verdict import Verdict
 
 from .making import record, some_events, some_frames

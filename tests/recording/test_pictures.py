@@ -23,8 +23,10 @@ from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
 from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
-from taxel.recording.contents import Contents, Losses, Marks, Origin, Source, alone, known, source_from
+from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.once import known
 from taxel.recording.opening import joined, open_joined
+from taxel.recording.parts import Losses, Marks, Origin
 
 WHOLE = st.integers(0, 65_535).map(float)
 ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True, allow_infinity=False), st.sampled_from([-0.0, 65_536.0]))

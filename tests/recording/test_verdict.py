@@ -11,7 +11,9 @@ import pytest
 
 import taxel
 from taxel import _core
-from taxel.recording.contents import Contents, Losses, Origin, known, source_from
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Origin
 
 from .making import record, some_events
 

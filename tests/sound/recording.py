@@ -6,7 +6,8 @@ from typing import Any
 
 import taxel
 from sound.things import ARRAY, EVENTS, FRAMES, TARE, Sound, plain
-from taxel.recording.contents import Contents, Origin, source_from
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.parts import Origin
 
 #: A recording of numbered pictures, without times.
 NUMBERED = Contents.of(source_from(FRAMES, Origin(Path("grasp"), "grasp", "icub"), untimed=True))

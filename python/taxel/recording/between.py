@@ -17,28 +17,10 @@ from taxel import _core
 from taxel._base.files import open_file
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.recording.contents import (
-    UNKNOWN,
-    Board,
-    Changes,
-    Contents,
-    Lines,
-    Losses,
-    Marks,
-    Once,
-    Origin,
-    Part,
-    Readings,
-    S,
-    Sensor,
-    Settings,
-    Source,
-    Timing,
-    Wire,
-    applied,
-    together,
-)
+from taxel.recording import parts
+from taxel.recording.contents import Board, Contents, S, Source, applied, together
 from taxel.recording.kinds import verdict_of
+from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.verdict import Verdict
 
 __all__ = ["Slices", "between", "inside"]
@@ -55,33 +37,35 @@ def between(of: Contents, start: float, stop: float) -> Contents:
     every, whole = of.sources, _between(of.one, of.sources, start, stop)
     if len(every) == 1:
         return Contents.of(whole)
-    parts = {name: _between(one, every, start, stop) for name, one in inside(every).items()}
+    every_part = {name: _between(one, every, start, stop) for name, one in inside(every).items()}
     apart = Once(lambda: len(every) > 1 and of.one.timing.clock_of is None and not together(every))
-    return Contents(whole, Slices(parts, of.one.origin, apart))
+    return Contents(whole, Slices(every_part, of.one.origin, apart))
 
 
 def _between(of: S, sources: Mapping[str, Source], start: float, stop: float) -> S:
     """Return a part of a source by time."""
     marks = of.marks
 
-    def rule(part: Part) -> Part:  # noqa: PLR0911  one a type
+    def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
         match part:
-            case Origin() | Sensor() | Wire():
+            case parts.Origin() | parts.Sensor() | parts.Wire():
                 return part
-            case Changes():
-                return Changes(Once(lambda: part.events().between(start, stop)))
-            case Readings():
+            case parts.Changes():
+                return parts.Changes(Once(lambda: part.events().between(start, stop)))
+            case parts.Readings():
                 return replace(part, frames=Once(lambda: part.frames().between(start, stop)))
-            case Lines():
-                return Lines(part.columns, part.samples.to(lambda samples: samples and samples.between(start, stop)))
-            case Settings():
-                return Settings(Once(lambda: _held_at(of, start)), part.registers, part.register_changes)
-            case Timing():
-                return Timing(part.clock, part.clock_of, Once(lambda: _stretch(of, start, stop)))
-            case Losses():
+            case parts.Lines():
+                return parts.Lines(
+                    part.columns, part.samples.to(lambda samples: samples and samples.between(start, stop))
+                )
+            case parts.Settings():
+                return parts.Settings(Once(lambda: _held_at(of, start)), part.registers, part.register_changes)
+            case parts.Timing():
+                return parts.Timing(part.clock, part.clock_of, Once(lambda: _stretch(of, start, stop)))
+            case parts.Losses():
                 return replace(part, verdict=Once(lambda: _verdict(of, sources)))
-            case Marks():
-                return Marks(
+            case parts.Marks():
+                return parts.Marks(
                     board_changes=part.board_changes,
                     notes=Once(lambda: tuple(n for n in part.notes() if n.t is not None and start <= n.t < stop)),
                     detections=Once(lambda: part.detections().between(start, stop)),
@@ -129,8 +113,8 @@ def _ends(path: Path) -> bytes:
 class Slices(Mapping[str, Source]):
     """Hold the same part of all sources of a file; refuse access to those whose clock is not that of the interval."""
 
-    def __init__(self, parts: Mapping[str, Source], one: Origin, apart: Once[bool]) -> None:
-        self._parts, self._one, self._apart = parts, one, apart
+    def __init__(self, every_part: Mapping[str, Source], one: parts.Origin, apart: Once[bool]) -> None:
+        self._parts, self._one, self._apart = every_part, one, apart
 
     def __getitem__(self, name: str) -> Source:
         part = self._parts[name]

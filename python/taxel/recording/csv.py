@@ -28,8 +28,9 @@ from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
-from taxel.recording.contents import Origin, Source, source_from
+from taxel.recording.contents import Source, source_from
 from taxel.recording.npz import around
+from taxel.recording.parts import Origin
 
 __all__ = ["array_in_csv", "check_head", "read_csv", "write_csv"]
 

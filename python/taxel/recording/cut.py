@@ -11,23 +11,10 @@ from numpy.typing import NDArray
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
 from taxel.events import Events
-from taxel.recording.contents import (
-    Changes,
-    Contents,
-    Lines,
-    Losses,
-    Marks,
-    Once,
-    Origin,
-    Part,
-    Readings,
-    Sensor,
-    Settings,
-    Timing,
-    Wire,
-    applied,
-)
+from taxel.recording import parts
+from taxel.recording.contents import Contents, applied
 from taxel.recording.notes import Zeroing
+from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 
 __all__ = ["cut", "region"]
@@ -87,15 +74,15 @@ def cut(
     whole = (start_us, stop_us) == (-np.inf, np.inf)
     stretch = recording if whole else recording.between(start_us, stop_us)
     if label is None:
-        parts = [stretch]
+        pieces = [stretch]
     else:
         text("label", label)
         times = [note.t for note in stretch.notes if note.text == label and note.t is not None]
-        parts = [stretch.between(t - around[0], t + around[1]) for t in times]
+        pieces = [stretch.between(t - around[0], t + around[1]) for t in times]
     if columns is None and rows is None:
-        return parts
+        return pieces
     across, down = (slice(None) if chosen is None else chosen for chosen in (columns, rows))
-    return [Recording(region(part._contents, across, down)) for part in parts]
+    return [Recording(region(part._contents, across, down)) for part in pieces]
 
 
 def _asked(chosen: slice) -> str:
@@ -138,30 +125,30 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
         inside = (z for z in every if left <= z.x < right and top <= z.y < bottom)
         return tuple(Zeroing(z.t, z.x - left, z.y - top, z.rest, z.before) for z in inside)
 
-    def rule(part: Part) -> Part | None:  # noqa: PLR0911  one a type
+    def rule(part: parts.Part) -> parts.Part | None:  # noqa: PLR0911  one a type
         match part:
-            case Origin() | Timing() | Losses():
+            case parts.Origin() | parts.Timing() | parts.Losses():
                 return part
-            case Sensor():
+            case parts.Sensor():
                 calibration = part.calibration.to(lambda whole: None if whole is None else whole._region(columns, rows))
-                return Sensor(small, part.side, part.heel, calibration)
-            case Settings():
+                return parts.Sensor(small, part.side, part.heel, calibration)
+            case parts.Settings():
                 held = Once(lambda: _cropped(part.held(), top, bottom, left, right))
-                return Settings(held, part.registers, part.register_changes)
-            case Marks():
+                return parts.Settings(held, part.registers, part.register_changes)
+            case parts.Marks():
                 return replace(part, zeroings=Once(lambda: zeroings(part.zeroings())))
-            case Changes():
-                return Changes(Once(lambda: events(part.events())))
-            case Readings():
+            case parts.Changes():
+                return parts.Changes(Once(lambda: events(part.events())))
+            case parts.Readings():
                 return replace(part, frames=Once(lambda: part.frames().region(columns, rows)))
-            case Lines():
-                return Lines(part.columns[left:right])
-            case Wire():
+            case parts.Lines():
+                return parts.Lines(part.columns[left:right])
+            case parts.Wire():
                 return None
             case _:
                 assert_never(part)
 
-    lines = of.one.part(Lines)
+    lines = of.one.part(parts.Lines)
     return Contents.of(applied(of.one, rule, lambda: [*([] if lines is None else lines.received()), *of.others()]))
 
 

@@ -21,19 +21,11 @@ from taxel.events import Events
 from taxel.formats.checks import sensor as checked
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.contents import (
-    Losses,
-    Marks,
-    Origin,
-    Readings,
-    Sensor,
-    Settings,
-    Source,
-    known,
-    source_from,
-)
+from taxel.recording import parts
+from taxel.recording.contents import Source, source_from
 from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import BoardChange, Zeroing
+from taxel.recording.once import known
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
@@ -50,7 +42,7 @@ def json_of(of: Source) -> str:
     ------
     ProblemError : a description that would not be read again, as it takes too much memory
     """
-    sensor, losses, readings = of.sensor, of.losses, of.part(Readings)
+    sensor, losses, readings = of.sensor, of.losses, of.part(parts.Readings)
     registers, changes = of.settings.registers(), of.settings.register_changes()
     driven = registers.array if registers is not None else changes[0][1].array if changes else sensor.array
     document: dict[str, Any] = {
@@ -115,7 +107,7 @@ def about_of(place: str, document: str) -> dict[str, Any]:
 
 
 def described_source(
-    table: Events | Frames, held: NDArray[np.uint16] | None, origin: Origin, about: Mapping[str, Any]
+    table: Events | Frames, held: NDArray[np.uint16] | None, origin: parts.Origin, about: Mapping[str, Any]
 ) -> Source:
     """Return a source of a table and of what `about_of` read; its sensor is that of the table."""
     get = about.get
@@ -126,15 +118,15 @@ def described_source(
         untimed=get("untimed", False),
         turned=get("turned"),
         columns=get("columns", ()),
-        sensor=Sensor(table.array, get("side", ""), get("heel", "")),
-        settings=Settings(known(held), known(get("registers")), known(get("register_changes", ()))),
-        marks=Marks(
+        sensor=parts.Sensor(table.array, get("side", ""), get("heel", "")),
+        settings=parts.Settings(known(held), known(get("registers")), known(get("register_changes", ()))),
+        marks=parts.Marks(
             board_changes=known(get("board_changes", ())),
             notes=known(get("notes", ())),
             detections=known(get("detections", none)),
             zeroings=known(get("zeroings", ())),
         ),
-        losses=Losses(
+        losses=parts.Losses(
             counts=known(get("counts", {})),
             verdict=known(get("verdict")),
             remarks=get("remarks", ()),

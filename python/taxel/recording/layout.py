@@ -18,7 +18,9 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.layout import Layout, packaged
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Changes, Contents, Pictures, Readings, S, Source, Stream, alone, known
+from taxel.recording.contents import Board, Contents, Pictures, S, Source, Stream, alone
+from taxel.recording.once import known
+from taxel.recording.parts import Changes, Readings
 from taxel.recording.pictures import times_at
 
 __all__ = ["check_size", "laid_out", "on_array"]

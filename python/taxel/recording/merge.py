@@ -21,30 +21,11 @@ from taxel.detections import Detections
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.contents import (
-    UNKNOWN,
-    Changes,
-    Contents,
-    Lines,
-    Losses,
-    Marks,
-    Origin,
-    Part,
-    Pictures,
-    Readings,
-    Sensor,
-    Settings,
-    Source,
-    Stream,
-    Timing,
-    Wire,
-    anything,
-    applied,
-    known,
-    named,
-)
+from taxel.recording import parts
+from taxel.recording.contents import Contents, Pictures, Source, Stream, applied, named
 from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import BoardChange, Zeroing
+from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
@@ -92,38 +73,38 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
     >>> both.events == events, [note.t for note in both.notes], both.lost
     (True, [0, 200], ())
     """
-    parts = [instance("recordings", part, Recording) for part in several("recordings", recordings)]
+    sources = [instance("recordings", part, Recording) for part in several("recordings", recordings)]
     flag("beside", beside)
     gap = None if gap_us is None else number("gap_us", gap_us)
     if gap is not None and not 0 <= gap < 2**52:
         raise ProblemError(f"gap_us is {shown(gap_us)}: must be 0 or more")
-    if not parts:
+    if not sources:
         raise ProblemError("recordings: there must be one or more")
-    return Recording(merged([part._contents for part in parts], gap, beside=beside))
+    return Recording(merged([part._contents for part in sources], gap, beside=beside))
 
 
 def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
-    parts = [recording.one for recording in recordings]
-    if len({part.has_events for part in parts}) > 1:
-        other = next(part for part in parts if part.has_events != parts[0].has_events)
-        events, pictures = (parts[0], other) if parts[0].has_events else (other, parts[0])
+    sources = [recording.one for recording in recordings]
+    if len({part.has_events for part in sources}) > 1:
+        other = next(part for part in sources if part.has_events != sources[0].has_events)
+        events, pictures = (sources[0], other) if sources[0].has_events else (other, sources[0])
         raise ProblemError(
             f"recordings: {events.origin.name} holds events, {pictures.origin.name} pictures; convert one of them first"
         )
-    tables = [part.table for part in parts]
+    tables = [part.table for part in sources]
     shifts = _shifts(tables, gap)
-    array, lefts = _side_by_side(tables) if beside else (_common(parts, tables), [0] * len(parts))
-    merging = _Merging(parts, tables, shifts, lefts, array, beside)
-    first = parts[0]
+    array, lefts = _side_by_side(tables) if beside else (_common(sources, tables), [0] * len(sources))
+    merging = _Merging(sources, tables, shifts, lefts, array, beside)
+    first = sources[0]
     if isinstance(first, Pictures):
         columns, header = merging.columns(), {name: getattr(first, name) for name in _HEADER}
         first = Pictures(readings=first.readings, **header)
         if columns is not None:
-            first = Stream(readings=first.readings, lines=Lines(columns), **header)
-    lost = [line for part in parts for line in part.losses.lost()]
-    for recording, part in zip(recordings, parts, strict=True):
-        wire, lines = part.part(Wire), part.part(Lines)
+            first = Stream(readings=first.readings, lines=parts.Lines(columns), **header)
+    lost = [line for part in sources for line in part.losses.lost()]
+    for recording, part in zip(recordings, sources, strict=True):
+        wire, lines = part.part(parts.Wire), part.part(parts.Lines)
         lost += [] if wire is None else wire.lines()
         lost += [] if lines is None else lines.received()
         lost += recording.others()
@@ -142,14 +123,14 @@ class _Merging:
 
     def __init__(
         self,
-        parts: Sequence[Source],
+        sources: Sequence[Source],
         tables: Sequence[Events | Frames],
         shifts: list[int],
         lefts: list[int],
         array: Array,
         beside: bool,
     ) -> None:
-        self.parts, self.tables, self.shifts, self.lefts = parts, tables, shifts, lefts
+        self.sources, self.tables, self.shifts, self.lefts = sources, tables, shifts, lefts
         self.array, self.beside, self.lost = array, beside, list[str]()
 
     def agreed(self, values: Iterable[T], empty: T, line: str, same: Callable[[T, T], bool] = operator.eq) -> T:
@@ -163,45 +144,45 @@ class _Merging:
 
     def columns(self) -> tuple[str, ...] | None:
         """Return the names of the columns."""
-        each = [part.columns for part in self.parts]
+        each = [part.columns for part in self.sources]
         if not self.beside:
             return self.agreed(each, None, "the names of the columns")
         return (
             tuple(name for names in each for name in names or ()) if any(names is not None for names in each) else None
         )
 
-    def rule(self, part: Part) -> Part:  # noqa: PLR0911  one a type
+    def rule(self, part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
         """Return the merged part of a type."""
         match part:
-            case Origin():
-                names = ", ".join(one.origin.name for one in self.parts)
-                return Origin(Path("merged"), "merged", "merged", source=f"merged of {names}")
-            case Sensor():
+            case parts.Origin():
+                names = ", ".join(one.origin.name for one in self.sources)
+                return parts.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}")
+            case parts.Sensor():
                 return self.sensor()
-            case Settings():
+            case parts.Settings():
                 return self.settings()
-            case Marks():
+            case parts.Marks():
                 return self.marks()
-            case Timing():
+            case parts.Timing():
                 return self.timing()
-            case Losses():
+            case parts.Losses():
                 return self.losses()
-            case Changes():
+            case parts.Changes():
                 tables = [table for table in self.tables if isinstance(table, Events)]
-                return Changes(known(_events(tables, self.shifts, self.array, self.lefts)))
-            case Readings():
+                return parts.Changes(known(_events(tables, self.shifts, self.array, self.lefts)))
+            case parts.Readings():
                 return self.readings()
-            case Lines():
-                return Lines(part.columns)
-            case Wire():
-                return Wire()
+            case parts.Lines():
+                return parts.Lines(part.columns)
+            case parts.Wire():
+                return parts.Wire()
             case _:
                 assert_never(part)
 
-    def sensor(self) -> Sensor:
+    def sensor(self) -> parts.Sensor:
         """Merge what describes the sensors; what one of them says of its taxels may be lost."""
-        array, sensors = self.array, [part.sensor for part in self.parts]
-        for part in self.parts:
+        array, sensors = self.array, [part.sensor for part in self.sources]
+        for part in self.sources:
             own, name = part.sensor.array, part.origin.name
             if own._is_measured and (own.pitch_mm, own.places) != (array.pitch_mm, array.places):
                 self.lost.append(f"the pitch or places of {name} ({own._apart()})")
@@ -212,29 +193,29 @@ class _Merging:
         if self.beside and calibration is not None and len(sensors) > 1:
             self.lost.append("the calibration (it is of one of the sensors)")
             calibration = None
-        return Sensor(
+        return parts.Sensor(
             array,
             self.agreed((one.side for one in sensors), "", "the side"),
             self.agreed((one.heel for one in sensors), "", "where the heel lies"),
             known(calibration),
         )
 
-    def settings(self) -> Settings:
+    def settings(self) -> parts.Settings:
         """Merge registers that are equal, and the values that the taxels held at the beginning."""
-        each = [part.settings for part in self.parts]
+        each = [part.settings for part in self.sources]
         registers = [one.registers() for one in each]
-        held = _beside_held(self.parts, self.array, self.lefts) if self.beside else self.held()
+        held = _beside_held(self.sources, self.array, self.lefts) if self.beside else self.held()
         changes = self.agreed((one.register_changes() for one in each), (), "the settings of the registers")
-        return Settings(
+        return parts.Settings(
             held=known(held),
             registers=known(self.agreed(registers, None, "the board's registers", _same_registers)),
             register_changes=known(changes),
         )
 
-    def marks(self) -> Marks:
+    def marks(self) -> parts.Marks:
         """Merge what happened at a time; a note with its name stands at the beginning of each recording."""
         changes, notes, found = list[tuple[BoardChange, ...]](), list[Note](), list[Any]()
-        for part, table, shift in zip(self.parts, self.tables, self.shifts, strict=True):
+        for part, table, shift in zip(self.sources, self.tables, self.shifts, strict=True):
             own, d = part.marks, part.marks.detections()
             changes.append(tuple(_later(change, shift) for change in own.board_changes()))
             notes.append(Note(part.origin.name, int(table.t.min()) + shift if len(table) else shift, 0))
@@ -242,43 +223,43 @@ class _Merging:
             found += zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True)
         found.sort(key=lambda row: int(row[2]))
         label, t, when, slope, repaired = ([row[k] for row in found] for k in range(5))
-        return Marks(
+        return parts.Marks(
             board_changes=known(self.agreed(changes, (), "the changes of the board")),
             notes=known(tuple(sorted(notes, key=lambda note: (note.t is None, note.t or 0)))),
             detections=known(Detections._of(label, t, when, slope, repaired=repaired)),
             zeroings=known(self.zeroings()),
         )
 
-    def timing(self) -> Timing:
+    def timing(self) -> parts.Timing:
         """Merge clocks that are equal."""
-        clocks = [part.timing.clock() for part in self.parts]
+        clocks = [part.timing.clock() for part in self.sources]
         clock = clocks[0]
         if len(set(self.shifts)) > 1 or not all(one is clock or _same_clock(clock, one) for one in clocks[1:]):
             self.lost += ["arrival times"] * any(map(anything, clocks))
             clock = None
-        return Timing(
-            known(clock), self.agreed((p.timing.clock_of for p in self.parts), None, "by whose clock times are")
+        return parts.Timing(
+            known(clock), self.agreed((p.timing.clock_of for p in self.sources), None, "by whose clock times are")
         )
 
-    def losses(self) -> Losses:
+    def losses(self) -> parts.Losses:
         """Merge what was lost; counts only if they are equal."""
-        each = [part.losses for part in self.parts]
+        each = [part.losses for part in self.sources]
         verdict = None
         if any(one.verdict() is not None for one in each):
-            verdict = Verdict._together(_of_files(self.parts, self.shifts))
-        return Losses(
+            verdict = Verdict._together(_of_files(self.sources, self.shifts))
+        return parts.Losses(
             counts=known(self.agreed((one.counts() for one in each), {}, "what each received and lost, by cause")),
             verdict=known(verdict),
-            remarks=named([(part.origin.name, part.losses.remarks) for part in self.parts]),
+            remarks=named([(part.origin.name, part.losses.remarks) for part in self.sources]),
             truncated=any(one.truncated for one in each),
             rebuilt=known(self.agreed((one.rebuilt() for one in each), {}, "what reading each had to put up with")),
         )
 
-    def readings(self) -> Readings:
+    def readings(self) -> parts.Readings:
         """Merge frames."""
         tables = [table for table in self.tables if isinstance(table, Frames)]
-        each = [readings for part in self.parts if (readings := part.part(Readings)) is not None]
-        return Readings(
+        each = [readings for part in self.sources if (readings := part.part(parts.Readings)) is not None]
+        return parts.Readings(
             known(_frames(tables, self.shifts, self.array, self.beside)),
             all(one.untimed for one in each),
             self.agreed((one.turned for one in each), None, "whether readings were turned"),
@@ -288,11 +269,11 @@ class _Merging:
         """Return the zeroed taxels of all recordings, unless one of them would change a rest in another recording."""
         every = [
             [replace(z, t=z.t + shift, x=z.x + left) for z in part.marks.zeroings()]
-            for part, shift, left in zip(self.parts, self.shifts, self.lefts, strict=True)
+            for part, shift, left in zip(self.sources, self.shifts, self.lefts, strict=True)
         ]
         together = tuple(sorted({z for own in every for z in own}, key=lambda z: (z.t, z.x, z.y)))
         # Sensors side by side have no taxels in common.
-        for part, own, shift in zip(self.parts, every, self.shifts, strict=True):
+        for part, own, shift in zip(self.sources, every, self.shifts, strict=True):
             stop = _end(part) + shift
             if not self.beside and {z for z in together if z.t < stop} != {z for z in own if z.t < stop}:
                 self.lost.append(f"{len(together)} zeroed taxels (the recordings differ)")
@@ -301,7 +282,7 @@ class _Merging:
 
     def held(self) -> NDArray[np.uint16] | None:
         """Return the values held at the beginning, if they and the events since imply those held in later parts."""
-        every = list(zip(self.parts, self.tables, self.shifts, strict=True))
+        every = list(zip(self.sources, self.tables, self.shifts, strict=True))
         every.sort(key=lambda one: _begin(one[0]) + one[2])
         first = every[0][0].settings.held()
         now = np.full(self.array.shape, UNKNOWN, np.uint16) if first is None else first.copy()
@@ -347,7 +328,7 @@ def _same_calibration(a: Calibration | None, b: Calibration | None) -> bool:
     return a is not None and b is not None and a.to_json() == b.to_json()
 
 
-def _of_files(parts: Sequence[Source], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
+def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
     """Return name and verdict of each file or merged recording of which there are parts.
 
     Stretches of one recording, in memory or in files of their own, have the losses of the whole, which count once;
@@ -355,7 +336,7 @@ def _of_files(parts: Sequence[Source], shifts: Sequence[int]) -> list[tuple[str,
     """
     files: dict[str, Any] = {}
     verdicts: dict[Any, dict[Any, dict[Verdict, tuple[str, Verdict]]]] = {}
-    for part, shift in zip(parts, shifts, strict=True):
+    for part, shift in zip(sources, shifts, strict=True):
         said = verdict_of(part)
         file = id(said) if part.origin.kind == "merged" else part.origin.path
         if said.stretch_of is not None:
@@ -363,8 +344,8 @@ def _of_files(parts: Sequence[Source], shifts: Sequence[int]) -> list[tuple[str,
         source = part.origin.label if said.stretch_of is not None else (part.origin.name, part.origin.label)
         verdicts.setdefault(file, {}).setdefault(source, {}).setdefault(said, (part.origin.name, said._later(shift)))
     of_files = []
-    for sources in verdicts.values():
-        each = [(next(iter(own.values()))[0], Verdict._of_stretches(own.values())) for own in sources.values()]
+    for of_file in verdicts.values():
+        each = [(next(iter(own.values()))[0], Verdict._of_stretches(own.values())) for own in of_file.values()]
         of_files.append((each[0][0], Verdict._of_sources(each)))
     return of_files
 
@@ -384,9 +365,9 @@ def _begin(part: Source) -> int:
     return int(t.min()) if len(t) else 0
 
 
-def _beside_held(parts: Sequence[Source], array: Array, lefts: Sequence[int]) -> NDArray[np.uint16] | None:
+def _beside_held(sources: Sequence[Source], array: Array, lefts: Sequence[int]) -> NDArray[np.uint16] | None:
     """Return the values that the taxels of all sensors held at the beginning."""
-    every = [part.settings.held() for part in parts]
+    every = [part.settings.held() for part in sources]
     if all(own is None for own in every):
         return None
     held = np.full(array.shape, UNKNOWN, np.uint16)
@@ -411,9 +392,9 @@ def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
     return shifts
 
 
-def _common(parts: Sequence[Source], tables: Sequence[Events | Frames]) -> Array:
+def _common(sources: Sequence[Source], tables: Sequence[Events | Frames]) -> Array:
     array = tables[0].array
-    for part, table in zip(parts, tables, strict=True):
+    for part, table in zip(sources, tables, strict=True):
         if not array.fits(table.array):
             raise ProblemError(
                 f"{part.origin.name}: {table.array!r}, {parts[0].origin.name}: {array!r}; different sensors are merged "

@@ -27,9 +27,10 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.frames import Frames
-from taxel.recording.contents import Origin, Source
+from taxel.recording.contents import Source
 from taxel.recording.description import about_of, described_source, json_of
 from taxel.recording.layout import check_size
+from taxel.recording.parts import Origin
 
 __all__ = ["DTYPES", "TEXTS", "around", "chosen", "columns_of", "read_npz", "source_of_columns", "write_npz"]
 

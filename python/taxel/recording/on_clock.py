@@ -15,26 +15,11 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.contents import (
-    Changes,
-    Contents,
-    Lines,
-    Losses,
-    Marks,
-    Once,
-    Origin,
-    Part,
-    Readings,
-    Sensor,
-    Settings,
-    Source,
-    Timing,
-    Wire,
-    alone,
-    applied,
-)
+from taxel.recording import parts
+from taxel.recording.contents import Contents, Source, alone, applied
 from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import BoardChange, Zeroing
+from taxel.recording.once import Once
 from taxel.recording.read_mcap import ascending
 from taxel.recording.verdict import Verdict
 
@@ -131,27 +116,27 @@ def _moved(of: Source, name: str, times: Times | None) -> Source:
         after = steps[0]["after_us"] if doubtful is None and steps else doubtful
         return own if after is None else told._later(one(after) - after)
 
-    def rule(part: Part) -> Part:  # noqa: PLR0911  one a type
+    def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
         match part:
             # The times in the datagrams stay by the source's own clock.
-            case Origin() | Sensor() | Settings() | Wire():
+            case parts.Origin() | parts.Sensor() | parts.Settings() | parts.Wire():
                 return part
-            case Marks():
-                return Marks(
+            case parts.Marks():
+                return parts.Marks(
                     part.board_changes.to(at), part.notes.to(at), part.detections.to(detections), part.zeroings.to(at)
                 )
-            case Timing():
-                return Timing(part.clock.to(clock), name, part.stretch)
-            case Losses():
+            case parts.Timing():
+                return parts.Timing(part.clock.to(clock), name, part.stretch)
+            case parts.Losses():
                 return replace(part, verdict=part.verdict.to(verdict))
-            case Changes():
-                return Changes(part.events.to(events))
-            case Readings():
+            case parts.Changes():
+                return parts.Changes(part.events.to(events))
+            case parts.Readings():
                 return replace(part, frames=part.frames.to(frames))
-            case Lines():
-                return Lines(part.columns)
+            case parts.Lines():
+                return parts.Lines(part.columns)
             case _:
                 assert_never(part)
 
-    lines = of.part(Lines)
+    lines = of.part(parts.Lines)
     return applied(of, rule, lambda: [] if lines is None else lines.received())

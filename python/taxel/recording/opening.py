@@ -25,25 +25,14 @@ from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import (
-    Board,
-    Contents,
-    Losses,
-    Marks,
-    Origin,
-    Pictures,
-    Sensor,
-    Source,
-    Stream,
-    known,
-    several,
-    source_from,
-)
+from taxel.recording import parts
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, several, source_from
 from taxel.recording.csv import check_head, read_csv
 from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_own_table, kind_of
 from taxel.recording.layout import check_size, laid_out, on_array
 from taxel.recording.npz import read_npz
+from taxel.recording.once import known
 from taxel.recording.read_foreign import is_foreign, read_foreign
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
@@ -409,15 +398,15 @@ def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | N
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
     label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
-    origin = Origin(place if place.is_file() else place / trial.name, trial.name, kind, label, trial.source)
+    origin = parts.Origin(place if place.is_file() else place / trial.name, trial.name, kind, label, trial.source)
     contents = Contents.of(
         source_from(
             trial.recorded,
             origin,
             untimed=not trial.timed,
-            sensor=Sensor(trial.recorded.array, trial.foot),
-            marks=Marks(notes=known(tuple(notes))),
-            losses=Losses(lost=known(_beside_pictures(trial))),
+            sensor=parts.Sensor(trial.recorded.array, trial.foot),
+            marks=parts.Marks(notes=known(tuple(notes))),
+            losses=parts.Losses(lost=known(_beside_pictures(trial))),
         )
     )
     said = _layout(place, layout)

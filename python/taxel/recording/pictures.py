@@ -14,23 +14,9 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.contents import (
-    UNKNOWN,
-    Board,
-    Contents,
-    Drawn,
-    Lines,
-    Once,
-    Pictures,
-    Readings,
-    Settings,
-    Source,
-    Stream,
-    Wire,
-    known,
-    saying,
-    several,
-)
+from taxel.recording import parts
+from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, saying, several
+from taxel.recording.once import UNKNOWN, Once, known
 from taxel.tare import Tare
 
 __all__ = ["FRAMES_HZ", "at_rate", "calibrated", "period_us", "pictures", "times_at"]
@@ -101,9 +87,9 @@ def pictures(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz")
         _ = of.table
     header = {one: getattr(of, one) for one in ("marks", "timing", "losses")}
     # The first picture includes the held values.
-    header["settings"] = Settings(known(None), of.settings.registers, of.settings.register_changes)
+    header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
     frames = Once(lambda: _drawn(of, period))
-    return Drawn(of.origin, of.sensor, Readings(frames), of.part(Wire) or Wire(), **header)
+    return Drawn(of.origin, of.sensor, parts.Readings(frames), of.part(parts.Wire) or parts.Wire(), **header)
 
 
 def _drawn(of: Source, period: int | None) -> Frames:
@@ -146,7 +132,7 @@ def _at_rate(of: Source, rate_hz: float) -> Source:
     def notes(own: tuple[Note, ...]) -> tuple[Note, ...]:
         return tuple(replace(n, t=None if n.t is None else round(n.t * 1e6 / rate_hz)) for n in own)
 
-    readings = Readings(of.readings.frames.to(frames), untimed=False, turned=of.readings.turned)
+    readings = parts.Readings(of.readings.frames.to(frames), untimed=False, turned=of.readings.turned)
     return replace(of, readings=readings, marks=replace(of.marks, notes=of.marks.notes.to(notes)))
 
 
@@ -180,4 +166,4 @@ def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = Non
     )
     if not isinstance(made, Stream):
         return made
-    return saying(replace(made, lines=Lines(made.lines.columns)), made.lines.received)
+    return saying(replace(made, lines=parts.Lines(made.lines.columns)), made.lines.received)

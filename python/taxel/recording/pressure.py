@@ -17,7 +17,8 @@ from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import UNKNOWN, Contents, source_from
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.once import UNKNOWN
 from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
 from taxel.recording.rest import (

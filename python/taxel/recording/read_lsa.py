@@ -9,7 +9,9 @@ from taxel import _core
 from taxel._base import limits
 from taxel.array import Array
 from taxel.events import Events
-from taxel.recording.contents import Board, Changes, Losses, Origin, Sensor, Wire, known
+from taxel.recording.contents import Board
+from taxel.recording.once import known
+from taxel.recording.parts import Changes, Losses, Origin, Sensor, Wire
 from taxel.recording.verdict import Verdict
 
 __all__ = ["read_lsa"]

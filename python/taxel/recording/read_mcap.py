@@ -19,26 +19,8 @@ from taxel.array import Array
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import (
-    Board,
-    Changes,
-    Contents,
-    Lines,
-    Losses,
-    Marks,
-    Once,
-    Origin,
-    Pictures,
-    Readings,
-    Sensor,
-    Settings,
-    Source,
-    Stream,
-    Timing,
-    Wire,
-    alone,
-    known,
-)
+from taxel.recording import parts
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, alone
 from taxel.recording.description import (
     array_of,
     board_changes_of,
@@ -49,6 +31,7 @@ from taxel.recording.description import (
     zeroings_of,
 )
 from taxel.recording.notes import Datagrams, Samples
+from taxel.recording.once import Once, known
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
@@ -97,12 +80,12 @@ class _Source:
         self.before = _stated(path, "counts", counts_of, self.header.get("counts")) or {}
         self.remarks = Once(lambda: json.loads(self.reader().remarks()))
         label = self.header.get("name", "board")
-        self.origin = Origin(path, path.name, "mcap", label, self.header["source"])
-        self.sensor = Sensor(self.array, self.header.get("side", ""), self.header.get("heel", ""))
+        self.origin = parts.Origin(path, path.name, "mcap", label, self.header["source"])
+        self.sensor = parts.Sensor(self.array, self.header.get("side", ""), self.header.get("heel", ""))
 
-    def losses(self, counts: Callable[[], dict[str, Any]], found: Callable[[], str] | None = None) -> Losses:
+    def losses(self, counts: Callable[[], dict[str, Any]], found: Callable[[], str] | None = None) -> parts.Losses:
         """Return what was lost; arguments are those of `counts` and `verdict`."""
-        return Losses(
+        return parts.Losses(
             counts=self.counts(counts),
             verdict=Once(lambda: self.verdict(found)),
             remarks=tuple(self.header.get("remarks", ())),
@@ -125,27 +108,27 @@ class _Source:
         return Board(
             self.origin,
             self.sensor,
-            Changes(Once(lambda: Events._from_parts(decoded()[0], self.array))),
-            Wire(
+            parts.Changes(Once(lambda: Events._from_parts(decoded()[0], self.array))),
+            parts.Wire(
                 datagrams=Once(lambda: Datagrams(*self.reader().datagrams()), arrived),
                 version_2=Once(lambda: bool(json.loads(decoded()[5])["intact"])),
                 differences=bool(self.header["difference"]),
                 origin_us=int(self.header["origin_us"]),
                 unmarked=tuple(self.header.get("repaired", ())),
             ),
-            timing=Timing(Once(lambda: _clock(decoded()), arrived)),
+            timing=parts.Timing(Once(lambda: _clock(decoded()), arrived)),
             losses=self.losses(lambda: self.counts_of_board(decoded()), lambda: decoded()[7]),
             settings=self.settings(),
             marks=self.marks(),
         )
 
-    def settings(self) -> Settings:
+    def settings(self) -> parts.Settings:
         """Return the board's state of a board, or of the pictures that were made of one."""
-        return Settings(Once(self.held), Once(self.registers), Once(self.register_changes))
+        return parts.Settings(Once(self.held), Once(self.registers), Once(self.register_changes))
 
-    def marks(self) -> Marks:
+    def marks(self) -> parts.Marks:
         """Return what happened at a time."""
-        return Marks(
+        return parts.Marks(
             board_changes=Once(lambda: board_changes_of(self.remarks()["board"])),
             notes=Once(lambda: notes_of(self.remarks()["notes"])),
             detections=Once(lambda: detections_of(self.remarks()["detections"])),
@@ -171,11 +154,11 @@ class _Source:
             return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
         turned = _stated(path, "turned", turned_of, about.get("turned"))
-        readings = Readings(Once(frames), not about.get("clock", True), turned)
+        readings = parts.Readings(Once(frames), not about.get("clock", True), turned)
         header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
         if not about.get("columns"):
             return Pictures(self.origin, self.sensor, readings, **header)
-        return Stream(self.origin, self.sensor, readings, Lines(tuple(about["columns"])), **header)
+        return Stream(self.origin, self.sensor, readings, parts.Lines(tuple(about["columns"])), **header)
 
     def stream(self) -> Stream:
         """Return the contents of a stream of numbers, whose lines are pictures of one row."""
@@ -200,9 +183,9 @@ class _Source:
         return Stream(
             self.origin,
             self.sensor,
-            Readings(Once(frames)),
-            Lines(names, Once(samples, lambda: bool(self.remarks()["samples"] > 0))),
-            timing=Timing(Once(lambda: Clock(read()[2], read()[0]))),
+            parts.Readings(Once(frames)),
+            parts.Lines(names, Once(samples, lambda: bool(self.remarks()["samples"] > 0))),
+            timing=parts.Timing(Once(lambda: Clock(read()[2], read()[0]))),
             losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read()[4]),
         )
 

@@ -16,7 +16,9 @@ from taxel.array import Array
 from taxel.formats.ros import Chosen, Read, read
 from taxel.frames import Frames
 from taxel.labels import source_of
-from taxel.recording.contents import Contents, Losses, Origin, Source, alone, known, source_from
+from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Origin
 from taxel.recording.read_mcap import ascending
 
 __all__ = ["Topics", "read_ros"]

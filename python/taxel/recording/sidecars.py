@@ -8,7 +8,9 @@ from pathlib import Path
 from taxel._core import ProblemError
 from taxel.calibration import Calibration
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import Contents, Once, Origin, Pictures, Source, Stream, alone, known, together
+from taxel.recording.contents import Contents, Pictures, Source, Stream, alone, together
+from taxel.recording.once import Once, known
+from taxel.recording.parts import Origin
 from taxel.recording.pictures import calibrated
 
 __all__ = ["calibrated_by", "calibration_beside", "has_calibration", "labels_of", "with_sidecars"]

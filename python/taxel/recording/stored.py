@@ -17,26 +17,15 @@ from taxel.clock import Clock
 from taxel.events import Events
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
+from taxel.recording import parts
 from taxel.recording.contents import (
     Board,
-    Changes,
     Contents,
     Drawn,
-    Lines,
-    Losses,
-    Marks,
-    Origin,
-    Part,
     Pictures,
-    Readings,
-    Sensor,
-    Settings,
     Source,
     Stream,
-    Timing,
-    Wire,
     applied,
-    known,
     parts_of,
     saying,
     several,
@@ -45,6 +34,7 @@ from taxel.recording.contents import (
 )
 from taxel.recording.csv import array_in_csv
 from taxel.recording.kinds import ENDINGS, verdict_of
+from taxel.recording.once import known
 from taxel.recording.sidecars import calibration_beside
 from taxel.recording.write_mcap import cut_raw, encoded
 from taxel.wire import decode as wire_decode
@@ -105,7 +95,7 @@ def _stored(of: Source, ending: str, place: Path) -> Source:
 
 def is_made(of: Source) -> bool:
     """Return whether a file's bytes must be made of the events, as no datagrams contain exactly these events."""
-    wire = of.part(Wire)
+    wire = of.part(parts.Wire)
     has_bytes = wire is not None and (wire.datagrams.holds() or (wire.payload is not None and len(wire.payload) > 0))
     return of.timing.stretch is not None or of.timing.clock_of is not None or not has_bytes
 
@@ -118,7 +108,7 @@ def _sensor(array: Array) -> str:
 
 def _arrivals(of: Source) -> list[str]:
     """Return what is lost without arrival times, which datagrams have too."""
-    wire = of.part(Wire)
+    wire = of.part(parts.Wire)
     return ["arrival times"] * (of.timing.clock.holds() and not (wire is not None and wire.datagrams.holds()))
 
 
@@ -126,19 +116,21 @@ def _table(of: Source, _: Path) -> _Kept:
     """Return what a .npz or a .h5 holds: all but the raw datagrams."""
     lines = _arrivals(of)
 
-    def rule(part: Part) -> Part | None:
+    def rule(part: parts.Part) -> parts.Part | None:
         match part:
-            case Origin():
+            case parts.Origin():
                 return replace(part, source=part.source or part.name)
-            case Sensor() | Settings() | Marks() | Losses() | Changes() | Readings():
+            case (
+                parts.Sensor() | parts.Settings() | parts.Marks() | parts.Losses() | parts.Changes() | parts.Readings()
+            ):
                 return part
-            case Wire():
+            case parts.Wire():
                 lines.extend(part.lines(with_times=True))
-                return Wire()
-            case Lines():
+                return parts.Wire()
+            case parts.Lines():
                 lines.extend(part.received())
-                return Lines(part.columns)
-            case Timing():
+                return parts.Lines(part.columns)
+            case parts.Timing():
                 return None
             case _:
                 assert_never(part)
@@ -148,9 +140,9 @@ def _table(of: Source, _: Path) -> _Kept:
 
 def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
     """Return a table alone, and what is lost of each of the other parts; of the bytes it is given."""
-    parts = (part for part in parts_of(of).values() if not isinstance(part, Wire))
-    return source_from(table, losses=Losses(lost=of.losses.lost)), [
-        *(line for part in parts for line in part.lines()),
+    others = (part for part in parts_of(of).values() if not isinstance(part, parts.Wire))
+    return source_from(table, losses=parts.Losses(lost=of.losses.lost)), [
+        *(line for part in others for line in part.lines()),
         *_arrivals(of),
         *wire,
     ]
@@ -158,7 +150,7 @@ def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
 
 def _csv(of: Source, place: Path) -> _Kept:
     """Return what a .csv holds: events without markers, or frames without their unit."""
-    beside, readings, wire = Layout.beside(place), of.part(Readings), of.part(Wire)
+    beside, readings, wire = Layout.beside(place), of.part(parts.Readings), of.part(parts.Wire)
     is_turned = readings is not None and readings.turned is not None
     if is_turned and beside is not None and Layout.read(beside).turned is not None:
         raise ProblemError(
@@ -206,7 +198,7 @@ def _lsa(of: Source, place: Path) -> _Kept:
         lost.append("whole turns of 6.5536 s in times")
     kept, lines = _bare(of, events, of_wire)
     assert isinstance(kept, Board)  # of events
-    return replace(kept, wire=Wire(payload=payload)), [*lines, *lost]
+    return replace(kept, wire=parts.Wire(payload=payload)), [*lines, *lost]
 
 
 def _mcap(of: Source, place: Path) -> _Kept:
@@ -217,7 +209,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     samples = of.lines.samples() if isinstance(of, Stream) else None
     events = None if isinstance(of, Pictures) else known(_board(of, place).table)
     clock = of.timing.clock() if of.timing.clock.holds() else None
-    wire = _wire(of, clock, lines) if isinstance(of, Board) else Wire()
+    wire = _wire(of, clock, lines) if isinstance(of, Board) else parts.Wire()
     if samples is not None:
         bad = of.losses.counts().get("lines_that_could_not_be_read", 0)
         lines += [f"{bad} lines that could not be read"] * bool(bad)
@@ -230,21 +222,21 @@ def _mcap(of: Source, place: Path) -> _Kept:
         lines += _arrivals(of)
         lines += of.wire.lines(with_times=True) if isinstance(of, Drawn) else []
 
-    def rule(part: Part) -> Part:
+    def rule(part: parts.Part) -> parts.Part:
         match part:
-            case Origin():
+            case parts.Origin():
                 return replace(part, source=part.source or part.name or ("events" if of.has_events else "pictures"))
-            case Sensor() | Settings() | Marks() | Readings() | Lines():
+            case parts.Sensor() | parts.Settings() | parts.Marks() | parts.Readings() | parts.Lines():
                 return part
-            case Changes():
-                return Changes(events or part.events)
-            case Timing():
+            case parts.Changes():
+                return parts.Changes(events or part.events)
+            case parts.Timing():
                 lines.extend(part.lines())
-                return Timing(known(clock))
-            case Wire():
+                return parts.Timing(known(clock))
+            case parts.Wire():
                 return wire
-            case Losses():
-                return Losses(
+            case parts.Losses():
+                return parts.Losses(
                     counts=part.counts,
                     verdict=known(verdict_of(of) if is_file else None),
                     remarks=tuple(dict.fromkeys((*part.remarks, *converted))),
@@ -256,7 +248,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     return applied(of, rule), lines
 
 
-def _wire(of: Board, clock: Clock | None, lost: list[str]) -> Wire:
+def _wire(of: Board, clock: Clock | None, lost: list[str]) -> parts.Wire:
     """Return the datagrams of a new .mcap: those received, or new ones made of the events."""
     wire = of.wire
     if not is_made(of):
@@ -267,7 +259,9 @@ def _wire(of: Board, clock: Clock | None, lost: list[str]) -> Wire:
     lost += wire.lines()
     origin_us, made, unmarked = encoded(of.table, of.settings.held(), clock)
     lost += [f"that {len(unmarked) - _MOST} of the events are repaired"] * (len(unmarked) > _MOST)
-    return Wire(known(made), version_2=known(True), origin_us=origin_us, unmarked=tuple(unmarked[:_MOST].tolist()))
+    return parts.Wire(
+        known(made), version_2=known(True), origin_us=origin_us, unmarked=tuple(unmarked[:_MOST].tolist())
+    )
 
 
 def _board(of: Source, place: Path) -> Board:

@@ -15,9 +15,10 @@ from taxel import _core
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, known
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream
 from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import Datagrams
+from taxel.recording.once import known
 from taxel.recording.pressure import above_rest
 from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, ticks_by_unit

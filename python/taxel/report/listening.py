@@ -28,7 +28,8 @@ from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
-from taxel.recording.contents import Contents, Origin, source_from
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.parts import Origin
 from taxel.recording.pressure import series
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
