@@ -397,7 +397,7 @@ def _common(sources: Sequence[Source], tables: Sequence[Events | Frames]) -> Arr
     for part, table in zip(sources, tables, strict=True):
         if not array.fits(table.array):
             raise ProblemError(
-                f"{part.origin.name}: {table.array!r}, {parts[0].origin.name}: {array!r}; different sensors are merged "
+                f"{part.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors are merged "
                 "beside one another only"
             )
     return array
