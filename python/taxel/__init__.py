@@ -79,7 +79,7 @@ __all__ = [
 #: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
 _ROOMS = (
     "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot", "recording", "simulate",
-    "wire", "wire_v2",
+    "wire",
 )  # fmt: skip
 _RECORDING = (
     "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",
@@ -102,8 +102,6 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(place), inside)
         globals()[name] = value
         return value
-    if name == "Label":  # its name until version 0.1
-        return import_module("taxel.labels")._label
     raise AttributeError(f"module 'taxel' has no attribute {name!r}")
 
 

@@ -101,6 +101,8 @@ def every(
             )
         return
     changes = {} if realisations is None else {"realisations": realisations}
+    for name in STUDIES:
+        load(name).set(size)  # refused before any study begins
     sections = {}
     try:
         for name in STUDIES:
@@ -111,7 +113,7 @@ def every(
                 continue
             sections[name] = study.run(
                 report,
-                size=size if size in study.sizes else "full",
+                size=size,
                 changes=own,
                 data=where,
                 workers=_workers(jobs, backend, scheduler),

@@ -198,7 +198,7 @@ class Study:
         ------
         ProblemError : an unknown size or parameter, or a value of another kind
         """
-        one_of("size", size, ("full", *self.sizes))
+        one_of(f"{self.name}: size", size, ("full", *self.sizes))
         values = {**self.parameters, **self.sizes.get(size, {})}
         for name, value in changes.items():
             if name not in values:

@@ -182,7 +182,7 @@ def test_the_command_prints_json(small, capsys):
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (["--size", "huge"], "size is 'huge'"),
+        (["--size", "huge"], "fig6.11: size is 'huge': must be one of 'full', 'toy'"),
         (["--set", "kapa=1"], "fig6.11 has no parameter 'kapa': there are"),
         (["--set", "kappa=wide"], "kappa is 'wide': must be a number, as 1.04"),
         (["--set", "kappa"], "--set kappa: must be KEY=VALUE"),
@@ -197,6 +197,13 @@ def test_nonsense_ends_in_one_line(small, capsys, more, message):
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize("size", ["huge", "coarse"])  # a few studies have coarse
+def test_all_studies_run_at_a_size_that_each_of_them_has(tmp_path, capsys, size):
+    assert ends(["study", "all", "--size", size, "--report", str(tmp_path / "report")]) == 2
+    assert capsys.readouterr().err.endswith(f": size is '{size}': must be one of 'full', 'toy'\n")
+    assert not (tmp_path / "report").exists()
 
 
 def test_a_name_that_is_no_study_is_refused(capsys):

@@ -126,7 +126,10 @@ def source_of(name: str, model: Model) -> Source:
     )
     frames = Frames(model.values, model.t, unit=model.unit, array=Array(3, 5, 5.0, name="sole"))
     origin = Origin(Path("feet"), f"feet {name}", "pedar", name, "an amplifier")
-    sensor, losses = Sensor(frames.array, model.side, model.heel), Losses(verdict=known("nothing lost"))
+    sensor, losses = (
+        Sensor(frames.array, model.side, model.heel),
+        Losses(verdict=known(taxel.Verdict.from_dict({"status": "complete", "text": "nothing lost"}))),
+    )
     return source_from(frames, origin, turned=model.turned, sensor=sensor, marks=marks, losses=losses)
 
 

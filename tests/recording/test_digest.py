@@ -111,7 +111,7 @@ def test_what_is_not_as_written_is_refused_but_opens_without_its_checksum(
     within(path, change)
     with pytest.raises(FormatError, match=f"^{re.escape(str(path))}: {DAMAGED}$"):
         taxel.open(path)
-    # As files of before, and those that are changed on purpose.
+    # As of files that are changed on purpose.
     within(path, lambda columns: columns.pop("digest"))
     assert len(taxel.open(path).events) == 3000
 

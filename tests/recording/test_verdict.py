@@ -110,15 +110,14 @@ def test_verdicts_of_all_counts_are_on_the_page(seed: int) -> None:
     if draw.random() < 0.3:
         del counts["missing"]
     assert_listed(of_counts(counts))
-    counts["converted"] = "the .npz does not say what was lost"
-    assert of_counts(counts) == counts["converted"]
 
 
 @pytest.mark.parametrize("kind", [".mcap", ".npz", ".h5"])
 def test_remarks_go_to_files_and_back_beside_the_verdict(tmp_path: Path, kind: str) -> None:
     frames = taxel.Frames([[[1.0, 2.0]], [[3.0, 4.0]]], [0, 10_000])
     said = ("at the bag's times", "2 messages of another length left out")
-    losses = Losses(remarks=said, verdict=known("nothing lost"))
+    fine = taxel.Verdict.from_dict({"status": "complete", "text": "nothing lost"})
+    losses = Losses(remarks=said, verdict=known(fine))
     of = source_from(frames, Origin(tmp_path / "a.bag", "a.bag", "ros"), losses=losses)
     taxel.convert(taxel.Recording(Contents.of(of)), tmp_path / f"a{kind}")
     back = taxel.open(tmp_path / f"a{kind}")

@@ -21,7 +21,7 @@ from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
-from taxel.cli._app import app, with_typed
+from taxel.cli._app import App, with_typed
 from taxel.cli._recordings import progress
 from taxel.cli._say import say
 from taxel.cli.console import Console
@@ -35,7 +35,9 @@ from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.simulate.options import EmulateOptions
 from taxel.spikes import to_ms
 
-__all__ = ["emulate"]
+__all__ = ["app", "emulate"]
+
+app = App()
 
 
 def _option(name: str, *flags: str, of: type = EmulateOptions, metavar: str | None = None) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from taxel import _core
-from taxel.detect.detector import read
+from taxel._base.saved import read
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.readout import Readout
 

@@ -89,7 +89,7 @@ def about_of(place: str, document: str) -> dict[str, Any]:
     entry = "the whole"
     fields: dict[str, Any] = {}
     try:
-        about = of_json(place, document, limits.ABOUT, room=limits.ABOUT, with_nan=True)
+        about = of_json(place, document, limits.ABOUT, room=limits.ABOUT)
         if not isinstance(about, dict):
             raise ProblemError("no object")
         for entry, read in _ENTRIES.items():
@@ -150,11 +150,10 @@ def notes_of(records: Any) -> tuple[Note, ...]:
 
 
 def detections_of(records: Any) -> Detections:
-    """Return detections from records of (host ns, label, t, known, slope[, repaired]); JSON has no NaN."""
+    """Return detections from records of (host ns, label, t, known, slope, repaired); JSON has no NaN."""
     rows = list(records)
     slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
-    repaired = [row[5] if len(row) > 5 else False for row in rows]
-    label, t, known = ([row[k] for row in rows] for k in (1, 2, 3))
+    label, t, known, repaired = ([row[k] for row in rows] for k in (1, 2, 3, 5))
     return Detections._of(label, t, known, slopes, repaired=repaired)
 
 
@@ -232,8 +231,7 @@ _ENTRIES: dict[str, Any] = {
     "notes": lambda value, _: notes_of(value),
     "detections": lambda value, _: detections_of(value),
     "counts": lambda value, _: counts_of(value),
-    # Earlier versions wrote its line alone.
-    "verdict": lambda value, _: Verdict(value) if isinstance(value, str) else Verdict.from_dict(value),
+    "verdict": lambda value, _: Verdict.from_dict(value),
     "remarks": lambda value, _: _texts(value),
     "zeroings": lambda value, _: zeroings_of(value),
     "columns": lambda value, _: _texts(value),

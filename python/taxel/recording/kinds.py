@@ -77,9 +77,7 @@ _OTHERS = {"arrays": "file of arrays", "table": "table", "ros": "ROS bag"}
 def verdict_of(source: Source) -> Verdict:
     """Return what was lost of a recording, or that its file does not say it."""
     verdict = source.losses.verdict()
-    if verdict is None:
-        return Verdict._of({"silent": kind_of_file(source.origin.kind)})
-    return verdict if isinstance(verdict, Verdict) else Verdict(verdict)
+    return Verdict._of({"silent": kind_of_file(source.origin.kind)}) if verdict is None else verdict
 
 
 def kind_of(path: Path) -> str:

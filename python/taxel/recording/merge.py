@@ -397,8 +397,8 @@ def _common(sources: Sequence[Source], tables: Sequence[Events | Frames]) -> Arr
     for part, table in zip(sources, tables, strict=True):
         if not array.fits(table.array):
             raise ProblemError(
-                f"{part.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors are merged "
-                "beside one another only"
+                f"{part.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors are "
+                "merged beside one another only"
             )
     return array
 

@@ -47,7 +47,7 @@ DTYPES: dict[str, type[np.generic]] = {
     **dict.fromkeys(("x", "y", "intensity"), np.uint16),
     **dict.fromkeys(("p", "present", "repaired"), np.bool_),
 }
-#: The entry with the checksum over all columns; earlier versions wrote none, and ignore it.
+#: The entry with the checksum over all columns; a file without it opens unverified.
 _DIGEST = "digest"
 #: Bytes of a column that are taken into the checksum at once.
 _PIECE_BYTES = 1 << 20

@@ -57,7 +57,7 @@ def on_clock(of: Contents, name: str) -> Contents:
         return alone(moved)
     own = moved[label]
 
-    def verdict() -> Verdict | str | None:
+    def verdict() -> Verdict | None:
         # It may be that of all sources.
         is_own = one.losses.verdict() == sources[label].losses.verdict()
         return (own if is_own else alone(moved).one).losses.verdict()
@@ -110,7 +110,7 @@ def _moved(of: Source, name: str, times: Times | None) -> Source:
     def clock(own: Clock | None) -> Clock | None:
         return None if own is None else Clock(times(own.board_us), own.arrived_ns)
 
-    def verdict(own: Verdict | str | None) -> Verdict | str | None:
+    def verdict(own: Verdict | None) -> Verdict | None:
         told = verdict_of(of)
         doubtful, steps = told.doubtful_after_us, told.steps_back
         after = steps[0]["after_us"] if doubtful is None and steps else doubtful

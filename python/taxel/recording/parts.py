@@ -159,7 +159,7 @@ class Losses:
     ----------
     counts : mapping
         What was received and lost, by cause.
-    verdict : Verdict, or a line
+    verdict : Verdict
         What was lost; None if that is not known.
     remarks : tuple of str
         What else there is to know: by whose times it is, what was left out, what it was converted from.
@@ -171,7 +171,7 @@ class Losses:
     """
 
     counts: Once[Mapping[str, Any]] = field(default_factory=lambda: known(dict[str, Any]()))
-    verdict: Once[Verdict | str | None] = _NONE
+    verdict: Once[Verdict | None] = _NONE
     remarks: tuple[str, ...] = ()
     truncated: bool = False
     rebuilt: Once[Mapping[str, int]] = field(default_factory=lambda: known(dict[str, int]()))

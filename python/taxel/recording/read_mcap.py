@@ -256,7 +256,7 @@ class _Source:
     def counted(self) -> dict[str, Any]:
         """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""
         counts = self.ending.get("finished", {}).get("counts") or {}
-        return {} if self.header.get("converted") or counts.get("converted") else counts
+        return {} if self.header.get("converted") else counts
 
     def verdict(self, found: Callable[[], str] | None = None) -> Verdict:
         """Return what was lost at which stage; `found` decodes a board or a stream, and returns what it found."""
@@ -270,9 +270,8 @@ class _Source:
         if "finished" not in self.ending:
             return True
         counts = self.ending["finished"]["counts"]
-        converted = self.header.get("converted") or counts.get("converted")
         causes = DOUBTS if counts.get("steps_back") else (*DOUBTS, *STEPS)
-        return not converted and any(counts["decoder"].get(cause, 0) for cause in causes)
+        return not self.header.get("converted") and any(counts["decoder"].get(cause, 0) for cause in causes)
 
 
 def _stated(path: Path, entry: str, read: Callable[[Any], Any], value: Any) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._core import RecordingWriter
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
@@ -23,7 +24,7 @@ from taxel.recording.pressure import above_rest
 from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, ticks_by_unit
 
-__all__ = ["cut_raw", "encoded", "write_mcap"]
+__all__ = ["RecordingWriter", "cut_raw", "encoded", "write_mcap"]
 
 #: Number of values of a block of pictures: a chunk of the file.
 _BLOCK = 1 << 18
@@ -53,7 +54,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     samples = one.lines.samples() if isinstance(one, Stream) else None
     if samples is not None:
         header = {**samples.about, "sources": [], **_told(one)}
-        writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+        writer = RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
         writer.finish(json.dumps(counts[one.origin.label]))
         return
@@ -74,7 +75,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
         "origin_us": wire.origin_us,
         "started_ns": int(arrived[0]) if len(arrived) else 0,
     }
-    writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+    writer = RecordingWriter(part, json.dumps(header), compression, True)
     # Written before all datagrams, as the recorder does, because a player reads it there.
     if (held := one.settings.held()) is not None:
         writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(held).reshape(-1))
@@ -133,7 +134,7 @@ def _write_pictures(
         for name, one in sources.items()
     ]
     header = {**headers[0], "sources": headers[1:], "started_ns": 0}
-    writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+    writer = RecordingWriter(part, json.dumps(header), compression, True)
     tracks = {name: writer.track(name) for name in sources}
 
     def at_ns(t: int) -> int:
