@@ -300,13 +300,13 @@ def test_a_folder_of_tables_opens_by_its_one_layout(tmp_path: Path) -> None:
         (tmp_path / name).write_text(lines(VALUES))
     (tmp_path / "layout.toml").write_text("rows = 2\ncolumns = 3\nrate_hz = 10\n")
     (tmp_path / "labels.csv").write_text("recording,label,t_us\nstep2,contact,100000\n")
-    opened = taxel.open(tmp_path)
+    opened = taxel.open_all(tmp_path)
     assert [one.name for one in opened] == ["step2.csv", "step10.csv"]
     assert [len(one.notes) for one in opened] == [1, 0]
 
 
 def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) -> None:
-    left, right = taxel.open(write_gaitpdb(tmp_path))
+    left, right = taxel.open_all(write_gaitpdb(tmp_path))
     assert (left.side, right.side) == ("left", "right")
     for foot, sign in ((left, -1), (right, 1)):
         places = foot.array.places
@@ -459,7 +459,7 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
     write_gaitpdb(tmp_path)
     (tmp_path / "layout.toml").write_text("[places]\nx = [1, 2]\ny = [1, 2]\n")
     with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 8\), one a taxel"):
-        taxel.open(tmp_path)
+        taxel.open_all(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 import taxel
 from taxel import Array, Frames, Note, _core
-from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.contents import Contents, Pictures, Source, alone, source_from
 from taxel.recording.once import known
-from taxel.recording.parts import Losses, Marks, Origin, Readings, Sensor
+from taxel.recording.parts import Losses, Marks, Origin, Sensor
 
 #: The kinds of files that hold frames.
 KINDS = (".mcap", ".npz", ".h5", ".csv")
@@ -178,9 +178,9 @@ def same(recording: taxel.Recording, m: Model, where: str) -> None:
     np.testing.assert_array_equal(frames.t, m.t, where)
     np.testing.assert_array_equal(frames.values, m.values, where)
     assert (frames.unit, recording.side, recording.heel, recording.timed) == (m.unit, m.side, m.heel, True), where
-    readings = recording._contents.one.part(Readings)
-    assert readings is not None
-    assert readings.turned == m.turned, where
+    one = recording._contents.one
+    assert isinstance(one, Pictures)
+    assert one.readings.turned == m.turned, where
     assert (recording.columns if recording.is_stream else None) == m.columns, where
     assert sorted((n.text, str(n.t)) for n in recording.notes) == sorted((text, str(t)) for text, t in m.notes), where
     assert [(d.label, d.t, d.known) for d in recording.detections] == m.found, where

@@ -138,7 +138,7 @@ class Coloured(Board):
     colour: str = field(default="red", kw_only=True)
 
 
-@pytest.mark.parametrize("function", ["between", "region", "merge", "on_clock", *KINDS])
+@pytest.mark.parametrize("function", ["between", "region", "on_clock", *KINDS])
 def test_a_part_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
     of = full(tmp_path, Board)
     one = Coloured(**parts_of(of.one))

@@ -75,8 +75,7 @@ def converted(kind: str, frames: bool) -> Callable[[Path], taxel.Recording]:
 
 def of_format(name: str) -> Callable[[Path], taxel.Recording]:
     def make(folder: Path) -> taxel.Recording:
-        opened = taxel.open(getattr(making, f"write_{name}")(folder))
-        return opened if isinstance(opened, taxel.Recording) else next(iter(opened))
+        return taxel.open_all(getattr(making, f"write_{name}")(folder))[0]
 
     return make
 

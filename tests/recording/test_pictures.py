@@ -211,7 +211,7 @@ def test_both_feet_of_a_file_become_sources_left_and_right(
 ) -> None:
     file = make(tmp_path)
     file = next(tmp_path.iterdir()) if file.is_dir() else file
-    trials = taxel.open(file)
+    trials = taxel.open_all(file)
     assert [one.name.rsplit(" ")[-1] for one in trials] == ["left", "right"]
     assert call(capsys, "convert", file, tmp_path / "both.mcap")[0] == 0
     both = taxel.open(tmp_path / "both.mcap")
@@ -297,7 +297,7 @@ def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys
 def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = write_icub(tmp_path)
     file = file if file.is_file() else next(tmp_path.iterdir())
-    opened = taxel.open(file)
+    opened = taxel.open_all(file)
     assert not any(one.timed for one in opened)
     assert call(capsys, "convert", file, tmp_path / "out")[0] == 0
     for ending in (".npz", ".h5", ".mcap"):

@@ -76,17 +76,17 @@ class FileOptions:
         ),
     ] = None
 
-    def open(self, path: Path) -> Recording | list[Recording]:
+    def open(self, path: Path) -> list[Recording]:
         """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
 
         Raises
         ------
         ProblemError : an ``--array`` that differs from the sensor that a file holds; a ``--rate-hz`` of one with times
         """
-        from taxel.recording import open_any  # noqa: PLC0415  the command line starts quickly
+        from taxel.recording import open_all  # noqa: PLC0415  the command line starts quickly
 
         arrays = [geometry(size, of_wire=False) for size in self.array or ()]
-        opened = open_any(
+        opened = open_all(
             path,
             array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
             layout=self.layout or self._instead_of_layout(path),
@@ -96,9 +96,7 @@ class FileOptions:
             ros=self.ros,
             limit=self.limit,
         )
-        if isinstance(opened, list):
-            return [self._timed(self._on_array(one)) for one in opened]
-        return self._timed(self._on_array(opened))
+        return [self._timed(self._on_array(one)) for one in opened]
 
     def words(self) -> list[str]:
         """Return the options as words of a command line."""
@@ -150,8 +148,7 @@ class FileOptions:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
         from taxel.recording.opening import joined  # noqa: PLC0415  the command line starts quickly
 
-        opened = self.open(path)
-        return joined(opened if isinstance(opened, list) else [opened])
+        return joined(self.open(path))
 
     def all(self, paths: Sequence[Path]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
@@ -160,9 +157,7 @@ class FileOptions:
         """
         from taxel.recording.opening import sensors  # noqa: PLC0415  the command line starts quickly
 
-        opened = (self.open(path) for path in paths)
-        every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
-        return [one for each in every for one in sensors(each)]
+        return [one for path in paths for each in self.open(path) for one in sensors(each)]
 
     def _timed(self, recording: Recording) -> Recording:
         return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)

@@ -18,7 +18,7 @@ __all__ = [
     "parts_of", "saying", "several", "source_from", "together",
 ]  # fmt: skip
 
-P = TypeVar("P", bound=parts.Part)
+P = TypeVar("P", parts.Wire, parts.Lines)
 S = TypeVar("S", bound="Source")
 
 
@@ -43,21 +43,19 @@ class Source:
         """The events or the frames."""
         raise NotImplementedError
 
-    def part(self, kind: type[P]) -> P | None:
-        """Return its part of a type; None if it has none."""
-        return next((part for part in parts_of(self).values() if isinstance(part, kind)), None)
+    def part(self, kind: type[P]) -> P:
+        """Return its part of a type, of which there need not be one; else an empty one."""
+        return next((part for part in parts_of(self).values() if isinstance(part, kind)), None) or kind()
 
     @property
     def columns(self) -> tuple[str, ...] | None:
         """The names of the columns of a stream of numbers; None for a sensor."""
-        lines = self.part(parts.Lines)
-        return None if lines is None else lines.columns
+        return self.lines.columns if isinstance(self, Stream) else None
 
     @property
     def untimed(self) -> bool:
         """Whether its frames are numbered."""
-        readings = self.part(parts.Readings)
-        return readings is not None and readings.untimed
+        return isinstance(self, Pictures) and self.readings.untimed
 
 
 @dataclass(frozen=True, eq=False)

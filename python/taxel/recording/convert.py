@@ -126,10 +126,9 @@ def _write_lsa(place: Path, of: Source, overwrite: bool) -> None:
         tempfile.TemporaryDirectory(dir=place.parent, prefix=f".{place.name}.") as folder,
     ):
         made = Path(folder) / "made.lsa"
-        wire = of.part(Wire)
-        assert wire is not None
-        assert wire.payload is not None
-        _core.write_lsa(made, wire.payload.tobytes())
+        payload = of.part(Wire).payload
+        assert payload is not None  # `stored` sets it
+        _core.write_lsa(made, payload.tobytes())
         os.replace(made, part)
     write_whole(done, lambda _: None, overwrite=True)
 

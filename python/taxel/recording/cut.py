@@ -148,8 +148,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
             case _:
                 assert_never(part)
 
-    lines = of.one.part(parts.Lines)
-    return Contents.of(applied(of.one, rule, lambda: [*([] if lines is None else lines.received()), *of.others()]))
+    return Contents.of(applied(of.one, rule, lambda: [*of.one.part(parts.Lines).received(), *of.others()]))
 
 
 def _cropped(

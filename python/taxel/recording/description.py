@@ -22,7 +22,7 @@ from taxel.formats.checks import sensor as checked
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
-from taxel.recording.contents import Source, source_from
+from taxel.recording.contents import Pictures, Source, source_from
 from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import BoardChange, Zeroing
 from taxel.recording.once import known
@@ -42,7 +42,7 @@ def json_of(of: Source) -> str:
     ------
     ProblemError : a description that would not be read again, as it takes too much memory
     """
-    sensor, losses, readings = of.sensor, of.losses, of.part(parts.Readings)
+    sensor, losses = of.sensor, of.losses
     registers, changes = of.settings.registers(), of.settings.register_changes()
     driven = registers.array if registers is not None else changes[0][1].array if changes else sensor.array
     document: dict[str, Any] = {
@@ -65,7 +65,7 @@ def json_of(of: Source) -> str:
         "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in of.marks.zeroings()],
         "columns": of.columns,
         "untimed": of.untimed,
-        "turned": None if readings is None else readings.turned,
+        "turned": of.readings.turned if isinstance(of, Pictures) else None,
         "truncated": losses.truncated,
         "rebuilt": dict(losses.rebuilt()),
         "lost": losses.lost(),

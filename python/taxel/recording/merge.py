@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar, assert_never
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
-from taxel.recording.contents import Contents, Pictures, Source, Stream, applied, named
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, named, saying
 from taxel.recording.kinds import verdict_of
 from taxel.recording.notes import BoardChange, Zeroing
 from taxel.recording.once import UNKNOWN, anything, known
@@ -96,42 +96,44 @@ def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: 
     shifts = _shifts(tables, gap)
     array, lefts = _side_by_side(tables) if beside else (_common(sources, tables), [0] * len(sources))
     merging = _Merging(sources, tables, shifts, lefts, array, beside)
-    first = sources[0]
-    if isinstance(first, Pictures):
-        columns, header = merging.columns(), {name: getattr(first, name) for name in _HEADER}
-        first = Pictures(readings=first.readings, **header)
-        if columns is not None:
-            first = Stream(readings=first.readings, lines=parts.Lines(columns), **header)
-    lost = [line for part in sources for line in part.losses.lost()]
-    for recording, part in zip(recordings, sources, strict=True):
-        wire, lines = part.part(parts.Wire), part.part(parts.Lines)
-        lost += [] if wire is None else wire.lines()
-        lost += [] if lines is None else lines.received()
-        lost += recording.others()
-    both = applied(first, merging.rule)
+    lost = [line for source in sources for line in source.losses.lost()]
+    for recording, source in zip(recordings, sources, strict=True):
+        lost += [*source.part(parts.Wire).lines(), *source.part(parts.Lines).received(), *recording.others()]
+    both = merging.source()
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
-    said = known(tuple(dict.fromkeys((*lost, *merging.lost))))
-    return Contents.of(replace(both, losses=replace(both.losses, lost=said)))
+    return Contents.of(saying(both, known((*lost, *merging.lost))))
 
 
-#: The parts that all sources have.
-_HEADER = tuple(one.name for one in fields(Source))
-
-
+@dataclass
 class _Merging:
-    """Merges the parts of sources, type by type; `lost` lists what they do not agree in."""
+    """Merges sources, a type of part after the other; `lost` lists what they do not agree in."""
 
-    def __init__(
-        self,
-        sources: Sequence[Source],
-        tables: Sequence[Events | Frames],
-        shifts: list[int],
-        lefts: list[int],
-        array: Array,
-        beside: bool,
-    ) -> None:
-        self.sources, self.tables, self.shifts, self.lefts = sources, tables, shifts, lefts
-        self.array, self.beside, self.lost = array, beside, list[str]()
+    sources: Sequence[Source]
+    tables: Sequence[Events | Frames]
+    shifts: list[int]
+    lefts: list[int]
+    array: Array
+    beside: bool
+    lost: list[str] = field(default_factory=list)
+
+    def source(self) -> Source:
+        """Return the sources as one."""
+        names = ", ".join(one.origin.name for one in self.sources)
+        header: dict[str, Any] = {
+            "origin": parts.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}"),
+            "sensor": self.sensor(),
+            "settings": self.settings(),
+            "marks": self.marks(),
+            "timing": self.timing(),
+            "losses": self.losses(),
+        }
+        if self.sources[0].has_events:
+            tables = [table for table in self.tables if isinstance(table, Events)]
+            return Board(changes=parts.Changes(known(_events(tables, self.shifts, self.array, self.lefts))), **header)
+        columns = self.columns()
+        if columns is None:
+            return Pictures(readings=self.readings(), **header)
+        return Stream(readings=self.readings(), lines=parts.Lines(columns), **header)
 
     def agreed(self, values: Iterable[T], empty: T, line: str, same: Callable[[T, T], bool] = operator.eq) -> T:
         """Return the common value if all recordings agree, else the empty value; then a line says so."""
@@ -150,34 +152,6 @@ class _Merging:
         return (
             tuple(name for names in each for name in names or ()) if any(names is not None for names in each) else None
         )
-
-    def rule(self, part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
-        """Return the merged part of a type."""
-        match part:
-            case parts.Origin():
-                names = ", ".join(one.origin.name for one in self.sources)
-                return parts.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}")
-            case parts.Sensor():
-                return self.sensor()
-            case parts.Settings():
-                return self.settings()
-            case parts.Marks():
-                return self.marks()
-            case parts.Timing():
-                return self.timing()
-            case parts.Losses():
-                return self.losses()
-            case parts.Changes():
-                tables = [table for table in self.tables if isinstance(table, Events)]
-                return parts.Changes(known(_events(tables, self.shifts, self.array, self.lefts)))
-            case parts.Readings():
-                return self.readings()
-            case parts.Lines():
-                return parts.Lines(part.columns)
-            case parts.Wire():
-                return parts.Wire()
-            case _:
-                assert_never(part)
 
     def sensor(self) -> parts.Sensor:
         """Merge what describes the sensors; what one of them says of its taxels may be lost."""
@@ -258,7 +232,7 @@ class _Merging:
     def readings(self) -> parts.Readings:
         """Merge frames."""
         tables = [table for table in self.tables if isinstance(table, Frames)]
-        each = [readings for part in self.sources if (readings := part.part(parts.Readings)) is not None]
+        each = [part.readings for part in self.sources if isinstance(part, Pictures)]
         return parts.Readings(
             known(_frames(tables, self.shifts, self.array, self.beside)),
             all(one.untimed for one in each),

@@ -138,5 +138,4 @@ def _moved(of: Source, name: str, times: Times | None) -> Source:
             case _:
                 assert_never(part)
 
-    lines = of.part(parts.Lines)
-    return applied(of, rule, lambda: [] if lines is None else lines.received())
+    return applied(of, rule, of.part(parts.Lines).received)

@@ -45,8 +45,9 @@ __all__ = [
     "check_recording",
     "is_recording",
     "joined",
-    "open_any",
+    "open_all",
     "open_joined",
+    "open_one",
     "open_recording",
     "recordings_in",
     "sensors",
@@ -56,7 +57,7 @@ __all__ = [
 FEET = ("left", "right")
 
 
-def open_any(
+def open_one(
     path: str | os.PathLike[str],
     *,
     array: Array | Sequence[Array] | None = None,
@@ -68,16 +69,16 @@ def open_any(
     types: str | os.PathLike[str] | None = None,
     ros: str | None = None,
     limit: int | None = None,
-) -> Any:
-    r"""Open a recording, or a folder of trials.
+) -> Recording:
+    r"""Open a recording.
 
-    `taxel.open` is this function.
+    `taxel.open` is this function; `taxel.open_all` opens those of a folder.
 
     Parameters
     ----------
     path : path
         A .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged; a file of another format
-        that `taxel.formats` reads; a ROS bag; or a folder of either kind.
+        that `taxel.formats` reads, with one trial; or a ROS bag.
     array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
         a larger one if events lie outside it. A .mcap holds its own, which is kept. Of a ROS bag rows and
@@ -101,13 +102,12 @@ def open_any(
 
     Returns
     -------
-    Recording, or list of Recording
-        One for a file as taxel writes it. A list for a folder, in the order of the names (2 before 10), and for a file
-        of another format, which holds one or more trials: their reference events (contact, foot-off ...) become notes.
+    Recording
 
     Raises
     ------
     FormatError : not a recording, damaged so that nothing can be read, or more than may be read (names the place)
+    ProblemError : a folder, or a file of another format with several trials
     OSError : the file does not exist, or cannot be read
 
     Notes
@@ -117,8 +117,67 @@ def open_any(
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
     is described in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) become
-    notes of the recordings that it names, also of a file of pictures that is opened alone. In a folder with files that
-    taxel writes, all other files are ignored.
+    notes of a file of pictures that it names.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile, taxel
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "step.npz"
+    >>> events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    >>> _ = taxel.convert(events, place)
+    >>> taxel.open(place)
+    Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
+    """
+    how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
+    place = Path(arguments.path("path", path))
+    if place.is_dir() and not is_bag(place):
+        raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
+    every = _open(place, how)
+    if len(every) != 1:
+        names = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
+        raise ProblemError(f"{place}: holds {len(every)} recordings ({names}); taxel.open_all opens each")
+    return every[0]
+
+
+def open_all(
+    path: str | os.PathLike[str],
+    *,
+    array: Array | Sequence[Array] | None = None,
+    layout: str | os.PathLike[str] | None = None,
+    pairing: str = "direct",
+    differences: bool = False,
+    topic: str | Sequence[str] | None = None,
+    field: str | Sequence[str] | None = None,
+    types: str | os.PathLike[str] | None = None,
+    ros: str | None = None,
+    limit: int | None = None,
+) -> list[Recording]:
+    r"""Open all recordings of a folder, or all trials of a file.
+
+    `taxel.open_all` is this function.
+
+    Parameters
+    ----------
+    path : path
+        A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
+    array, layout, pairing, differences, topic, field, types, ros, limit
+        As of `taxel.open`.
+
+    Returns
+    -------
+    list of Recording
+        In the order of the names (2 before 10). A file of another format holds one or more trials: their reference
+        events (contact, foot-off ...) become notes.
+
+    Raises
+    ------
+    FormatError : a folder without a recording; else as of `taxel.open`
+    OSError : the file does not exist, or cannot be read
+
+    Notes
+    -----
+    The reference events of a ``labels.csv`` in the folder (`taxel.Labels`) become notes of the recordings that it
+    names. In a folder with files that taxel writes, all other files are ignored.
 
     Examples
     --------
@@ -128,25 +187,29 @@ def open_any(
     >>> for name in ("step10.npz", "step2.npz"):
     ...     _ = taxel.convert(events, folder / name)
     >>> _ = (folder / "labels.csv").write_text("recording,label,t_us\nstep2,contact,200\n")
-    >>> taxel.open(folder)
+    >>> taxel.open_all(folder)
     [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 note),
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
-    place = Path(arguments.path("path", path))
     how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
+    return _open(Path(arguments.path("path", path)), how)
+
+
+def _open(place: Path, how: How) -> list[Recording]:
+    """Open all recordings of a folder, or all trials of a file."""
     with how.within():
         if place.is_dir() and not is_bag(place):
             return _folder(place, how)
         # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
         if place.exists() and (names := _formats(place)) and not _is_own(place):
             trials = _kept(formats.trials(place, names[0]))
-            return [_named_beside(place, Path(one.name), _of(one, place, names[0], layout)) for one in trials]
-        return _named_beside(place, Path(place.name), _open_one(place, how))
+            return [_named_beside(place, Path(one.name), _of(one, place, names[0], how.layout)) for one in trials]
+        return [_named_beside(place, Path(place.name), _open_one(place, how))]
 
 
 @dataclass(frozen=True)
 class How:
-    """Hold what says how files are opened; the fields are the arguments of `open_any`."""
+    """Hold what says how files are opened; the fields are the arguments of `taxel.open`."""
 
     array: Array | Sequence[Array] | None = None
     layout: str | os.PathLike[str] | None = None
@@ -175,7 +238,7 @@ def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
     ----------
     path : path
     **how
-        The other arguments of `open_any`.
+        The other arguments of `open_one`.
 
     Returns
     -------
@@ -315,7 +378,7 @@ def _warn_of_tables(folder: Path, own: Sequence[Path], files: Sequence[Path], ho
         warn(
             f"{folder}: {names} left out, as beside recordings ({kept}) tables and arrays are not read: convert them, "
             "or keep them in a folder of their own",
-            stacklevel=4,
+            stacklevel=5,
         )
 
 
@@ -476,7 +539,7 @@ def joined(opened: Sequence[Recording]) -> list[Recording]:
     Parameters
     ----------
     opened : sequence of Recording
-        As `open_any` returns them, where each foot is a trial.
+        As `open_all` returns them, where each foot is a trial.
 
     Returns
     -------
@@ -508,9 +571,8 @@ def sensors(recording: Recording) -> list[Recording]:
 
 
 def open_joined(path: str | os.PathLike[str], **how: Any) -> list[Recording]:
-    """Open a file or a folder as `open_any` does, with the feet of each trial joined."""
-    opened = open_any(path, **how)
-    return joined(opened if isinstance(opened, list) else [opened])
+    """Open a file or a folder as `open_all` does, with the feet of each trial joined."""
+    return joined(open_all(path, **how))
 
 
 def _formats(place: Path) -> list[str]:

@@ -89,7 +89,7 @@ def pictures(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz")
     # The first picture includes the held values.
     header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
     frames = Once(lambda: _drawn(of, period))
-    return Drawn(of.origin, of.sensor, parts.Readings(frames), of.part(parts.Wire) or parts.Wire(), **header)
+    return Drawn(of.origin, of.sensor, parts.Readings(frames), of.part(parts.Wire), **header)
 
 
 def _drawn(of: Source, period: int | None) -> Frames:

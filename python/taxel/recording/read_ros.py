@@ -102,7 +102,7 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     for name, one in zip(_names(path, reads), reads, strict=True):
         told = tuple(_told(one))
         for line in told:
-            warn(f"{path}: topic {one.topic}: {line}", stacklevel=4)
+            warn(f"{path}: topic {one.topic}: {line}", stacklevel=5)
         losses = Losses(
             known(
                 {

@@ -321,8 +321,7 @@ class Recording:
         if self._contents.is_several:
             # Reading the events raises the error that lists the sources.
             _ = self._contents.one.table
-        wire = self._contents.one.part(Wire)
-        datagrams = None if wire is None else wire.datagrams()
+        datagrams = self._contents.one.part(Wire).datagrams()
         if datagrams is not None:
             return datagrams
         if self.is_stream:

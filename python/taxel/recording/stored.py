@@ -95,8 +95,7 @@ def _stored(of: Source, ending: str, place: Path) -> Source:
 
 def is_made(of: Source) -> bool:
     """Return whether a file's bytes must be made of the events, as no datagrams contain exactly these events."""
-    wire = of.part(parts.Wire)
-    has_bytes = wire is not None and (wire.datagrams.holds() or (wire.payload is not None and len(wire.payload) > 0))
+    has_bytes = bool(of.part(parts.Wire).lines())
     return of.timing.stretch is not None or of.timing.clock_of is not None or not has_bytes
 
 
@@ -108,13 +107,12 @@ def _sensor(array: Array) -> str:
 
 def _arrivals(of: Source) -> list[str]:
     """Return what is lost without arrival times, which datagrams have too."""
-    wire = of.part(parts.Wire)
-    return ["arrival times"] * (of.timing.clock.holds() and not (wire is not None and wire.datagrams.holds()))
+    return ["arrival times"] * (of.timing.clock.holds() and not of.part(parts.Wire).datagrams.holds())
 
 
 def _table(of: Source, _: Path) -> _Kept:
     """Return what a .npz or a .h5 holds: all but the raw datagrams."""
-    lines = _arrivals(of)
+    wire, lines = of.part(parts.Wire), of.part(parts.Lines)
 
     def rule(part: parts.Part) -> parts.Part | None:
         match part:
@@ -125,17 +123,15 @@ def _table(of: Source, _: Path) -> _Kept:
             ):
                 return part
             case parts.Wire():
-                lines.extend(part.lines(with_times=True))
                 return parts.Wire()
             case parts.Lines():
-                lines.extend(part.received())
                 return parts.Lines(part.columns)
             case parts.Timing():
                 return None
             case _:
                 assert_never(part)
 
-    return applied(of, rule), lines
+    return applied(of, rule), [*_arrivals(of), *wire.lines(with_times=True), *lines.received()]
 
 
 def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
@@ -150,8 +146,7 @@ def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
 
 def _csv(of: Source, place: Path) -> _Kept:
     """Return what a .csv holds: events without markers, or frames without their unit."""
-    beside, readings, wire = Layout.beside(place), of.part(parts.Readings), of.part(parts.Wire)
-    is_turned = readings is not None and readings.turned is not None
+    beside, is_turned = Layout.beside(place), isinstance(of, Pictures) and of.readings.turned is not None
     if is_turned and beside is not None and Layout.read(beside).turned is not None:
         raise ProblemError(
             f"{place}: the readings were turned already, which a .csv cannot state, and {beside} beside it would turn "
@@ -170,7 +165,7 @@ def _csv(of: Source, place: Path) -> _Kept:
     else:
         lost += [f"the unit ({whole.unit})"] * (whole.unit != "counts")
         table = Frames(whole.values[:, : array.rows, : array.columns], whole.t, array=array)
-    kept, lines = _bare(of, table, [] if wire is None else wire.lines(with_times=True))
+    kept, lines = _bare(of, table, of.part(parts.Wire).lines(with_times=True))
     return kept, [*lines, *lost]
 
 
