@@ -125,10 +125,11 @@ def variants(schema: Schema) -> dict[str, Schema]:
 
 
 def keys(schema: Schema) -> Iterator[tuple[str, Schema, bool]]:
-    """Yield name, schema, and whether it is required, of each key but `type`."""
-    for name, one in schema["properties"].items():
-        if name != "type":
-            yield name, one, name in schema["required"]
+    """Yield name, schema, and whether it is required, of each key but `type`; those that are required first."""
+    required = [name for name in schema.get("required", ()) if name != "type"]
+    others = [name for name in schema["properties"] if name != "type" and name not in required]
+    for name in (*required, *others):
+        yield name, schema["properties"][name], name in required
 
 
 def comment(schema: Schema) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 from taxel.calibration import Calibration
 from taxel.clock import Clock
 from taxel.recording.contents import Source, parts_of
-from taxel.recording.notes import Datagrams, Samples
 from taxel.recording.once import UNKNOWN, Once
+from taxel.recording.raw import Datagrams, Samples
 
 #: What a line in `lost` says of a field that is lost: one of these.
 WORDS: dict[str, tuple[str, ...]] = {

@@ -15,11 +15,11 @@ from taxel.recording.between import between
 from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, parts_of
 from taxel.recording.cut import region
 from taxel.recording.merge import merged
-from taxel.recording.notes import Samples
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
 from taxel.recording.parts import Lines, Timing
 from taxel.recording.pictures import calibrated, pictures
+from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
 from taxel.recording.stored import stored
 

@@ -17,9 +17,10 @@ import pytest
 import taxel
 from taxel._core import FormatError
 from taxel.recording.contents import Contents
-from taxel.recording.npz import columns_of, source_of_columns
 from taxel.recording.once import known
+from taxel.recording.read_npz import source_of_columns
 from taxel.recording.verdict import Verdict
+from taxel.recording.write_npz import columns_of
 
 from .making import record, some_events, some_frames
 

@@ -54,17 +54,35 @@ pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
 pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
     serde_path_to_error::deserialize(&value).map_err(|error| {
         let place = error.path().to_string();
-        let mut there = Some(&value);
+        let mut pointer = String::new();
         for segment in error.path() {
-            there = match segment {
-                serde_path_to_error::Segment::Seq { index } => there.and_then(|value| value.get(*index)),
-                serde_path_to_error::Segment::Map { key } => there.and_then(|value| value.get(key)),
-                serde_path_to_error::Segment::Enum { variant } => there.and_then(|value| value.get(variant)).or(there),
-                serde_path_to_error::Segment::Unknown => None,
+            let (step, stays) = match segment {
+                serde_path_to_error::Segment::Seq { index } => (index.to_string(), false),
+                serde_path_to_error::Segment::Map { key } => (key.clone(), false),
+                serde_path_to_error::Segment::Enum { variant } => (variant.clone(), true),
+                serde_path_to_error::Segment::Unknown => continue,
             };
+            let deeper = format!("{pointer}/{}", step.replace('~', "~0").replace('/', "~1"));
+            if !stays || value.pointer(&deeper).is_some() {
+                pointer = deeper;
+            }
         }
-        in_words(if place == "." { String::new() } else { place }, there, &error.inner().to_string())
+        let message = error.inner().to_string();
+        let message = names::<T>(&value, &pointer, &message).unwrap_or(message);
+        in_words(if place == "." { String::new() } else { place }, value.pointer(&pointer), &message)
     })
+}
+
+/// The error that lists the names of an enum, for one that says only that a value is none of its kind: serde_json lists
+/// them only where it reads a text.
+fn names<T: DeserializeOwned>(value: &Value, pointer: &str, message: &str) -> Option<String> {
+    if !message.ends_with(", expected string or map") {
+        return None;
+    }
+    let mut value = value.clone();
+    *value.pointer_mut(pointer)? = Value::String(String::new());
+    let error = serde_path_to_error::deserialize::<_, T>(&value).err()?.into_inner().to_string();
+    error.starts_with("unknown variant ").then_some(error)
 }
 
 /// Rewrites an error of serde_json in plain terms; its text is the only information that serde_json gives.
@@ -146,7 +164,7 @@ fn kind(wanted: &str, there: Option<&Value>) -> String {
         ("f64" | "f32", ..) => "a number".to_owned(),
         ("i8" | "i16" | "i32" | "i64" | "isize", ..) => "a whole number".to_owned(),
         ("a boolean", ..) => "true or false".to_owned(),
-        ("a string" | "a borrowed string" | "string or map", ..) => "a name".to_owned(),
+        ("a string" | "a borrowed string", ..) => "a name".to_owned(),
         ("a sequence", ..) => "a list".to_owned(),
         ("a map", ..) => "values by name".to_owned(),
         _ if wanted.starts_with("struct ") => "values by name".to_owned(),
@@ -202,7 +220,8 @@ mod tests {
             (r#""tau": 1, "many": -1"#, "many is -1: must be a whole number, 0 or more"),
             (r#""tau": 1, "many": 0.5"#, "many is 0.5: must be a whole number, 0 or more"),
             (r#""tau": 1, "word": "x""#, "word is \"x\": must be \"keep\", \"reset\" or \"later\""),
-            (r#""tau": 1, "word": 2"#, "word is 2: must be a name"),
+            (r#""tau": 1, "word": 2"#, "word is 2: must be \"keep\", \"reset\" or \"later\""),
+            (r#""tau": 1, "word": []"#, "word is []: must be \"keep\", \"reset\" or \"later\""),
             (r#""tau": 1, "word": {"later": {"tau": "x"}}"#, "word.later.tau is \"x\": must be a number"),
             (r#""tau": 1, "three": [1, 2]"#, "three is [1,2]: must be a list of 3"),
             (r#""tau": 1, "three": [1, 2, "3"]"#, "three[2] is \"3\": must be a number"),

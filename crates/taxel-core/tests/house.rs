@@ -44,17 +44,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
     (
         "taxel-panel",
         &[
-            &[
-                "assets",
-                "centre",
-                "connections",
-                "limited",
-                "limits",
-                "options",
-                "refusal",
-                "time_columns",
-                "weights",
-            ],
+            &["assets", "centre", "connections", "limited", "limits", "options", "refusal", "time_columns", "weights"],
             &["load", "request"],
             &["array_state", "taxel_history"],
             &["keyframe_index"],

@@ -3,9 +3,9 @@
 /** A label at one time or more. */
 export interface MarkedTimes {
   label: string;
+  t_us: number[];
   replaces_us?: number[] | null;
   source?: string | null;
-  t_us: number[];
 }
 
 /** An IPv4 address and its network interface. */
@@ -16,29 +16,29 @@ export interface Address {
 
 /** A sensor. */
 export interface ArrayInfo {
+  rows: number;
   columns: number;
-  /** A digit a taxel, 0 or 1, row by row; null where all exist. */
-  exists: string | null;
-  name: string;
-  /** Only where taxels have names, as the columns of a table: a text a taxel row by row, "" for one without. */
-  names?: string[] | null;
   /** A number of mm, or a pair for rows and columns; null where it is not known. A pitch of 1 mm is a pair. */
   pitch_mm: number | [number, number] | null;
+  name: string;
+  /** A digit a taxel, 0 or 1, row by row; null where all exist. */
+  exists: string | null;
+  /** Only where taxels have names, as the columns of a table: a text a taxel row by row, "" for one without. */
+  names?: string[] | null;
   /** Only where they are known instead of a pitch. */
   places?: TaxelPlaces | null;
-  rows: number;
 }
 
 /** Whether datagrams arrive, since when none do, and how long they may be missing. */
 export interface Arrival {
-  /** The longest interval between two heartbeats, us. */
-  heartbeat_us: number | null;
-  /** How long ago that was, s. */
-  silent_s: number;
-  /** When the latest one arrived, ns since 1970. */
-  since_ns: number | null;
   /** Whether they arrive. */
   state: "nothing" | "arriving" | "quiet" | "lost";
+  /** When the latest one arrived, ns since 1970. */
+  since_ns: number | null;
+  /** How long ago that was, s. */
+  silent_s: number;
+  /** The longest interval between two heartbeats, us. */
+  heartbeat_us: number | null;
 }
 
 /** What another program's text of a table lacks. A row without a `label` says that the note at `replaces_us` counts no more. */
@@ -46,56 +46,56 @@ export interface Conflict {
   conflict_id: number;
   /** Acknowledged by `done`, and not in it. */
   missing: LabelRow[];
-  /** The other labels that it has since; they are not in conflict, and in `labels` as well. */
-  new: LabelRow[];
   /** Deleted, moved or renamed, which was acknowledged, and in it again. */
   returned: LabelRow[];
+  /** The other labels that it has since; they are not in conflict, and in `labels` as well. */
+  new: LabelRow[];
 }
 
 /** A recording of the folder. */
 export interface FileInfo {
+  name: string;
   bytes: number;
+  modified_ns: number;
   /** Number of its labels, once they have been read. */
   labels: number | null;
-  modified_ns: number;
-  name: string;
 }
 
 /** A detection in a recording. */
 export interface FoundDetection {
-  known_us: number;
   label: string;
   t_us: number;
+  known_us: number;
 }
 
 /** A label of a recording. */
 export interface Label {
-  /** Its text; empty where a note of the recording is to count no more, and no label does in its place. */
-  label: string;
   /** Valid as long as the server runs. */
   label_id: number;
-  /** Time of the recording's own note that it replaces, us. */
-  replaces_us: number | null;
-  /** The source that it is of; empty for all of them. */
-  source: string;
+  /** Its text; empty where a note of the recording is to count no more, and no label does in its place. */
+  label: string;
   /** Board time, us. */
   t_us: number;
+  /** The source that it is of; empty for all of them. */
+  source: string;
   /** The trial that it is of, where the file holds several; empty for all of them. */
   trial: string;
+  /** Time of the recording's own note that it replaces, us. */
+  replaces_us: number | null;
 }
 
 /** A label of a recording. */
 export interface LabelRow {
   /** Its text; empty where a note of the recording is to count no more, and no label does in its place. */
   label: string;
-  /** Time of the recording's own note that it replaces, us. */
-  replaces_us: number | null;
-  /** The source that it is of; empty for all of them. */
-  source: string;
   /** Board time, us. */
   t_us: number;
+  /** The source that it is of; empty for all of them. */
+  source: string;
   /** The trial that it is of, where the file holds several; empty for all of them. */
   trial: string;
+  /** Time of the recording's own note that it replaces, us. */
+  replaces_us: number | null;
 }
 
 /** The last recording. */
@@ -112,86 +112,86 @@ export interface Latency {
 
 /** What was lost, by cause. */
 export interface Lost {
-  /** Bytes that were no words. */
-  damaged: number;
   /** Messages. */
   kernel: number;
-  /** Taxels outside the array. */
-  outside: number;
-  /** Events that only the panel's curves and its past lack: its held values are right again within 0.1 s. */
-  panel: number;
   /** Datagrams. */
   queue: number;
-  /** Events that found no room before the readout. */
-  readout: number;
   /** Datagrams of version 2 that never arrived intact. */
   wire: number;
+  /** Bytes that were no words. */
+  damaged: number;
+  /** Taxels outside the array. */
+  outside: number;
+  /** Events that found no room before the readout. */
+  readout: number;
+  /** Events that only the panel's curves and its past lack: its held values are right again within 0.1 s. */
+  panel: number;
 }
 
 /** A marker of the board's own recording. */
 export interface Marker {
-  start: boolean;
   t_us: number;
+  start: boolean;
 }
 
 /** The drift and the delays that arrivals show. */
 export interface Pace {
+  /** Drift of the host's clock relative to the board's, parts per million. */
+  drift_ppm: number;
   /** Delays beyond the shortest, of all datagrams so far. */
   delay: Quantiles;
   /** Why they cannot be, with the likely cause; `None` if they can. */
   doubt: string | null;
-  /** Drift of the host's clock relative to the board's, parts per million. */
-  drift_ppm: number;
 }
 
 /** A source of pictures; sources stand side by side in `array`. */
 export interface PictureSource {
-  columns: number;
-  /** Whether values fall from that of a quiet stretch, so that less may mean more pressure. */
-  falls: boolean;
+  name: string;
   /** Its first column. */
   left: number;
-  name: string;
-  /** Where something lay in that stretch and was taken away later, as text (`rows 2 to 4, columns 5 to 7 (up to 41 above rest)`); empty where nothing did. */
-  on: string;
+  rows: number;
+  columns: number;
   /** `given`: 0, as the unit is one of force or pressure; `quiet`: that of a quiet stretch, tracked from there; `none`: nothing was quiet, the values are above 0. */
   rest: "given" | "quiet" | "none";
-  rows: number;
+  /** Whether values fall from that of a quiet stretch, so that less may mean more pressure. */
+  falls: boolean;
+  /** Where something lay in that stretch and was taken away later, as text (`rows 2 to 4, columns 5 to 7 (up to 41 above rest)`); empty where nothing did. */
+  on: string;
 }
 
 /** A recording of pictures. */
 export interface Pictures {
   count: number;
-  /** Taxels that never count as above rest. */
-  flickering: [number, number][];
+  unit: string;
+  /** A value is `(ticks - zero) * step`. */
+  step: number;
+  zero: number;
   /** Steps above rest up to which a taxel is not loaded. */
   floor: number;
-  /** These are only the pictures at the beginning of a large text table, and reading it all takes about so many seconds; `loading` follows each second, and then `opened` again, with all of it, at the same time of the view. */
-  left_s: number | null;
   /** The force of 1 in the sums of the curves, N, where values are in kPa and the area of each taxel is known: each counts by its area; else null, and 1 is a step. */
   newtons: number | null;
   /** A number where the pictures have no times: picture k is then at k times that many us, in all messages; show the number, no seconds. Tables of labels hold the numbers. */
   picture_us: number | null;
   sources: PictureSource[];
-  /** A value is `(ticks - zero) * step`. */
-  step: number;
+  /** Taxels that never count as above rest. */
+  flickering: [number, number][];
   trial: string | null;
   /** The trials of a file with several. */
   trials: string[];
-  unit: string;
-  zero: number;
+  /** These are only the pictures at the beginning of a large text table, and reading it all takes about so many seconds; `loading` follows each second, and then `opened` again, with all of it, at the same time of the view. */
+  left_s: number | null;
 }
 
 /** A serial port. */
 export interface Port {
-  /** "usb", "pci", "bluetooth" or "other". */
-  kind: string;
-  /** The manufacturer of a USB device, if it reports it. */
-  maker: string | null;
   /** Path of the device, as "/dev/ttyUSB0". */
   place: string;
+  /** "usb", "pci", "bluetooth" or "other". */
+  kind: string;
   /** The product name of a USB device, if it reports it. */
   product: string | null;
+  /** The manufacturer of a USB device, if it reports it. */
+  maker: string | null;
   /** The serial number of a USB device, if it reports it. */
   serial: string | null;
   /** Vendor and product numbers of a USB device. */
@@ -202,92 +202,92 @@ export interface Port {
 export interface Quantiles {
   /** Number of measured durations. */
   count: number;
-  /** The maximum. */
-  max_us: number | null;
   /** Median. */
   p50_us: number | null;
   /** The 99th percentile. */
   p99_us: number | null;
+  /** The maximum. */
+  max_us: number | null;
 }
 
 /** A note of a recording. */
 export interface RecordedNote {
-  /** Empty for all sources. */
-  source: string;
   /** Null where it is about the whole recording. */
   t_us: number | null;
   text: string;
+  /** Empty for all sources. */
+  source: string;
 }
 
 /** The place of each taxel, row by row. */
 export interface TaxelPlaces {
+  x: number[];
+  y: number[];
   /** Where it is known. */
   area: number[] | null;
   /** Null where it is unknown. */
   unit: "mm" | null;
-  x: number[];
-  y: number[];
 }
 
 /** A taxel that was zeroed. */
 export interface Zeroing {
-  /** The readout's rest of it before; null where it uses none. */
-  before: number | null;
+  taxel: [number, number];
+  t_us: number;
   /** Its rest now, ticks. */
   rest: number;
-  t_us: number;
-  taxel: [number, number];
+  /** The readout's rest of it before; null where it uses none. */
+  before: number | null;
 }
 
 /** The server and what it shows; sent again when any of it changes (`listen`, `delta_intensity`, `control`). */
 export interface Hello {
   type: "hello";
+  /** 1. */
+  protocol: number;
+  /** taxel's version. */
+  taxel: string;
+  /** False: no board, recordings only (`taxel view`). */
+  live: boolean;
   array: ArrayInfo | null;
+  /** Where datagrams are received. */
+  udp: string | null;
+  /** Whether intensities are differences; null without a board. */
+  delta_intensity: boolean | null;
+  /** The board's serial line; null: registers cannot be written. */
+  control: string | null;
+  /** The folder of the recordings. */
+  folder: string;
+  /** The recording to show first. */
+  open: string | null;
+  /** The labels of the readout that runs. */
+  readout: string[] | null;
+  /** The names of the encoders. */
+  encoders: string[];
   /** Width of a column of time, us. */
   column_us: number;
   /** The narrowest and the widest that `zoom` takes, us. */
   columns_us: [number, number];
-  /** The board's serial line; null: registers cannot be written. */
-  control: string | null;
-  /** Whether intensities are differences; null without a board. */
-  delta_intensity: boolean | null;
-  /** The names of the encoders. */
-  encoders: string[];
-  /** The folder of the recordings. */
-  folder: string;
-  /** False: no board, recordings only (`taxel view`). */
-  live: boolean;
-  /** Credits that the server counts, at most. */
-  most_credits: number;
-  /** Bytes of a request, at most. */
-  most_message_bytes: number;
-  /** The recording to show first. */
-  open: string | null;
-  /** 1. */
-  protocol: number;
-  /** The labels of the readout that runs. */
-  readout: string[] | null;
-  /** taxel's version. */
-  taxel: string;
   /** Columns of time in a picture, at most. */
   time_columns: number;
-  /** Where datagrams are received. */
-  udp: string | null;
+  /** Bytes of a request, at most. */
+  most_message_bytes: number;
+  /** Credits that the server counts, at most. */
+  most_credits: number;
 }
 
 /** What the board holds, or what it is assumed to hold; at the beginning and after every change. */
 export interface Registers {
   type: "registers";
-  /** How long a frame takes, us. */
-  frame_us: number;
   /** False: they were not read from the board; they are the preset that was named on the command line, or what the board held before a reset (a new session of version 2, or its greeting on the serial line), until they are read again, which is at once. */
   known: boolean;
-  /** The preset that holds the same, the user's or built-in, whatever the version of the wire. */
-  preset: string | null;
   /** Whether they were stated at the start (`--preset`, or `--rate-hz` with `--bits`, or another computer's bridge). */
   stated: boolean;
   /** Every field of `registers.js` in its unit; those of one bit are true or false. */
   values: Record<string, boolean | number>;
+  /** The preset that holds the same, the user's or built-in, whatever the version of the wire. */
+  preset: string | null;
+  /** How long a frame takes, us. */
+  frame_us: number;
   warnings: string[];
 }
 
@@ -304,63 +304,63 @@ export interface Presets {
 /** Of the live source, 4 times a second; what is not known is null. */
 export interface Counters {
   type: "counters";
-  /** Whether datagrams arrive. */
-  arrival: Arrival;
   at_ns: number;
-  board_us: number | null;
-  bytes_per_s: number | null;
-  datagrams_per_s: number | null;
-  detections: number;
-  /** Whether the source has ended, by an error or its owner. */
-  ended: boolean;
-  events: number;
-  events_per_s: number | null;
-  /** Follows from the registers; null where they are neither known nor stated. */
-  frames_per_s: number | null;
-  latency: Latency;
-  lost: Lost;
-  marked_start: boolean | null;
-  /** Null in the first quarter of a second. */
-  pace: Pace | null;
-  /** Of this client. */
-  pictures_per_s: number;
-  /** Datagrams that wait. */
-  queue: number;
-  reach_bytes: number;
-  /** From and to where a live view may seek (60 s, or what 512 MB hold), us; null before the first event. */
-  reach_us: [number, number] | null;
   /** Since the source began. */
   seconds: number;
-  taring: boolean;
-  viewers: number;
+  board_us: number | null;
+  events: number;
+  events_per_s: number | null;
+  bytes_per_s: number | null;
+  datagrams_per_s: number | null;
+  /** Follows from the registers; null where they are neither known nor stated. */
+  frames_per_s: number | null;
+  /** Whether datagrams arrive. */
+  arrival: Arrival;
+  /** Null in the first quarter of a second. */
+  pace: Pace | null;
+  lost: Lost;
+  /** Datagrams that wait. */
+  queue: number;
+  latency: Latency;
   wire_version: number;
+  marked_start: boolean | null;
+  taring: boolean;
+  detections: number;
+  /** From and to where a live view may seek (60 s, or what 512 MB hold), us; null before the first event. */
+  reach_us: [number, number] | null;
+  reach_bytes: number;
+  viewers: number;
+  /** Of this client. */
+  pictures_per_s: number;
+  /** Whether the source has ended, by an error or its owner. */
+  ended: boolean;
 }
 
 /** A detection, as it is reported. */
 export interface Detection {
   type: "detection";
-  known_us: number;
   label: string;
+  t_us: number;
+  known_us: number;
+  said_us: number;
   /** From known to reported, us. */
   latency_us: number;
-  said_us: number;
   /** Of the potential as it comes to the threshold; null for a rule. */
   slope_mv_per_ms: number | null;
-  t_us: number;
 }
 
 /** At most 60 times a second, after `encode`: the spikes since the last message; after a seek those of the stretch that is shown. An encoder that begins in the middle begins with the held values. */
 export interface Spikes {
   type: "spikes";
   encoder: string;
-  latency_ms: number;
-  /** Number of the others, where there are more than the 4096 newest. */
-  left_out: number;
+  trains: number;
   signed: boolean;
+  latency_ms: number;
   t_ms: number[];
   train: number[];
-  trains: number;
   value: number[];
+  /** Number of the others, where there are more than the 4096 newest. */
+  left_out: number;
 }
 
 /** Of the live source, when it has changed: all taxels that were zeroed, each as it was last. */
@@ -379,38 +379,38 @@ export interface BoardLine {
 /** Where a board can be, when asked. Pseudo-terminals are in no list: type their name. */
 export interface Places {
   type: "places";
-  /** The IPv4 addresses of the machine. */
-  addresses: Address[];
   /** Serial ports that the system knows, USB devices first. */
   serial: Port[];
+  /** The IPv4 addresses of the machine. */
+  addresses: Address[];
 }
 
 /** The recorder, on each change and once a second while it counts or records. */
 export interface Recorder {
   type: "recorder";
-  advance: boolean;
-  /** Why the last one ended or did not begin. */
-  error: string | null;
-  file: string | null;
-  /** The one in use, or the next when idle. */
-  index: number | null;
-  label: string | null;
-  last: LastRecording | null;
-  /** To the start of a countdown, or to the end of a recording. */
-  left_s: number | null;
-  length_s: number | null;
-  name: string | null;
-  seconds: number | null;
   /** What the recorder does. */
   state: "idle" | "countdown" | "recording" | "finishing";
+  name: string | null;
+  /** The one in use, or the next when idle. */
+  index: number | null;
+  file: string | null;
+  label: string | null;
+  advance: boolean;
+  /** To the start of a countdown, or to the end of a recording. */
+  left_s: number | null;
+  seconds: number | null;
+  length_s: number | null;
+  last: LastRecording | null;
+  /** Why the last one ended or did not begin. */
+  error: string | null;
 }
 
 /** When asked and when the folder has changed by this server. */
 export interface Recordings {
   type: "recordings";
+  folder: string;
   /** A ROS 2 bag that is a folder counts as one file. */
   files: FileInfo[];
-  folder: string;
   /** The folder's readouts and plain rules (`.json`). */
   readouts: string[];
 }
@@ -432,45 +432,45 @@ export interface Training {
 /** When asked: what a readout found in a recording. */
 export interface Detections {
   type: "detections";
-  detections: FoundDetection[];
+  source: string;
+  readout: string;
   /** The readout's, in its order. */
   labels: string[];
-  readout: string;
-  source: string;
+  detections: FoundDetection[];
 }
 
 /** The answer to `open`, before its first picture; `labels` and `transport` follow. */
 export interface Opened {
   type: "opened";
-  array: ArrayInfo;
-  bytes: number;
-  detections: FoundDetection[];
-  /** 0 of pictures. */
-  events: number;
-  /** How long a frame takes, where the recording holds the registers. */
-  frame_us: number | null;
-  /** How long reading it took. */
-  index_ms: number;
-  markers: Marker[];
   name: string;
-  notes: RecordedNote[];
-  /** Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of pictures. */
-  on: string;
-  /** Of the recorded arrivals, where it holds them. */
-  pace: Pace | null;
-  pictures: Pictures | null;
-  registers: Record<string, boolean | number> | null;
+  array: ArrayInfo;
   /** Null where it holds no events, as `stop_us`. */
   start_us: number | null;
   stop_us: number | null;
   /** The time of the greatest force in the first touch; null where there is no force. */
   touch_us: number | null;
+  /** 0 of pictures. */
+  events: number;
+  bytes: number;
   /** The command that trains on its labels. */
   train: string;
-  unfinished: boolean;
+  pictures: Pictures | null;
   /** What was lost; empty where a file of pictures does not say. */
   verdict: string;
+  unfinished: boolean;
+  /** Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of pictures. */
+  on: string;
+  /** Of the recorded arrivals, where it holds them. */
+  pace: Pace | null;
+  registers: Record<string, boolean | number> | null;
+  /** How long a frame takes, where the recording holds the registers. */
+  frame_us: number | null;
+  markers: Marker[];
+  notes: RecordedNote[];
   zeroed: Zeroing[];
+  detections: FoundDetection[];
+  /** How long reading it took. */
+  index_ms: number;
 }
 
 /** How much of a large text table is read, 0 to 1, as its first lines let expect. */
@@ -483,50 +483,50 @@ export interface Loading {
 /** Events, and the greatest sum of ticks above rest, over time, for the strip: 1000 bins at most. */
 export interface Overview {
   type: "overview";
-  /** Empty of pictures. */
-  events: number[];
-  /** Empty where the recording is too long for its curves to be stored. */
-  force: number[];
   /** Null for the live one. */
   source: string | null;
   start_us: number;
   step_us: number;
+  /** Empty of pictures. */
+  events: number[];
+  /** Empty where the recording is too long for its curves to be stored. */
+  force: number[];
 }
 
 /** When a view's state changes by itself or by request. */
 export interface Transport {
   type: "transport";
   source: string | null;
-  speed: number;
   /** What a view does. */
   state: "playing" | "paused" | "following";
+  speed: number;
   t_us: number | null;
 }
 
 /** With `opened`, and to all clients that show that recording when they change. */
 export interface Labels {
   type: "labels";
-  /** What another program's text of the table lacks. */
-  conflict: Conflict | null;
-  labels: Label[];
   name: string;
   /** The table beside the recording. */
   path: string;
+  labels: Label[];
+  /** What another program's text of the table lacks. */
+  conflict: Conflict | null;
 }
 
 /** By the rules of `taxel.Recording` health (`taxel info`). A taxel is reported dead or stuck only where its neighbours were touched three times or more, or are known to rest above 0 and it is known to hold 0. */
 export interface Health {
   type: "health";
-  /** That did nothing while they were touched, and hold 0 as far as is known. */
-  dead: [number, number][];
+  source: string | null;
+  taxels: number;
   /** Taxels with events. */
   heard: number;
-  /** That change by themselves. */
-  noisy: [number, number][];
-  source: string | null;
+  /** That did nothing while they were touched, and hold 0 as far as is known. */
+  dead: [number, number][];
   /** That did nothing while they were touched, and hold another value. */
   stuck: [number, number][];
-  taxels: number;
+  /** That change by themselves. */
+  noisy: [number, number][];
   /** Number of taxels that were not touched enough to say. */
   untold: number;
 }
@@ -534,8 +534,8 @@ export interface Health {
 /** `lost` is what the new file's kind cannot hold. */
 export interface Cut {
   type: "cut";
-  lost: string[];
   name: string;
+  lost: string[];
 }
 
 /** After the messages about everything that the request changed. */
@@ -547,12 +547,12 @@ export interface Done {
 /** Nothing has changed. */
 export interface Refused {
   type: "refused";
-  /** The register or key at fault. */
-  field: string | null;
   id: number | string | null;
-  reason: string;
   /** The `type` of the request. */
   what: string;
+  reason: string;
+  /** The register or key at fault. */
+  field: string | null;
 }
 
 /** Text for the user; the client need not do anything. */
@@ -702,13 +702,13 @@ export interface PresetDeleteRequest {
 export interface RecordRequest {
   type: "record";
   id?: number;
+  name: string;
   advance?: boolean | null;
   countdown_s?: number | null;
   format?: "mcap" | "lsa" | null;
   index?: number | null;
   label?: string | null;
   length_s?: number | null;
-  name: string;
 }
 
 /** End the recording, or its countdown; and the advance. */
@@ -729,9 +729,9 @@ export interface MarkRequest {
   type: "mark";
   id?: number;
   label: string;
+  t_us: number;
   replaces_us?: number | null;
   source?: string | null;
-  t_us: number;
 }
 
 /** Several labels, all or none: each entry is a label at one time or more, its keys as of `mark`; `replaces_us` has as many times as `t_us`. At most 5000 labels. */
@@ -745,8 +745,8 @@ export interface MarksRequest {
 export interface RenameRequest {
   type: "rename";
   id?: number;
-  label: string;
   label_id: number;
+  label: string;
 }
 
 /** Another time, as for `mark`. */
@@ -808,9 +808,9 @@ export interface ReadOutRequest {
 export interface CutRequest {
   type: "cut";
   id?: number;
-  name: string;
   start_us: number;
   stop_us: number;
+  name: string;
 }
 
 /** Receive the board's datagrams there instead. Refused while a recording runs. */

@@ -9,15 +9,15 @@ from typing import Any, Literal, NotRequired, TypedDict
 
 
 class ArrayInfo(TypedDict):
+    rows: int
     columns: int
     name: str
-    rows: int
 
 
 class FoundDetection(TypedDict):
-    known_us: int
     label: str
     t_us: int
+    known_us: int
 
 
 class Label(TypedDict):
@@ -42,29 +42,29 @@ class RegistersMessage(TypedDict):
 
 class DetectionMessage(TypedDict):
     type: Literal["detection"]
-    known_us: int
     label: str
+    t_us: int
+    known_us: int
     said_us: int
     slope_mv_per_ms: float | None
-    t_us: int
 
 
 class SpikesMessage(TypedDict):
     type: Literal["spikes"]
     encoder: str
-    left_out: int
     t_ms: list[float]
     train: list[int]
     value: list[float]
+    left_out: int
 
 
 class OpenedMessage(TypedDict):
     type: Literal["opened"]
-    array: ArrayInfo
-    detections: list[FoundDetection]
     name: str
-    notes: list[RecordedNote]
+    array: ArrayInfo
     registers: dict[str, bool | int] | None
+    notes: list[RecordedNote]
+    detections: list[FoundDetection]
 
 
 class TransportMessage(TypedDict):

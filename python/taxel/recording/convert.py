@@ -20,16 +20,16 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, Source, Stream, source_from
-from taxel.recording.csv import write_csv
-from taxel.recording.h5 import write_h5
 from taxel.recording.kinds import ENDINGS
-from taxel.recording.npz import write_npz
 from taxel.recording.opening import open_recording
 from taxel.recording.parts import Wire
 from taxel.recording.pictures import period_us, pictures
 from taxel.recording.recording import Recording
 from taxel.recording.stored import is_made, stored
+from taxel.recording.write_csv import write_csv
+from taxel.recording.write_h5 import write_h5
 from taxel.recording.write_mcap import write_mcap
+from taxel.recording.write_npz import write_npz
 
 __all__ = ["KINDS", "convert"]
 

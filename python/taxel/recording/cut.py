@@ -12,8 +12,8 @@ from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.recording import parts
+from taxel.recording.changes import Zeroing
 from taxel.recording.contents import Contents, applied
-from taxel.recording.notes import Zeroing
 from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 

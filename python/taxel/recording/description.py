@@ -22,9 +22,9 @@ from taxel.formats.checks import sensor as checked
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
+from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Pictures, Source, source_from
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import BoardChange, Zeroing
 from taxel.recording.once import known
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers

@@ -22,9 +22,9 @@ from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
+from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, named, saying
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import BoardChange, Zeroing
 from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict

@@ -16,9 +16,9 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
+from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents, Source, alone, applied
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import BoardChange, Zeroing
 from taxel.recording.once import Once
 from taxel.recording.read_mcap import ascending
 from taxel.recording.verdict import Verdict

@@ -27,15 +27,15 @@ from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording import parts
 from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, several, source_from
-from taxel.recording.csv import check_head, read_csv
-from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_own_table, kind_of
 from taxel.recording.layout import check_size, laid_out, on_array
-from taxel.recording.npz import read_npz
 from taxel.recording.once import known
+from taxel.recording.read_csv import check_head, read_csv
 from taxel.recording.read_foreign import is_foreign, read_foreign
+from taxel.recording.read_h5 import is_ours, read_h5
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
+from taxel.recording.read_npz import read_npz
 from taxel.recording.read_ros import Topics, read_ros
 from taxel.recording.recording import Recording, noted
 from taxel.recording.sidecars import labels_of, with_sidecars
@@ -116,8 +116,8 @@ def open_one(
     first used.
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
-    is described in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) become
-    notes of a file of pictures that it names.
+    is described in `taxel.recording.write_h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
+    become notes of a file of pictures that it names.
 
     Examples
     --------

@@ -21,8 +21,9 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.notes import BoardChange, Datagrams, Samples, Zeroing
+from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.once import UNKNOWN, Once, known
+from taxel.recording.raw import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 

@@ -32,10 +32,10 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.h5 import is_ours
 from taxel.recording.kinds import is_label_table, is_own_table
 from taxel.recording.once import known
 from taxel.recording.parts import Losses, Origin
+from taxel.recording.read_h5 import is_ours
 
 __all__ = [
     "ARRAYS",

@@ -30,8 +30,8 @@ from taxel.recording.description import (
     turned_of,
     zeroings_of,
 )
-from taxel.recording.notes import Datagrams, Samples
 from taxel.recording.once import Once, known
+from taxel.recording.raw import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 

@@ -23,13 +23,14 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording.between import Slices, between, inside
+from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents, S, Stream
 from taxel.recording.kinds import kind_of_file, verdict_of
-from taxel.recording.notes import BoardChange, Datagrams, Zeroing
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.parts import Wire
 from taxel.recording.pictures import at_rate, calibrated, pictures
+from taxel.recording.raw import Datagrams
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 from taxel.wire import Registers

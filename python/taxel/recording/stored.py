@@ -32,10 +32,10 @@ from taxel.recording.contents import (
     source_from,
     together,
 )
-from taxel.recording.csv import array_in_csv
 from taxel.recording.kinds import ENDINGS, verdict_of
 from taxel.recording.once import known
 from taxel.recording.sidecars import calibration_beside
+from taxel.recording.write_csv import array_in_csv
 from taxel.recording.write_mcap import cut_raw, encoded
 from taxel.wire import decode as wire_decode
 

@@ -18,9 +18,9 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, Pictures, Source, Stream
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import Datagrams
 from taxel.recording.once import known
 from taxel.recording.pressure import above_rest
+from taxel.recording.raw import Datagrams
 from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, ticks_by_unit
 

@@ -1,4 +1,4 @@
-"""Tables of text: a .csv of events or of pictures.
+"""Reads tables of text: a .csv of events or of pictures.
 
 A .csv has either the columns ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is an absent one), or ``t_us``
 and a column a taxel, named ``x3y5``, or, of channels, as they are called.
@@ -29,13 +29,14 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.npz import around
 from taxel.recording.parts import Origin
+from taxel.recording.read_npz import around
 
-__all__ = ["array_in_csv", "check_head", "read_csv", "write_csv"]
+__all__ = ["EVENTS", "MORE", "check_head", "read_csv"]
 
-_EVENTS = ("t_us", "x", "y", "p")
-_MORE = ("intensity", "repaired")
+#: Columns of events: those that a table must have, and those that may follow.
+EVENTS = ("t_us", "x", "y", "p")
+MORE = ("intensity", "repaired")
 _TAXEL = re.compile(r"x([0-9]{1,5})y([0-9]{1,5})")
 #: Columns of events: the least and the largest number in the file, and the type in memory. -1 is an absent intensity.
 _LIMITS: dict[str, tuple[int, int, type[Any]]] = {
@@ -45,55 +46,12 @@ _LIMITS: dict[str, tuple[int, int, type[Any]]] = {
     "intensity": (-1, 65_535, np.uint16),
     "repaired": (0, 1, np.bool_),
 }
-#: Number of pictures that are written at once.
-_PICTURES = 4096
 #: Bytes of the first line, whose columns are counted for the error.
 _HEAD = 1 << 26
 #: Bytes of a table that are read at once.
 _AT_ONCE = 1 << 22
 #: The number of a table's line, and whole lines from there on.
 _Block = tuple[int, bytes]
-
-
-def array_in_csv(table: Events | Frames) -> Array:
-    """Return the sensor that a reader of the .csv assumes: the file holds neither name nor pitch."""
-    if isinstance(table, Events):
-        return around(table.x, table.y)
-    x, y = np.array(_places(table.array)).reshape(-1, 2).T
-    rows, columns = int(y.max()) + 1, int(x.max()) + 1
-    exists = np.zeros((rows, columns), bool)
-    exists[y, x] = True
-    return Array(rows, columns, exists=None if exists.all() else exists)
-
-
-def write_csv(file: BinaryIO, table: Events | Frames) -> None:
-    """Write a .csv."""
-    if isinstance(table, Frames):
-        places = _places(table.array)
-        names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
-        file.write(names.encode() + b"\n")
-        x, y = np.array(places).T
-        for k in range(0, len(table), _PICTURES):
-            values = table.values[k : k + _PICTURES, y, x]
-            # Each value is written once; as bits, because 0 equals -0.
-            bits, which = np.unique(values.view(np.uint32), return_inverse=True)
-            texts = np.array([_shortest(value) for value in bits.view(np.float32)], object)
-            rows = texts[which.reshape(values.shape)].tolist()
-            times = table.t[k : k + _PICTURES].tolist()
-            file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
-        return
-    columns: list[NDArray[Any]] = [table.t, table.x, table.y, table.p.astype(np.uint8)]
-    more = [name for name in _MORE if getattr(table, name) is not None]
-    file.write(",".join([*_EVENTS, *more]).encode() + b"\n")
-    block = 1 << 16
-    for k in range(0, len(table), block):
-        rows = [column[k : k + block].astype(str) for column in columns]
-        if table.intensity is not None and table.present is not None:
-            ticks = table.intensity[k : k + block].astype(str)
-            rows.append(np.where(table.present[k : k + block], ticks, ""))
-        if table.repaired is not None:
-            rows.append(table.repaired[k : k + block].astype(np.uint8).astype(str))
-        file.write("\n".join(map(",".join, zip(*(r.tolist() for r in rows), strict=True))).encode() + b"\n")
 
 
 def read_csv(path: Path, array: Array | None) -> Source:
@@ -127,7 +85,7 @@ def _head(path: Path, file: BinaryIO) -> list[str]:
 def _table(path: Path, array: Array | None) -> Events | Frames:
     with open_file(path) as file:
         names = _head(path, file)
-        if tuple(names[:4]) == _EVENTS:
+        if tuple(names[:4]) == EVENTS:
             return _csv_events(path, names, _blocks(path, file), array)
         return _csv_frames(path, names, _blocks(path, file), array)
 
@@ -151,8 +109,8 @@ def _names(path: Path, head: bytes) -> list[str]:
             f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel; "
             + advice(path, "describes a table of another program")
         )
-    if tuple(names[:4]) == _EVENTS:
-        if names[4:] != [name for name in _MORE if name in names[4:]]:
+    if tuple(names[:4]) == EVENTS:
+        if names[4:] != [name for name in MORE if name in names[4:]]:
             raise FormatError(
                 f"{path}, line 1: {shown(','.join(names[4:]))} after p: only intensity and repaired may follow"
             )
@@ -190,8 +148,8 @@ def _csv_events(path: Path, names: list[str], blocks: Iterator[_Block], array: A
             columns["present"] = columns["intensity"] >= 0
             columns["intensity"] = np.maximum(columns["intensity"], 0)
         read.add(**columns)
-    t, x, y, p = (read.column(name) for name in _EVENTS)
-    extra: dict[str, Any] = {name: read.column(name) for name in (*_MORE, "present") if name in kinds}
+    t, x, y, p = (read.column(name) for name in EVENTS)
+    extra: dict[str, Any] = {name: read.column(name) for name in (*MORE, "present") if name in kinds}
     try:
         return Events(t, x, y, p, array=array or around(x, y), **extra)
     except ProblemError as error:
@@ -316,15 +274,3 @@ def _within(path: Path, first: int, body: bytes, name: str, column: NDArray[Any]
         k = int(wrong[0])
         line = first + _line_number(body, k)
         raise FormatError(f"{path}, line {line}, column {name}: is {column[k]}; must be {max(0, low)} to {high}")
-
-
-def _places(array: Array) -> list[tuple[int, int]]:
-    """Return column and row of each taxel that exists, row by row."""
-    exists = np.ones(array.shape, bool) if array.exists is None else array.exists
-    return [(int(x), int(y)) for y, x in np.argwhere(exists)]
-
-
-def _shortest(value: np.float32) -> str:
-    # str of a float32 is the shortest text that reads back as the same value.
-    text = str(value)
-    return text.removesuffix(".0")

@@ -1,26 +1,19 @@
-"""Events or pictures as named columns, the common layout of .npz and .h5.
-
-Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and ``markers``; pictures are
-``values t unit``. ``held`` is the values of the taxels at the beginning; ``about`` is JSON with all other fields.
-``digest`` is a checksum over all of these, by which damage is found that the formats themselves do not notice.
-"""
+"""Reads events or pictures as named columns: a .npz, and what a .h5 holds (`taxel.recording.write_npz`)."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.archive import read_arrays, stored_names
 from taxel._base.columns import frozen_whole
-from taxel._base.limits import ABOUT, MARKERS, TAXELS, UNIT
+from taxel._base.limits import MARKERS, TAXELS
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -28,18 +21,15 @@ from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.frames import Frames
 from taxel.recording.contents import Source
-from taxel.recording.description import about_of, described_source, json_of
+from taxel.recording.description import about_of, described_source
 from taxel.recording.layout import check_size
 from taxel.recording.parts import Origin
+from taxel.recording.write_npz import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
 
-__all__ = ["DTYPES", "TEXTS", "around", "chosen", "columns_of", "read_npz", "source_of_columns", "write_npz"]
+__all__ = ["DTYPES", "around", "chosen", "read_npz", "source_of_columns"]
 
-_EVENTS = ("t", "x", "y", "p")
-_COLUMNS = (*_EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
 #: Columns of events, one entry each.
-_OF_EVENTS = (*_EVENTS, "intensity", "present", "repaired")
-#: The columns that are a single text, and how many characters they may have; NumPy's have 4 bytes.
-TEXTS = {"about": ABOUT // 6, "unit": UNIT}
+_OF_EVENTS = (*EVENTS, "intensity", "present", "repaired")
 #: The columns that are converted as they are read.
 DTYPES: dict[str, type[np.generic]] = {
     "values": np.float32,
@@ -47,64 +37,6 @@ DTYPES: dict[str, type[np.generic]] = {
     **dict.fromkeys(("x", "y", "intensity"), np.uint16),
     **dict.fromkeys(("p", "present", "repaired"), np.bool_),
 }
-#: The entry with the checksum over all columns; a file without it opens unverified.
-_DIGEST = "digest"
-#: Bytes of a column that are taken into the checksum at once.
-_PIECE_BYTES = 1 << 20
-
-
-def columns_of(source: Source) -> dict[str, NDArray[Any]]:
-    """Return a recording as columns by name, with their checksum.
-
-    Raises
-    ------
-    ProblemError : more markers, or a longer description, than are read again
-    """
-    table = source.table
-    columns: dict[str, Any]
-    if isinstance(table, Frames):
-        if (count := len(table.unit)) > UNIT:
-            raise ProblemError(
-                f"{source.origin.name}: a unit of {count} characters; a .npz and a .h5 hold at most {UNIT}"
-            )
-        columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
-    else:
-        columns = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
-        if table.intensity is not None:
-            columns |= {"intensity": table.intensity, "present": table.present}
-        if table.repaired is not None:
-            columns["repaired"] = table.repaired
-        if len(table.markers) > MARKERS:
-            raise ProblemError(
-                f"{source.origin.name}: {len(table.markers)} markers; a .npz and a .h5 hold at most {MARKERS}"
-            )
-        columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
-    held = source.settings.held()
-    if held is not None:
-        columns["held"] = held
-    columns["about"] = np.array(json_of(source))
-    return {**columns, _DIGEST: _digest_of(columns)}
-
-
-def _digest_of(columns: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
-    """Return BLAKE2b (16 bytes) over the columns by name: of each a line of JSON (name, dtype, shape), then its bytes.
-
-    Bytes are in C order, little-endian; texts are UTF-32. Entries that are no columns of a recording do not count.
-    """
-    digest = hashlib.blake2b(digest_size=16)
-    for name in sorted(columns.keys() & set(_COLUMNS)):
-        column = columns[name]
-        little = column.dtype.newbyteorder("<")
-        digest.update(json.dumps([name, little.str, column.shape]).encode() + b"\n")
-        rows = np.atleast_1d(column)
-        if rows.dtype.kind == "U" and rows.nbytes:
-            little = np.dtype("<u4")
-            rows = rows.view(rows.dtype.str[0] + "u4")
-        step = max(1, _PIECE_BYTES // max(1, rows[:1].nbytes))
-        # A shape of many rows without bytes would take for ever.
-        for k in range(0, len(rows) if column.nbytes else 0, step):
-            digest.update(rows[k : k + step].astype(little, copy=False).tobytes())
-    return np.frombuffer(digest.digest(), np.uint8)
 
 
 def chosen(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
@@ -115,7 +47,7 @@ def chosen(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
     FormatError : columns that do not fit each other, or too many markers
     """
     others = (*_OF_EVENTS[1:], "markers") if {"values", "t"} <= shapes.keys() else ("values", "unit")
-    there = {name: shapes[name] for name in (*_COLUMNS, _DIGEST) if name in shapes and name not in others}
+    there = {name: shapes[name] for name in (*COLUMNS, DIGEST) if name in shapes and name not in others}
     for name, shape in there.items():
         if (right := _wrong_shape(name, there)) is not None:
             raise FormatError(f"{path}: {name} has shape {shape}: must be {right}")
@@ -127,7 +59,7 @@ def _wrong_shape(name: str, there: Mapping[str, tuple[int, ...]]) -> str | None:
     shape, pictures = there[name], there.get("values")
     if name in TEXTS:
         return "one text" if shape else None
-    if name == _DIGEST:
+    if name == DIGEST:
         # A shorter one is damage, which `contents_of` says.
         return "16 bytes" if math.prod(shape) > 16 else None
     if name == "markers":
@@ -158,12 +90,12 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
     FormatError : a column is missing or invalid, or the columns are not those of which the file has the checksum
     ProblemError : the given sensor has other rows or columns than the pictures
     """
-    if _DIGEST in columns and not np.array_equal(columns[_DIGEST], _digest_of(columns)):
+    if DIGEST in columns and not np.array_equal(columns[DIGEST], digest_of(columns)):
         raise FormatError(f"{path}: damaged: what it holds is not what was written")
     values = columns.get("values")
     if values is not None and values.dtype.kind == "f" and values.flags.writeable:
         # Of the NaNs of a damaged file some may be signalling ones, of which each computation would warn.
-        for k in range(0, len(values) if values.ndim else 0, step := max(1, _PIECE_BYTES // max(1, values[:1].nbytes))):
+        for k in range(0, len(values) if values.ndim else 0, step := max(1, PIECE_BYTES // max(1, values[:1].nbytes))):
             part = values[k : k + step]
             np.copyto(part, np.nan, where=np.isnan(part))
     columns = {name: frozen_whole(values) for name, values in columns.items()}
@@ -179,14 +111,14 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
             unit = str(columns.get("unit", "counts"))
             table: Events | Frames = Frames(columns["values"], columns["t"], unit=unit, array=sensor)
         else:
-            missing = [name for name in _EVENTS if name not in columns]
+            missing = [name for name in EVENTS if name not in columns]
             if missing:
                 names = ", ".join(columns) or "nothing"
                 raise FormatError(
                     f"{path}: holds {names}: {missing[0]} is missing; must be t, x, y, p (events) or values, t "
                     "(pictures)"
                 )
-            t, x, y, p = (columns[name] for name in _EVENTS)
+            t, x, y, p = (columns[name] for name in EVENTS)
             markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]
             extra = {name: columns[name] for name in ("intensity", "present", "repaired") if name in columns}
             table = Events(t, x, y, p, array=sensor or around(x, y), markers=markers, **extra)
@@ -203,11 +135,6 @@ def _held(held: NDArray[Any], array: Array) -> NDArray[np.uint16]:
     return held
 
 
-def write_npz(file: BinaryIO, source: Source) -> None:
-    """Write a .npz."""
-    np.savez_compressed(file, **cast(dict[str, Any], columns_of(source)))
-
-
 def read_npz(path: Path, array: Array | None) -> Source:
     """Read a .npz that taxel wrote, or one with the columns ``t x y p`` or ``values t``.
 
@@ -217,7 +144,7 @@ def read_npz(path: Path, array: Array | None) -> Source:
     """
     # Other columns are not read, but the error for a missing column lists them.
     of_file = partial(chosen, path)
-    columns = read_arrays(path, (*_COLUMNS, _DIGEST), texts=TEXTS, dtypes=DTYPES, chosen=of_file) or {
+    columns = read_arrays(path, (*COLUMNS, DIGEST), texts=TEXTS, dtypes=DTYPES, chosen=of_file) or {
         name: np.empty(0) for name in stored_names(path)[:8]
     }
     return source_of_columns(path, "npz", columns, array)

@@ -1,11 +1,11 @@
-"""Events or pictures in a .h5: one data set a column, as `taxel convert` writes them.
+"""Writes events or pictures to a .h5: one data set a column.
 
 The root has the attribute ``taxel`` (1, the layout's version). Events are the data sets ``t`` (int64, us), ``x``, ``y``
 (uint16), ``p`` (bool), optionally ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
 ``markers`` (int64, two columns: us, whether a start); pictures are ``values`` (float32, pictures x rows x columns)
 with ``t`` and ``unit`` (text). ``held`` (uint16, rows x columns, 65 535 for unknown) is the values of the taxels at the
 beginning. ``about`` is JSON: the sensor, the source, registers, notes, detections and lost information. ``digest``
-(uint8) is the checksum over all data sets, of which `taxel.recording.npz` states the order.
+(uint8) is the checksum over all data sets, of which `taxel.recording.write_npz` states the order.
 """
 
 from __future__ import annotations
@@ -19,44 +19,17 @@ from typing import BinaryIO
 import numpy as np
 
 from taxel._base import h5_writing
-from taxel._base.files import open_file
-from taxel._base.h5_file import H5File
-from taxel._core import FormatError
-from taxel.array import Array
 from taxel.recording.contents import Source
-from taxel.recording.npz import DTYPES, TEXTS, chosen, columns_of, source_of_columns
+from taxel.recording.write_npz import TEXTS, columns_of
 
-__all__ = ["is_ours", "read_h5", "write_h5"]
+__all__ = ["MARK", "VERSION", "write_h5"]
 
 #: Name of the attribute that has the version of the layout.
-_MARK = "taxel"
+MARK = "taxel"
 #: Version of the layout.
-_VERSION = 1
+VERSION = 1
 #: Size of the chunks of a data set, which are compressed one by one.
 _PIECE_BYTES = 1 << 20
-
-
-def is_ours(path: Path) -> bool:
-    """Return whether a .h5 has the layout that `taxel convert` writes; false for a file that is not HDF5."""
-    try:
-        # The name of an attribute is in the file as it is: without it the library, which begins slowly, is not asked.
-        with open_file(path) as file:
-            if not _holds(file, _MARK.encode()):
-                return False
-        with H5File(path) as h5:
-            return h5.attribute(_MARK) is not None
-    except (FormatError, OSError):
-        return False
-
-
-def _holds(file: BinaryIO, word: bytes) -> bool:
-    """Return whether a word is in a file."""
-    before = b""
-    while piece := file.read(_PIECE_BYTES):
-        if word in before + piece:
-            return True
-        before = piece[1 - len(word) :]
-    return False
 
 
 def write_h5(path: Path, source: Source, *, overwrite: bool) -> None:
@@ -86,7 +59,7 @@ def _write(file: BinaryIO, source: BinaryIO) -> None:
     import h5py  # noqa: PLC0415  loads slowly
 
     with h5py.File(file, "w") as h5:
-        h5.attrs[_MARK] = _VERSION
+        h5.attrs[MARK] = VERSION
         for line in iter(source.readline, b""):
             name, dtype, shape = json.loads(line)
             if dtype == "text":
@@ -107,29 +80,3 @@ def _pieces(shape: Sequence[int], itemsize: int) -> Iterator[slice]:
     step = max(1, _PIECE_BYTES // max(1, itemsize * math.prod(shape[1:])))
     for start in range(0, shape[0], step):
         yield slice(start, min(start + step, shape[0]))
-
-
-def read_h5(path: Path, array: Array | None) -> Source:
-    """Read a .h5 that taxel wrote.
-
-    Raises
-    ------
-    FormatError : not an HDF5 file, or one of another layout
-    """
-    with H5File(path) as h5:
-        version = h5.attribute(_MARK)
-        if version is None:
-            raise FormatError(
-                f"{path}: HDF5, but without the attribute taxel of what taxel convert writes; other people's files are "
-                "read by taxel.open and taxel.formats.trials"
-            )
-        if version != _VERSION:
-            number = "no whole number" if isinstance(version, str) else version
-            raise FormatError(f"{path}: its attribute taxel is {number}; this version of taxel reads {_VERSION}")
-        names = chosen(path, {name: entry.shape for name, entry in h5.entries.items()})
-        h5.check_size(names, DTYPES)
-        columns = {
-            name: np.array(h5.text(name, TEXTS[name])) if name in TEXTS else h5.numbers(name, DTYPES.get(name))
-            for name in names
-        } or {name: np.empty(0) for name in list(h5.entries)[:8]}
-    return source_of_columns(path, "h5", columns, array)
