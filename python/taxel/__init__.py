@@ -20,8 +20,8 @@ from taxel.tare import Tare
 if TYPE_CHECKING:
     from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, tasks, wire
     from taxel.detect import Readout
-    from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing
-    from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
+    from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing, open_all
+    from taxel.recording import open_one as open  # noqa: A004  taxel.open is a recording's
     from taxel.recording.convert import convert
     from taxel.recording.cut import cut
     from taxel.recording.health import Health, health
@@ -71,6 +71,7 @@ __all__ = [
     "merge",
     "metrics",
     "open",
+    "open_all",
     "plot",
     "simulate",
     "tasks",
@@ -86,10 +87,11 @@ _ROOMS = (
 )  # fmt: skip
 _RECORDING = (
     "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",
+    "open_all",
 )  # fmt: skip
 _ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
 _ELSEWHERE |= {
-    "open": ("taxel.recording", "open_any"), "Readout": ("taxel.detect", "Readout"), "train": ("taxel.tasks", "train")
+    "open": ("taxel.recording", "open_one"), "Readout": ("taxel.detect", "Readout"), "train": ("taxel.tasks", "train")
 }  # fmt: skip
 
 

@@ -222,7 +222,7 @@ def test_an_empty_table_has_no_labels(text: bytes, name: str, tmp_path: Path) ->
     assert (table.rows, table.removed, table.recordings) == ((), (), ())
     assert taxel.open(made.path).notes == made.notes == ()
     # It is no recording of its folder.
-    assert [one.path for one in taxel.open(tmp_path)] == [made.path]
+    assert [one.path for one in taxel.open_all(tmp_path)] == [made.path]
     assert not is_recording(place)
     write_labels(place, [("heel", 5)])
     assert [row.text for row in taxel.Labels(place).rows] == ["heel"]

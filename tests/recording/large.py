@@ -249,11 +249,10 @@ KINDS: dict[str, Callable[[Path, int], Path]] = {
 QUICK = ("mcap of events", "mcap of pictures", "lsa", "npz of events", "npz of pictures", "npy", "gaitndd", "popu")
 
 
-def arrays_of(opened: Any) -> int:
+def arrays_of(every: Any) -> int:
     """Return the bytes of the arrays of recordings, each counted once."""
     import taxel
 
-    every = opened if isinstance(opened, list) else [opened]
     held: dict[int, int] = {}
     for recording in [source for one in every for source in (one.sources.values() or [one])]:
         table = recording.events if recording.has_events else recording.frames()
@@ -275,8 +274,8 @@ if __name__ == "__main__":
 
     given = json.loads(sys.argv[2]) if len(sys.argv) > 2 else {}
     try:
-        opened = taxel.open(sys.argv[1], **given)
-        print(json.dumps({"arrays": arrays_of(opened), "peak": peak()}))
+        every = taxel.open_all(sys.argv[1], **given)
+        print(json.dumps({"arrays": arrays_of(every), "peak": peak()}))
     except taxel.Error as error:
         print(json.dumps({"refused": str(error), "peak": peak()}))
     sys.stdout.flush()

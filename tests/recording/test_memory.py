@@ -100,7 +100,7 @@ def test_the_recordings_of_a_folder_count_together(tmp_path: Path) -> None:
         size = large.arrays_of(taxel.open(tmp_path / f"{k}.npz"))
     with refused("--limit", FormatError):
         taxel.open(tmp_path, limit=3 * size)
-    assert len(taxel.open(tmp_path, limit=100 * size)) == 4
+    assert len(taxel.open_all(tmp_path, limit=100 * size)) == 4
 
 
 def gzip_bomb(folder: Path) -> Path:

@@ -10,7 +10,9 @@ import pytest
 
 import taxel
 from taxel import _core
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Origin
 
 from .making import record, some_events
 
@@ -80,8 +82,9 @@ def test_remarks_go_to_files_and_back_beside_the_verdict(tmp_path: Path, kind: s
     frames = taxel.Frames([[[1.0, 2.0]], [[3.0, 4.0]]], [0, 10_000])
     said = ("at the bag's times", "2 messages of another length left out")
     fine = taxel.Verdict.from_dict({"status": "complete", "text": "nothing lost"})
-    of = Contents(tmp_path / "a.bag", "a.bag", "ros", frames.array, frames=frames, remarks=said, verdict=fine)
-    taxel.convert(taxel.Recording(of), tmp_path / f"a{kind}")
+    losses = Losses(remarks=said, verdict=known(fine))
+    of = source_from(frames, Origin(tmp_path / "a.bag", "a.bag", "ros"), losses=losses)
+    taxel.convert(taxel.Recording(Contents.of(of)), tmp_path / f"a{kind}")
     back = taxel.open(tmp_path / f"a{kind}")
     made = ("converted from a.bag",) * (kind == ".mcap")
     assert (back.verdict, back.remarks) == ("nothing lost", said + made)

@@ -22,7 +22,9 @@ from mcap.writer import Writer
 import taxel
 from taxel import Verdict, _core
 from taxel.live.summary import summary_of
-from taxel.recording.contents import Contents, several
+from taxel.recording.contents import alone, source_from
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Origin
 from taxel.recording.verdict import STATUSES
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
@@ -608,8 +610,10 @@ def test_a_converted_file_that_is_cut_says_what_its_source_lost(of: str, share: 
     else:
         frames = taxel.Frames(np.random.default_rng(2).normal(size=(300, 16, 16)).astype(np.float32), np.arange(300))
         verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 7}})
-        one = Contents(tmp_path, "a.bag", "ros", frames.array, label="a", frames=frames, verdict=verdict)
-        first = taxel.Recording(one if of == "pictures" else several({"a": one, "b": one.but(label="b")}))
+        names = "a" if of == "pictures" else "ab"
+        origins = {name: Origin(tmp_path, "a.bag", "ros", name) for name in names}
+        losses = Losses(verdict=known(verdict))
+        first = taxel.Recording(alone({n: source_from(frames, origin, losses=losses) for n, origin in origins.items()}))
     lost = first.verdict.lost
     assert lost == {"dropped_by_kernel": 14 if of == "two" else 7}
     taxel.convert(first, tmp_path / "b.mcap")

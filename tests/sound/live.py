@@ -92,7 +92,7 @@ SOUND: dict[str, Sound] = {
         folder=None,
         port=0,
         host="127.0.0.1",
-        opens=taxel.open,
+        opens=taxel.open_all,
         options=OpenOptions(rate_hz=100.0),
     ),
     "taxel.live.send": plain(

@@ -19,7 +19,7 @@ from .recordings import board, mat, trials
 
 
 def test_forces_rest_at_0_and_other_values_at_their_first_quiet_stretch(tmp_path: Path) -> None:
-    force = rest(taxel.open(trials(tmp_path))[0])
+    force = rest(taxel.open_all(trials(tmp_path))[0])
     assert (force.source, force.tare.rest.any(), force.to_dict()["us"]) == ("unit", np.False_, None)
     pictures = rest(taxel.open(mat(tmp_path)))
     assert (pictures.source, pictures.to_dict()["us"], pictures.detect_from_us) == ("quiet", [0, 500_000], None)

@@ -46,7 +46,7 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
     written: Callable[[Path], Path], tmp_path: Path
 ) -> None:
     place = written(tmp_path)
-    training = taxel.train(taxel.open(place))
+    training = taxel.train(taxel.open_all(place))
     assert training.score.found > 8
     training.readout.save(tmp_path / "python.json")
     shell = run("train", place, "-o", tmp_path / "shell.json", "--json")
@@ -63,7 +63,7 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
     assert process == json.loads(json.dumps(training.to_dict()))
 
     readout = tmp_path / "python.json"
-    found = json.loads(json.dumps(detect(training.readout, taxel.open(place)).to_dict()))
+    found = json.loads(json.dumps(detect(training.readout, taxel.open_all(place)).to_dict()))
     assert sum(len(one["detections"]) for one in found["recordings"]) > 8
     assert task("detect", recordings=[str(place)], readout=str(readout)) == found
     shown = json.loads(run("detect", place, "--readout", readout, "--json").stdout)

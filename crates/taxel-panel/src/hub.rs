@@ -244,7 +244,7 @@ impl Hub {
             folder: self.options.folder.display().to_string(),
             open: self.options.open.clone(),
             readout: lock(&self.readout).clone(),
-            encoders: &encode::NAMES,
+            encoders: encode::NAMES,
             column_us: COLUMN_US,
             columns_us: COLUMNS_US,
             time_columns: SPAN,

@@ -210,7 +210,7 @@ impl Request {
                 Segment::Map { key } => Some(key.clone()),
                 _ => None,
             };
-            match error.path().iter().filter_map(key).last() {
+            match error.path().iter().filter_map(key).next_back() {
                 Some(key) => Refusal::of(&key, error.inner()),
                 None => error.inner().to_string().into(),
             }

@@ -89,9 +89,7 @@ def info(
         if file.exists() and is_bag(file) and not files.opener._names_topic(file):
             say(*listed(file, topics(file, files.types, files.ros), as_json))
             return
-        opened = files.opener.open(file)
-        # A file of another maker may hold several recordings; many hold one.
-        every = opened if isinstance(opened, list) else [opened]
+        every = files.opener.open(file)
         recording = every[0]
         if len(every) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:

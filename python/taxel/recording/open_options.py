@@ -13,7 +13,8 @@ from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout
-from taxel.recording import Recording, open_any
+from taxel.recording import Recording, open_all
+from taxel.recording.contents import Contents
 from taxel.recording.layout import on_array
 from taxel.recording.opening import joined, sensors
 from taxel.recording.read_foreign import is_lone_array
@@ -52,7 +53,7 @@ class OpenOptions:
     rate_hz: float | None = None
     limit: int | None = None
 
-    def open(self, path: str | os.PathLike[str]) -> Recording | list[Recording]:
+    def open(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
 
         Raises
@@ -62,7 +63,7 @@ class OpenOptions:
         place = Path(checked_path("path", path))
         given = [] if self.array is None else several("array", self.array)
         arrays = [of_size(text("array", size), of_wire=False) for size in given]
-        opened = open_any(
+        opened = open_all(
             place,
             array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
             layout=self.layout or self._instead_of_layout(place),
@@ -72,9 +73,7 @@ class OpenOptions:
             ros=self.ros,
             limit=self.limit,
         )
-        if isinstance(opened, list):
-            return [self._timed(self._on_array(one)) for one in opened]
-        return self._timed(self._on_array(opened))
+        return [self._timed(self._on_array(one)) for one in opened]
 
     def given(self) -> dict[str, Any]:
         """Return the options that differ from their defaults, as JSON holds them."""
@@ -107,7 +106,7 @@ class OpenOptions:
             return recording
         own, given = recording.array, of_size(self.array[0], of_wire=False)
         if _is_row_of(recording, given):
-            return type(recording)(on_array(recording._contents, given))
+            return _laid_on(recording, given)
         differs = given.pitch_mm is not None and (own.pitch_mm, own.places) != (given.pitch_mm, None)
         if own.shape != given.shape or differs:
             sizes = ", ".join(self.array)
@@ -117,21 +116,18 @@ class OpenOptions:
             return recording
         # A size without a pitch says nothing of it, and events without one are of the board's wire.
         wire = of_size(self.array[0])
-        return type(recording)(on_array(recording._contents, Array(*own.shape, wire.pitch_mm, own.exists, wire.name)))
+        return _laid_on(recording, Array(*own.shape, wire.pitch_mm, own.exists, wire.name))
 
     def joined(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
-        opened = self.open(path)
-        return joined(opened if isinstance(opened, list) else [opened])
+        return joined(self.open(path))
 
     def all(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
 
         Each sensor of a file with several is a recording of its own (`Recording.title`).
         """
-        opened = (self.open(path) for path in several("paths", paths))
-        every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
-        return [one for each in every for one in sensors(each)]
+        return [one for path in several("paths", paths) for each in self.open(path) for one in sensors(each)]
 
     def _timed(self, recording: Recording) -> Recording:
         return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
@@ -150,6 +146,12 @@ class OpenOptions:
         return every[0]
 
 
+def _laid_on(recording: Recording, array: Array) -> Recording:
+    """Return a recording on another description of its sensor."""
+    own = recording._contents
+    return type(recording)(Contents(on_array(own.one, array), own.sources))
+
+
 def _is_row_of(recording: Recording, given: Array) -> bool:
     """Return whether pictures are a row of as many channels as a sensor has taxels, as tables and arrays may be."""
     own, is_one = recording.array, len(recording.sources) < 2
@@ -161,5 +163,5 @@ def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordi
     """Return each sensor of recordings as one of its own; refuse what is no recording."""
     given = [recordings] if isinstance(recordings, Recording) else several(name, recordings)
     if not len(given):
-        raise ProblemError(f"{name} is empty: must be a Recording or more, as taxel.open returns")
+        raise ProblemError(f"{name} is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
     return [one for each in given for one in sensors(instance(name, each, Recording))]

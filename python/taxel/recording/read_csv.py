@@ -28,7 +28,8 @@ from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Source, source_from
+from taxel.recording.parts import Origin
 from taxel.recording.read_npz import around
 
 __all__ = ["EVENTS", "MORE", "check_head", "read_csv"]
@@ -53,16 +54,14 @@ _AT_ONCE = 1 << 22
 _Block = tuple[int, bytes]
 
 
-def read_csv(path: Path, array: Array | None) -> Contents:
+def read_csv(path: Path, array: Array | None) -> Source:
     """Read a .csv of events or of pictures.
 
     Raises
     ------
     FormatError : another header, or an invalid value (names line and column)
     """
-    table = limited(path, _table(path, array))
-    events, frames = (table, None) if isinstance(table, Events) else (None, table)
-    return Contents(path, path.name, "csv", table.array, events=events, frames=frames)
+    return source_from(limited(path, _table(path, array)), Origin(path, path.name, "csv"))
 
 
 def check_head(path: Path) -> None:

@@ -11,8 +11,8 @@ from taxel._base.files import open_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
-from taxel.recording.contents import Contents
-from taxel.recording.read_npz import DTYPES, chosen, contents_of
+from taxel.recording.contents import Source
+from taxel.recording.read_npz import DTYPES, chosen, source_of_columns
 from taxel.recording.write_h5 import MARK, VERSION
 from taxel.recording.write_npz import TEXTS
 
@@ -45,7 +45,7 @@ def _holds(file: BinaryIO, word: bytes) -> bool:
     return False
 
 
-def read_h5(path: Path, array: Array | None) -> Contents:
+def read_h5(path: Path, array: Array | None) -> Source:
     """Read a .h5 that taxel wrote.
 
     Raises
@@ -68,4 +68,4 @@ def read_h5(path: Path, array: Array | None) -> Contents:
             name: np.array(h5.text(name, TEXTS[name])) if name in TEXTS else h5.numbers(name, DTYPES.get(name))
             for name in names
         } or {name: np.empty(0) for name in list(h5.entries)[:8]}
-    return contents_of(path, "h5", columns, array)
+    return source_of_columns(path, "h5", columns, array)

@@ -20,12 +20,13 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
-from taxel.recording.description import about_of
+from taxel.recording.contents import Source
+from taxel.recording.description import about_of, described_source
 from taxel.recording.layout import check_size
+from taxel.recording.parts import Origin
 from taxel.recording.write_npz import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
 
-__all__ = ["DTYPES", "around", "chosen", "contents_of", "read_npz"]
+__all__ = ["DTYPES", "around", "chosen", "read_npz", "source_of_columns"]
 
 #: Columns of events, one entry each.
 _OF_EVENTS = (*EVENTS, "intensity", "present", "repaired")
@@ -73,8 +74,8 @@ def _wrong_shape(name: str, there: Mapping[str, tuple[int, ...]]) -> str | None:
     return None if is_right else "one value an event, as many as t has"
 
 
-def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Contents:
-    """Return the contents of a file of columns; the arrays are not copied.
+def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Source:
+    """Return what a file of columns holds; the arrays are not copied.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
             np.copyto(part, np.nan, where=np.isnan(part))
     columns = {name: frozen_whole(values) for name, values in columns.items()}
     about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
-    described = about.pop("array", None)
+    described = about.get("array")
     # A sensor of unknown pitch says nothing against the pitch of the file.
     says_less = array is not None and described is not None and not array._is_measured and described.fits(array)
     sensor = described if says_less else array or described
@@ -125,8 +126,7 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
         held = _held(columns["held"], table.array) if "held" in columns else None
     except (ProblemError, ValueError, TypeError, OverflowError) as error:
         raise FormatError(f"{path}: {first_line(error)}") from None
-    events, frames = (table, None) if isinstance(table, Events) else (None, table)
-    return Contents(path, path.name, kind, table.array, events=events, frames=frames, held=held, **about)
+    return described_source(table, held, Origin(path, path.name, kind), about)
 
 
 def _held(held: NDArray[Any], array: Array) -> NDArray[np.uint16]:
@@ -135,7 +135,7 @@ def _held(held: NDArray[Any], array: Array) -> NDArray[np.uint16]:
     return held
 
 
-def read_npz(path: Path, array: Array | None) -> Contents:
+def read_npz(path: Path, array: Array | None) -> Source:
     """Read a .npz that taxel wrote, or one with the columns ``t x y p`` or ``values t``.
 
     Raises
@@ -147,7 +147,7 @@ def read_npz(path: Path, array: Array | None) -> Contents:
     columns = read_arrays(path, (*COLUMNS, DIGEST), texts=TEXTS, dtypes=DTYPES, chosen=of_file) or {
         name: np.empty(0) for name in stored_names(path)[:8]
     }
-    return contents_of(path, "npz", columns, array)
+    return source_of_columns(path, "npz", columns, array)
 
 
 def around(x: NDArray[Any], y: NDArray[Any]) -> Array:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
 from taxel.recording.read_csv import EVENTS, MORE
 from taxel.recording.read_npz import around
 
@@ -31,9 +30,8 @@ def array_in_csv(table: Events | Frames) -> Array:
     return Array(rows, columns, exists=None if exists.all() else exists)
 
 
-def write_csv(file: BinaryIO, contents: Contents) -> None:
+def write_csv(file: BinaryIO, table: Events | Frames) -> None:
     """Write a .csv."""
-    table = contents.table
     if isinstance(table, Frames):
         places = _places(table.array)
         names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])

@@ -19,7 +19,7 @@ from typing import BinaryIO
 import numpy as np
 
 from taxel._base import h5_writing
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Source
 from taxel.recording.write_npz import TEXTS, columns_of
 
 __all__ = ["MARK", "VERSION", "write_h5"]
@@ -32,14 +32,14 @@ VERSION = 1
 _PIECE_BYTES = 1 << 20
 
 
-def write_h5(path: Path, contents: Contents, *, overwrite: bool) -> None:
+def write_h5(path: Path, source: Source, *, overwrite: bool) -> None:
     """Write a .h5, column after column in pieces.
 
     Raises
     ------
     As `taxel._base.h5_writing.write_h5`.
     """
-    columns = columns_of(contents)
+    columns = columns_of(source)
 
     def send(pipe: BinaryIO) -> None:
         for name, column in columns.items():

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from taxel._base.limits import ABOUT, MARKERS, UNIT
 from taxel._core import ProblemError
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Source
 from taxel.recording.description import json_of
 
 __all__ = ["COLUMNS", "DIGEST", "EVENTS", "PIECE_BYTES", "TEXTS", "columns_of", "digest_of", "write_npz"]
@@ -32,18 +32,20 @@ DIGEST = "digest"
 PIECE_BYTES = 1 << 20
 
 
-def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
+def columns_of(source: Source) -> dict[str, NDArray[Any]]:
     """Return a recording as columns by name, with their checksum.
 
     Raises
     ------
     ProblemError : more markers, or a longer description, than are read again
     """
-    table = contents.table
+    table = source.table
     columns: dict[str, Any]
     if isinstance(table, Frames):
         if (count := len(table.unit)) > UNIT:
-            raise ProblemError(f"{contents.name}: a unit of {count} characters; a .npz and a .h5 hold at most {UNIT}")
+            raise ProblemError(
+                f"{source.origin.name}: a unit of {count} characters; a .npz and a .h5 hold at most {UNIT}"
+            )
         columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
     else:
         columns = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
@@ -53,12 +55,12 @@ def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
             columns["repaired"] = table.repaired
         if len(table.markers) > MARKERS:
             raise ProblemError(
-                f"{contents.name}: {len(table.markers)} markers; a .npz and a .h5 hold at most {MARKERS}"
+                f"{source.origin.name}: {len(table.markers)} markers; a .npz and a .h5 hold at most {MARKERS}"
             )
         columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
-    if contents.held is not None:
-        columns["held"] = contents.held
-    columns["about"] = np.array(json_of(contents))
+    if (held := source.settings.held()) is not None:
+        columns["held"] = held
+    columns["about"] = np.array(json_of(source))
     return {**columns, DIGEST: digest_of(columns)}
 
 
@@ -83,6 +85,6 @@ def digest_of(columns: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
     return np.frombuffer(digest.digest(), np.uint8)
 
 
-def write_npz(file: BinaryIO, contents: Contents) -> None:
+def write_npz(file: BinaryIO, source: Source) -> None:
     """Write a .npz."""
-    np.savez_compressed(file, **cast(dict[str, Any], columns_of(contents)))
+    np.savez_compressed(file, **cast(dict[str, Any], columns_of(source)))

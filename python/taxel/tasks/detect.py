@@ -164,7 +164,7 @@ def detect(
     readout : Readout or PlainRule
         `taxel.detect.load` reads one from its file.
     recordings : Recording or sequence of Recording
-        What `taxel.open` returns of a file or a folder.
+        What `taxel.open` or, of a folder, `taxel.open_all` returns.
     truth : "notes", path or sequence of mapping, optional
         Labels to score against, as of `taxel.train`.
     options : DetectOptions, optional

@@ -53,7 +53,7 @@ def train(
     Parameters
     ----------
     recordings : Recording or sequence of Recording
-        What `taxel.open` returns of a file or a folder.
+        What `taxel.open` or, of a folder, `taxel.open_all` returns.
     labels : "notes", path or sequence of mapping
         The recordings' own notes; a table label,t_us or recording,label,t_us; or times (us) by label, one mapping for
         each recording.

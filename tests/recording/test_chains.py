@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,17 +13,7 @@ import pytest
 
 import taxel
 from taxel import Array, Events, Note, _core
-from taxel.recording import contents, fates
-from taxel.recording.between import between
-from taxel.recording.contents import FIELDS, Contents, Once
-from taxel.recording.cut import region
-from taxel.recording.fates import CARRIED, CHANGED, FATES, LINES, LOST
-from taxel.recording.merge import merged
-from taxel.recording.on_clock import on_clock
-from taxel.recording.pictures import calibrated, pictures
-from taxel.recording.raw import Samples
-from taxel.recording.recording import one_source, with_notes
-from taxel.recording.stored import stored
+from taxel.recording.once import Once
 from taxel.wire import Registers
 
 ARRAY = Array(8, 10, 2.0, name="mat")
@@ -68,82 +57,6 @@ def write(path: Path, seed: int = 0, n: int = 300) -> Path:
     writer.detection(BEGAN + 240_000_000, "lift", 239_000, 240_000, float("nan"), True)
     writer.finish(json.dumps({"received": len(times), "dropped_by_kernel": 2}))
     return path
-
-
-def full(folder: Path) -> Contents:
-    """Return contents with something in every field."""
-    (folder / "calibration.json").write_text(taxel.Calibration.law(ARRAY, date="2026-11-21").to_json())
-    one = taxel.open(write(folder / "full.mcap"))._contents
-    raw, five = np.arange(5, dtype=np.uint8), np.arange(5)
-    samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
-    sources: dict[str, Contents] = {}
-    sources["board"] = one.but(
-        frames=None, payload=raw, samples=samples, columns=tuple(f"c{k}" for k in range(10)), truncated=True,
-        rebuilt={"gaps": 1}, differences=True, origin_us=7, unmarked=(1,), version_2=True, untimed=True,
-        sources=sources, lost=("something",), remarks=("by another's times",), side="left", heel="top",
-    )  # fmt: skip
-    sources["other"] = sources["board"].but(label="other")
-    return sources["board"]
-
-
-# the table
-
-
-def test_every_field_is_decided_for_every_function() -> None:
-    assert tuple(FATES) == (
-        "between", "region", "merge", "on_clock", "with_notes", "calibrated", "pictures", "source", *KINDS,
-    )  # fmt: skip
-    for step, decided in FATES.items():
-        assert tuple(decided) == FIELDS, f"{step}: each field of Contents has a row in taxel.recording.fates"
-        assert set(decided.values()) <= {CARRIED, CHANGED, LOST}
-    for name in FIELDS:
-        lost = any(decided[name] == LOST for decided in FATES.values())
-        assert not lost or name in LINES, f"{name}: is lost somewhere, so a line says so"
-
-
-#: Each function of the table, from the contents before to those after.
-FUNCTIONS: dict[str, Callable[[Contents, Path], Contents]] = {
-    "between": lambda of, _: between(of, 1000.0, 200_000.0),
-    "region": lambda of, _: region(of, slice(1, 5), slice(None)),
-    "merge": lambda of, _: merged([of, of.but(registers=None)]),
-    "on_clock": lambda of, _: on_clock(of, "other"),
-    "with_notes": lambda of, _: with_notes(of, (Note("more", 5, 0),)),
-    "calibrated": lambda of, _: calibrated(of),
-    "pictures": lambda of, _: pictures(of),
-    "source": lambda of, _: one_source(of, "other"),
-    **{kind: lambda of, folder, kind=kind: stored(of.but(samples=None), folder / f"new{kind}") for kind in KINDS},
-}
-
-
-@pytest.mark.parametrize("step", FATES)
-def test_each_function_does_to_each_field_what_the_table_says(tmp_path: Path, step: str) -> None:
-    of = full(tmp_path)
-    for name in FIELDS:
-        # Of a sensor nothing is left as pictures, so the two exclude each other.
-        assert of.holds(name) or name in ("frames", "stretch", "clock_of"), name
-    of = of.but(samples=None) if step in KINDS else of
-    if step not in ("on_clock", "between"):
-        of = of.but(stretch=(0, 300_000), clock_of="other")
-    to = FUNCTIONS[step](of, tmp_path)
-    for name, fate in FATES[step].items():
-        before, after = vars(of)[name], vars(to)[name]
-        if fate == CARRIED:
-            assert after is before or getattr(to, name) == getattr(of, name), f"{name} is carried"
-        elif fate == LOST:
-            assert not to.holds(name), f"{name} is lost"
-            line = LINES[name]
-            said = [] if line is None or not of.holds(name) else line(of, step)
-            assert set([said] if isinstance(said, str) else said) <= set(to.lost), f"{name} is lost and said to be"
-    if FATES[step]["lost"] != CARRIED or step in ("between", "with_notes"):
-        assert "something" in to.lost
-
-
-def test_a_field_that_is_added_and_not_decided_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(contents, "FIELDS", (*FIELDS, "colour"))
-    with pytest.raises(AssertionError):
-        assert tuple(FATES["between"]) == contents.FIELDS
-    with pytest.raises(TypeError, match="the table of fates says"):
-        fates.after("with_notes", Contents(Path("a"), "a", "npz", ARRAY), notes=())
 
 
 # nothing is read that is not asked for
