@@ -108,9 +108,7 @@ def test_the_recording_of_a_folder_that_does_not_fit_is_named(tmp_path: Path, tr
     assert re.search(r"small.npz: an array of 4 x 4 taxels", error), error
     code, _, error = call(capsys, "detect", tmp_path / "smaller.npz", "--readout", trained)
     assert code == 2
-    assert re.search(
-        r"smaller.npz, by .*touch.json: an array of 3 x 3 taxels: the readout was trained on 8 x 8$", error.strip()
-    )
+    assert re.search(r"smaller.npz: an array of 3 x 3 taxels: the readout was trained on 8 x 8$", error.strip())
 
 
 def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:
@@ -340,7 +338,7 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0")
     arguments = ("train", folder / "9.npz", "--labels", folder / "truth.csv", *plan)
     code, said, _ = call(capsys, *arguments, "-o", tmp_path / "by_itself.json")
-    first = min(row.t_us for row in taxel.Labels(folder / "truth.csv").rows)
+    first = min(row.t for row in taxel.Labels(folder / "truth.csv").rows)
     assert code == 0
     assert f"tare: what the recording holds from 0 to {first / 1000 - 20:g} ms; --tare gives another" in said
     taxel.Tare.take(events, stop_us=first - 20_000).save(tmp_path / "tare.json")
@@ -373,7 +371,7 @@ def test_the_command_that_follows_a_training_is_said_and_runs(
 
 @pytest.mark.parametrize("first", [1_000_000, 2_500_000, 3_700_000])
 def test_the_tare_that_is_said_is_no_more_than_half_of_the_recording(tmp_path: Path, capsys, first: int) -> None:
-    values = np.random.default_rng(1).normal(100.0, 12.0, (400, 4, 4))  # never quiet
+    values = np.random.default_rng(1).normal(100.0, 30.0, (400, 4, 4))  # never quiet
     values[first // 10_000 : first // 10_000 + 10, 1:3, 1:3] += 300.0
     taxel.convert(taxel.Frames(values, np.arange(400) * 10_000, unit="counts"), tmp_path / "a.npz")
     (tmp_path / "a.notes.csv").write_text(f"label,t_us\ncontact,{first}\n")

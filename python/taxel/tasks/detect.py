@@ -234,7 +234,12 @@ def _detected(
 
 
 def _rest(readout: Readout | PlainRule, recording: Recording, tare: GivenTare | None) -> TakenRest | None:
-    """Return the rest of a recording; None of one without a rest by its unit, if the readout needs none."""
+    """Return the rest of a recording; None of one without a rest by its unit, if the readout needs none.
+
+    None of one of another sensor too, which the readout refuses.
+    """
+    if readout.array is not None and not readout.array.fits(recording.array):
+        return None
     source = recorded(recording, hold=False)
     known = tare is not None or (isinstance(source, Frames) and source.unit in FORCE_UNITS)
     return rest(recording, tare) if known or readout._needs_tare else None

@@ -119,7 +119,7 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
     >>> place = pathlib.Path(tempfile.mkdtemp()) / "press.npz"
     >>> _ = taxel.convert(frames, place)
     >>> encode(taxel.open(place), EncodeOptions("level_crossing", {"levels": [5.0]})).trains.counts
-    array([1, 1])
+    array([2])
     """
     show = (lambda *_: None) if progress is None else callback("progress", progress)
     asked = instance("options", options, EncodeOptions)
