@@ -100,7 +100,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ),
         (("encode", "walk.npz", "s.npz", "--encoder", "contact_area"), "give --tare SECONDS or --tare FILE"),
         (("encode", "walk.npz", "nowhere/s.npz", "--encoder", "fa1"), "nowhere: no such folder"),
-        (("detect", "walk.npz", "--readout", "touch.json"), "give --tare SECONDS at rest, or --tare FILE"),
         (("detect", "walk.npz", "--readout", "touch.json", "--tare", "0.1", "--frame-us", "-5"), "--frame-us is -5"),
         (
             ("live", "--readout", "touch.json", "--tare", "5000"),

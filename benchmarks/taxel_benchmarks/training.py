@@ -29,7 +29,7 @@ import taxel
 from taxel import Events, Tare
 from taxel.cli.console import Console
 from taxel.demo.script import script
-from taxel.detect import Example, PlainRule, Readout, Recipe, judge, score, train, tune
+from taxel.detect import Example, PlainRule, Readout, Recipe, fit, judge, score, tune
 from taxel.detect import run as detect
 from taxel.detect.folds import count_of_folds
 from taxel.detections import Detections
@@ -105,7 +105,7 @@ def learnt(example: Example) -> Readout:
     """Return what `taxel train` makes of a recording."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # targets out of reach are counted as missed
-        return train([example], Recipe.load("touch", labels=LABELS))
+        return fit([example], Recipe.load("touch", labels=LABELS))
 
 
 def by(detectors: Sequence[Readout | PlainRule | None], example: Example) -> Detections:
@@ -217,7 +217,7 @@ def timed(example: Example) -> dict[str, float]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         judge([example], recipe, count_of_folds([example])[0])
-        train([example], recipe)
+        fit([example], recipe)
     return {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu}
 
 

@@ -18,7 +18,7 @@ from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
 if TYPE_CHECKING:
-    from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire
+    from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, tasks, wire
     from taxel.detect import Readout
     from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing, open_all
     from taxel.recording import open_one as open  # noqa: A004  taxel.open is a recording's
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from taxel.recording.cut import cut
     from taxel.recording.health import Health, health
     from taxel.recording.merge import merge
+    from taxel.tasks.train import train
 
 __version__ = "0.1.0"
 
@@ -73,6 +74,8 @@ __all__ = [
     "open_all",
     "plot",
     "simulate",
+    "tasks",
+    "train",
     "wire",
 ]
 
@@ -80,14 +83,16 @@ __all__ = [
 #: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
 _ROOMS = (
     "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot", "recording", "simulate",
-    "wire",
+    "tasks", "wire",
 )  # fmt: skip
 _RECORDING = (
     "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",
     "open_all",
 )  # fmt: skip
 _ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
-_ELSEWHERE |= {"open": ("taxel.recording", "open_one"), "Readout": ("taxel.detect", "Readout")}
+_ELSEWHERE |= {
+    "open": ("taxel.recording", "open_one"), "Readout": ("taxel.detect", "Readout"), "train": ("taxel.tasks", "train")
+}  # fmt: skip
 
 
 matplotlib_settings.ignore_current_folder()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +15,7 @@ from taxel._base.arguments import instance, number, numbers, several, shown, tex
 from taxel._base.messages import counted, escaped, warn
 from taxel._core import ProblemError
 
-__all__ = ["Array", "Places", "names_beside"]
+__all__ = ["Array", "Places", "names_beside", "of_size"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -497,3 +498,23 @@ def _pitch(pitch: object) -> float | tuple[float, float]:
     if not all(np.isfinite(one) and one > 0 for one in each):
         raise ProblemError(f"pitch_mm is {shown(pitch)}: must be above 0 and finite")
     return each[0] if each[0] == each[-1] else (each[0], each[1])
+
+
+def of_size(size: str, *, of_wire: bool = True) -> Array:
+    """Return the array of a size, rows x columns [x mm]; without mm, the pitch of the board's wire or none.
+
+    Raises
+    ------
+    ProblemError : the text is no such size
+    """
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", size, re.ASCII)
+    if match is None:
+        raise ProblemError(f"--array {size}: must be rows x columns, as 64x64, or with the pitch in mm, as 64x64x2.67")
+    thesis = Array.thesis()
+    rows, columns, pitch = int(match[1]), int(match[2]), thesis.pitch_mm if of_wire else None
+    pitch = float(match[3]) if match[3] else pitch
+    same = (rows, columns, pitch) == (*thesis.shape, thesis.pitch_mm)
+    try:
+        return thesis if same else Array(rows, columns, pitch_mm=pitch, name=size)
+    except ProblemError as error:
+        raise ProblemError(f"--array {size}: {error}") from None

@@ -19,8 +19,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import detect
-from taxel.detect import Example, Recipe, run, score
-from taxel.detect import train as train_readout
+from taxel.detect import Example, Recipe, fit, run, score
 from taxel.detections import Detections
 from taxel.encode import ContactArea
 from taxel.events import Events
@@ -194,7 +193,7 @@ def _learnt(train: Sequence[Drop], labels: Sequence[str]) -> detect.Readout:
     """Return the readout that the recipe gives."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # targets out of reach are counted as missed
-        return train_readout([drop.example for drop in train], Recipe.load("touch", labels=labels))
+        return fit([drop.example for drop in train], Recipe.load("touch", labels=labels))
 
 
 def _first(readout: detect.Readout, drop: Drop) -> tuple[str, float] | None:

@@ -40,7 +40,7 @@ def test_labels_that_a_recipe_does_not_name_are_refused_when_they_are_trained() 
     touch = taxel.Frames(pictures, range(0, 50_000, 1000), unit="ticks", array=two)
     example = taxel.detect.Example(touch, {"contact": [5_000]}, tare=taxel.Tare.take(rest))
     with refused("neurons.contact: delay_ms is 5.5"):
-        taxel.detect.train([example], recipe)
-    trained = taxel.detect.train([example], Recipe(ENCODER, {"delay_ms": 5.0, "tau": 1.0, "ub": 2.0, "lb": -2.0}))
+        taxel.detect.fit([example], recipe)
+    trained = taxel.detect.fit([example], Recipe(ENCODER, {"delay_ms": 5.0, "tau": 1.0, "ub": 2.0, "lb": -2.0}))
     found = taxel.detect.run(trained, touch, tare=example.tare)
     assert abs(found.t[0] - 5_000) <= 1000

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from test_readout import recipe, tare, touches
 
 import taxel
-from taxel.detect import Alignment, Example, Fold, Part, Recipe, judge, recipes, run, score, train
+from taxel.detect import Alignment, Example, Fold, Part, Recipe, fit, judge, recipes, run, score
 from taxel.detect.alignment import align
 from taxel.detect.training import trained
 
@@ -99,7 +99,7 @@ def test_examples_of_different_numbers_of_trains_are_refused() -> None:
     plan = dataclasses.replace(recipe(), align=True)
     spikes = [taxel.SpikeTrains.from_lists([[10.0]] * n, stop=50.0) for n in (2, 3)]
     with pytest.raises(taxel.ProblemError, match="example 1 has 3 trains, example 0 has 2"):
-        train([Example(one, {"contact": [10_000], "lift": [20_000]}) for one in spikes], plan)
+        fit([Example(one, {"contact": [10_000], "lift": [20_000]}) for one in spikes], plan)
 
 
 def examples(*seeds: int, jitter_ms: float = 0.0) -> list[Example]:
@@ -119,10 +119,10 @@ def examples(*seeds: int, jitter_ms: float = 0.0) -> list[Example]:
 def test_labels_that_are_off_teach_what_exact_ones_do() -> None:
     plan = dataclasses.replace(recipe(), align=True)
     exact, off = examples(1, 2, 3), examples(1, 2, 3, jitter_ms=20.0)
-    assert train(off, plan) == train(exact, plan)
-    assert train(off, recipe()) != train(exact, recipe())
+    assert fit(off, plan) == fit(exact, plan)
+    assert fit(off, recipe()) != fit(exact, recipe())
     events, truth = touches(9)
-    readout = train(off, plan)
+    readout = fit(off, plan)
     own = score(run(readout, events, tare=tare()), truth, 10.0)
     assert (own.missed, own.false) == (0, 0)
     # `t` is when the sensor felt it: what the aligned labels are, not what was given.
@@ -136,7 +136,7 @@ def test_the_part_that_is_tested_moves_no_label() -> None:
     fold = Fold([Part(0), Part(1)], [Part(2)])
     one = judge(data, plan, [fold]).trained[0]
     other = judge([*data[:2], *examples(7, jitter_ms=40.0)], plan, [fold]).trained[0]
-    assert one.readout == other.readout == train(data[:2], plan)
+    assert one.readout == other.readout == fit(data[:2], plan)
     assert {label: a.to_dict() for label, a in one.alignments.items()} == {
         label: a.to_dict() for label, a in trained(data[:2], plan, None).alignments.items()
     }
@@ -159,8 +159,8 @@ def test_without_align_labels_are_learnt_as_they_are_given() -> None:
     assert plain.align is False
     assert trained([Example(spikes[0], {"a": [20_000]})], plain, None).alignments == {}
     exact, off = ([Example(spikes[0], {"a": times})] for times in ([20_000, 120_000], [25_000, 118_000]))
-    assert train(exact, plain) == train(exact, aligned) == train(off, aligned)
-    assert train(off, plain) != train(off, aligned)
+    assert fit(exact, plain) == fit(exact, aligned) == fit(off, aligned)
+    assert fit(off, plain) != fit(off, aligned)
 
 
 def test_it_is_on_for_touch_and_off_for_all_other_recipes() -> None:

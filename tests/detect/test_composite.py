@@ -12,7 +12,7 @@ from refusal import refused
 
 import taxel
 from taxel import Array, Detections, Events, Frames, Neuron, Readout, Tare
-from taxel.detect import Example, Fold, Part, Recipe, TrainedNeuron, choose, judge, run, train
+from taxel.detect import Example, Fold, Part, Recipe, TrainedNeuron, choose, fit, judge, run
 from taxel.encode import FA1, ChangeEvents, Composite, ContactArea, LevelCrossing, Moments, ThresholdIzhikevich
 
 ARRAY = Array(4, 4, 2.0)
@@ -235,13 +235,13 @@ def recipe(**more: object) -> Recipe:
 
 def test_each_neuron_is_trained_on_its_inputs_as_if_they_were_the_encoder() -> None:
     examples = [touches(seed) for seed in range(3)]
-    readout = train(examples, recipe())
+    readout = fit(examples, recipe())
     assert isinstance(readout.encoder, Composite)
     assert {label: one.inputs for label, one in readout.neurons.items()} == {
         "contact": ("area",), "strong": ("moments",), "weak": ("moments",)
     }  # fmt: skip
     alone = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples]
-    single = train(alone, Recipe(ContactArea(), LEARNER, run_threshold=0.9, align=True))
+    single = fit(alone, Recipe(ContactArea(), LEARNER, run_threshold=0.9, align=True))
     assert single.neurons["contact"].weights.tobytes() == readout.neurons["contact"].weights.tobytes()
     new = touches(9)
     found = run(readout, new.source, tare=REST)
@@ -250,7 +250,7 @@ def test_each_neuron_is_trained_on_its_inputs_as_if_they_were_the_encoder() -> N
         late = found[label].t - new.labels[label]
         assert ((late >= 0) & (late < 20)).all(), late
     # Of one input the readout is one of that encoder, as before.
-    plain = train(alone, recipe(neurons={"contact": {"inputs": ["area"]}}))
+    plain = fit(alone, recipe(neurons={"contact": {"inputs": ["area"]}}))
     assert plain == single
 
 
@@ -263,7 +263,7 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
     chosen = choose(alone, plan, k=2)
     assert chosen.inputs_of("contact") == ("area",)
     assert chosen.encoder == plan.encoder
-    assert train(alone, chosen).encoder == ContactArea()
+    assert fit(alone, chosen).encoder == ContactArea()
     result = judge(alone, plan, [Fold([Part(0), Part(1), Part(2)], [Part(3)])], search=True)
     assert (result.together["contact"].missed, result.together["contact"].false) == (0, 0)
     assert result.trained[0].recipe == chosen
@@ -272,7 +272,7 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
         encoders={"area": {"name": "contact_area"}, "level": {"name": "level_crossing", "levels": [60.0]}},
         neurons={"contact": {"inputs": ["level"]}},
     )
-    assert train([one._replace(tare=None) for one in alone], free).encoder == LevelCrossing([60.0])
+    assert fit([one._replace(tare=None) for one in alone], free).encoder == LevelCrossing([60.0])
 
 
 @pytest.mark.parametrize(

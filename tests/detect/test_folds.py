@@ -12,7 +12,7 @@ from test_readout import recipe, tare, touches
 
 import taxel
 from taxel import SpikeTrains
-from taxel.detect import Example, Fold, Part, Score, choose, judge, run, score, train
+from taxel.detect import Example, Fold, Part, Score, choose, fit, judge, run, score
 from taxel.detect import folds as folds_module
 from taxel.detect.folds import _folds as folds
 from taxel.detect.folds import count_of_folds
@@ -27,7 +27,7 @@ def test_whole_recordings_are_judged_by_what_was_trained_on_the_others() -> None
     judged = judge(data, recipe(), 3, window_ms=10.0)
     assert judged.how == "whole recordings, 3 folds"
     for n, example in enumerate(data):
-        readout = train([one for k, one in enumerate(data) if k != n], recipe())
+        readout = fit([one for k, one in enumerate(data) if k != n], recipe())
         by_hand = score(run(readout, example.source, tare=example.tare), example.labels, 10.0)
         assert judged.scores[n].to_dict() == by_hand.to_dict()
     counts = ("events", "found", "missed", "false")
@@ -109,7 +109,7 @@ def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
     plan = recipe()
     neurons = {label: {**own, "ub": 1e-6} for label, own in plan.neurons.items()}
     with pytest.warns(UserWarning, match="out of reach") as caught:
-        train(data, dataclasses.replace(plan, neurons=neurons))
+        fit(data, dataclasses.replace(plan, neurons=neurons))
     for label in plan.neurons:
         (said,) = [str(one.message) for one in caught if str(one.message).startswith(f"{label}: ")]
         first = data[0].labels[label][0] / 1000.0
@@ -124,9 +124,9 @@ def test_events_out_of_reach_are_named_from_the_beginning_of_a_recording_since_1
     frames = taxel.Frames([[[v]] for v in (0.0, 9.0, 9.0, 0.0)], begin_us + 10_000 * np.arange(4), unit="N")
     plan = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "ub": 1e-6, "delay_ms": 1.0})
     with pytest.warns(UserWarning, match=r"out of reach.* \(10 ms\)"):
-        train([Example(frames, {"contact": [begin_us + 10_000]})], plan)
+        fit([Example(frames, {"contact": [begin_us + 10_000]})], plan)
     with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms lies outside it, 0.000 to 30.000 ms"):
-        train([Example(frames, {"contact": [begin_us + 5_000_000]})], plan)
+        fit([Example(frames, {"contact": [begin_us + 5_000_000]})], plan)
 
 
 def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
@@ -169,7 +169,7 @@ def test_folds_that_are_stated_are_those_that_are_judged() -> None:
     assert [one.to_dict() for one in by_data.scores] == [one.to_dict() for one in by_number.scores]
     assert by_data.how == "3 given folds"
     for fold, made in zip(stated, by_data.trained, strict=True):
-        alone = train([data[part.example] for part in fold.train], recipe())
+        alone = fit([data[part.example] for part in fold.train], recipe())
         assert made.readout == alone
         assert set(made.learners) == {"contact", "lift"}
 
@@ -225,8 +225,7 @@ def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
     encoder = recipe().encoder
     spikes = [one._replace(source=encoder.with_tare(one.tare).encode(one.source), tare=None) for one in data]
     assert (
-        train(spikes, recipe()).neurons["lift"].weights.tolist()
-        == train(data, recipe()).neurons["lift"].weights.tolist()
+        fit(spikes, recipe()).neurons["lift"].weights.tolist() == fit(data, recipe()).neurons["lift"].weights.tolist()
     )
     both = [judge(one, recipe(), 3, window_ms=10.0).together for one in (data, spikes)]
     assert both[0].found == both[1].found == both[0].events

@@ -10,7 +10,7 @@ from test_plain_rule import tare
 
 import taxel
 from taxel import Array, Events, Neuron, Readout, SpikeTrains
-from taxel.detect import Example, Recipe, load, train
+from taxel.detect import Example, Recipe, fit, load
 from taxel.detect.readout import run_counting
 from taxel.detect.seen import seen
 from taxel.encode import ContactArea
@@ -37,7 +37,7 @@ def touches(sides) -> Example:
 
 def test_detections_of_touches_unlike_those_of_training_are_counted(tmp_path: Path, capsys) -> None:
     trained, unseen = touches([2, 3, 4, 3, 2, 4]), touches([3, 5, 2, 6, 4])
-    readout = train([trained], RECIPE)
+    readout = fit([trained], RECIPE)
     for one, outside in ((trained, 0), (unseen, 2)):
         found, counted = run_counting(readout, one.source, tare=one.tare)
         assert np.abs(found.t - one.labels["on"]).max() <= 200

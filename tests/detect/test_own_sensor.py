@@ -18,6 +18,7 @@ from shell import call
 
 import taxel
 from taxel import Array, Frames, SpikeTrains, Tare
+from taxel._base import progress
 from taxel.cli import _recordings
 from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score, training
 from taxel.detect.advice import advised
@@ -274,11 +275,12 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
 
 def test_a_training_estimates_how_long_it_takes_by_the_folds_that_are_done(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
-    monkeypatch.setattr(_recordings, "perf_counter", lambda: now[0])
-    steps, said = _recordings._Steps(), []
+    monkeypatch.setattr(progress, "perf_counter", lambda: now[0])
+    steps, said = progress.Steps(), []
+    line = progress.lines_to(steps.update)
     for at, step in ((0, "reading"), (10, "fold 1 of 5"), (15, "learning"), (20, "fold 2 of 5"), (29, "learning")):
         now[0] = float(at)
-        steps.update(step)
+        line(step)
         said.append(str(steps))
     # Reading is no part of a fold; the training on all data and the plain rules count as two.
     told = ["fold 2 of 5, after 20 s; about 80 s in all", "learning, after 29 s; about 80 s in all"]
@@ -292,13 +294,13 @@ def test_without_a_terminal_lines_say_where_it_is_also_within_a_step(
 ) -> None:
     monkeypatch.setattr(_recordings, "_REPORT_S", (0.1, 0.2))
     with _recordings.progress(quiet=False) as update:
-        update("reading a.npy")
+        update("reading a.npy", 0, 0)
         time.sleep(1.0)
     said = capsys.readouterr().err.splitlines()
     assert len(said) >= 2
     assert all(re.fullmatch(r"taxel: reading a\.npy, after [01] s", line) for line in said)
     with _recordings.progress(quiet=True) as update:
-        update("reading a.npy")
+        update("reading a.npy", 0, 0)
         time.sleep(0.3)
     assert capsys.readouterr().err == ""
 
@@ -327,7 +329,7 @@ def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path
     grid = Frames(values, np.arange(400) * 1000)
     recipe = Recipe(LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
     example = Example(grid, {"contact": [100_000, 250_000]}, Tare.take(grid, stop_us=50_000))
-    taxel.detect.train([example], recipe).save(tmp_path / "readout.json")
+    taxel.detect.fit([example], recipe).save(tmp_path / "readout.json")
     said = call(capsys, "detect", tmp_path / "flat.npy", "--readout", tmp_path / "readout.json", "--tare", "0.05")[2]
     assert "1 x 12 taxels: the readout was trained on 3 x 4; give --array 3x4, or rows and columns in a layout" in said
 

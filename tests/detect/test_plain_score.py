@@ -10,9 +10,9 @@ from shell import call
 from test_plain_rule import played
 
 import taxel
-from taxel.cli._trained import Result
 from taxel.detect import Example, Fold, Part, PlainRule, Recipe, judge, run, score, tune
 from taxel.encode import ContactArea
+from taxel.tasks import Training, TrainOptions
 
 RECIPE = Recipe(
     ContactArea(),
@@ -151,7 +151,7 @@ def test_the_page_of_training_says_that_the_rule_knows_sooner() -> None:
     true = {"hit": [1000]}
     neuron, mine = (taxel.detect.score(taxel.Detections(["hit"], [1000], [known]), true) for known in (1500, 1200))
     plain = taxel.detect.PlainScore({"hit": taxel.detect.PlainRule("area", 2)}, mine)
-    result = Result((), None, SimpleNamespace(plain=plain, together=neuron), "", {}, 50.0, searched=False)
+    result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=neuron), "", {}, (), ())
     (line,) = result._better()
     assert line.startswith(
         "hit: the plain rule is as good and knows sooner: 0 missed and false, as the neuron, known +0.2 ms after the "
@@ -164,6 +164,6 @@ def test_where_the_rule_is_better_the_training_says_how_to_write_it() -> None:
     mine = taxel.detect.score(taxel.Detections(["hit"], [1000], [1200]), true)
     plain = taxel.detect.PlainScore({"hit": taxel.detect.PlainRule("area", 2)}, mine)
     nothing = taxel.detect.score(taxel.Detections([], [], []), true)
-    result = Result((), None, SimpleNamespace(plain=plain, together=nothing), "", {}, 50.0, searched=False)
+    result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=nothing), "", {}, (), ())
     (line,) = result._better()
     assert line.endswith("; --rule FILE writes it, for taxel detect --readout FILE")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from refusal import refused
 
 import taxel
-from taxel.detect import Example, Readout, Recipe, TrainedNeuron, run, score, train
+from taxel.detect import Example, Readout, Recipe, TrainedNeuron, fit, run, score
 from taxel.encode import ChangeEvents, ContactArea, LevelCrossing, ThresholdIzhikevich
 
 ARRAY = taxel.Array(8, 8, pitch_mm=2.67, name="small")
@@ -65,7 +65,7 @@ def recipe() -> Recipe:
 @pytest.fixture(scope="module")
 def readout() -> Readout:
     """Learnt on other seeds than the tests play."""
-    return train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
+    return fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
 
 
 def plain(encoder: taxel.encode.Encoder, array: taxel.Array, seed: int = 0, **neuron: object) -> Readout:

@@ -16,7 +16,7 @@ from shell import call
 
 import taxel
 from taxel import Array, Events, Frames, Readout, Tare
-from taxel.detect import Example, PlainRule, Recipe, judge, load, run, train, tune
+from taxel.detect import Example, PlainRule, Recipe, fit, judge, load, run, tune
 from taxel.encode import LevelCrossing
 from taxel.live import Live
 from taxel.live._shown_files import Opening, ShownFiles
@@ -47,7 +47,7 @@ def events() -> Events:
 def both(unit: str) -> list[Readout | PlainRule]:
     rule = tune([example(unit)], ["contact"])["contact"]
     assert rule is not None
-    return [train([example(unit)], RECIPE), rule]
+    return [fit([example(unit)], RECIPE), rule]
 
 
 @given(UNITS, UNITS)
@@ -98,7 +98,7 @@ def test_a_unit_has_a_name() -> None:
         Readout(LevelCrossing([5.0]), {"contact": (taxel.Neuron(), [1.0, 1.0])}, unit=3)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("does", [lambda x: train(x, RECIPE), lambda x: judge(x, RECIPE, 2), tune])
+@pytest.mark.parametrize("does", [lambda x: fit(x, RECIPE), lambda x: judge(x, RECIPE, 2), tune])
 def test_recordings_in_different_units_are_not_trained_on_together(does) -> None:
     with refused("example 1 is in N, example 0 in kPa: must be in one unit"):
         does([example("kPa"), example("N")])

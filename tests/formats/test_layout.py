@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 import taxel
 from taxel import Array, Events, FormatError, Frames, Places
 from taxel.cli import app
-from taxel.cli._opening import FileOptions
 from taxel.formats.layout import Layout, packaged
+from taxel.recording.open_options import OpenOptions
 
 from .making import write_gaitpdb
 from .tables import VALUES, lines, table
@@ -512,11 +512,11 @@ def test_a_taxel_may_be_named_by_the_letter_t(tmp_path: Path) -> None:
 def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: Path) -> None:
     palm = tmp_path / "palm.npy"
     np.save(palm, VALUES.reshape(3, 2, 3))
-    opened = FileOptions(rate_hz=100.0).one(palm)
+    opened = OpenOptions(rate_hz=100.0).one(palm)
     assert opened.frames().t.tolist() == [0, 10_000, 20_000]
     assert opened.array.shape == (2, 3)
     np.save(palm, VALUES)
-    assert FileOptions(rate_hz=100.0, array=["2x3"]).one(palm).array.shape == (2, 3)
+    assert OpenOptions(rate_hz=100.0, array=["2x3"]).one(palm).array.shape == (2, 3)
     refused = CliRunner().invoke(app, ["info", str(palm)])
     assert ", or --rate-hz HZ, says what it is" in str(refused.exception)
 

@@ -19,10 +19,10 @@ from shell import call
 
 import taxel
 from taxel import FormatError, ProblemError
-from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import references
 from taxel.formats import ros
 from taxel.formats.ros.reading import _times
+from taxel.recording.open_options import OpenOptions
+from taxel.tasks.labels import references
 
 from . import bags
 from .bags import BEGIN_NS, HAND, PALM, SKIN
@@ -558,15 +558,15 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
     bag = bags.write(tmp_path / "pick.mcap", several)
     table = tmp_path / "labels.csv"
     table.write_text("recording,source,label,t_us\n" + "".join(f"{names[s]}touch,{us + t}\n" for s, t in rows))
-    options = FileOptions(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
+    options = OpenOptions(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
     opened = options.all([bag])
-    left, right = references(str(table), "--labels", opened)
+    left, right = references(str(table), opened)
     assert [(left["touch"] - us).tolist(), (right["touch"] - us).tolist()] == [[20_000, 70_000], [30_000]]
     table.write_text(table.read_text() + "pick"[: 4 * (names["left"][0] != ",")] + f",/grip/thumb,touch,{us}\n")
     with pytest.raises(ProblemError, match="is of source grip_thumb; there is grip_left, grip_right"):
-        references(str(table), "--labels", opened)
+        references(str(table), opened)
     table.write_text(f"label,t_us\ntouch,{us + 20_000}\n")
-    assert [one["touch"].tolist() for one in references(str(table), "--labels", opened)] == [[us + 20_000]] * 2
+    assert [one["touch"].tolist() for one in references(str(table), opened)] == [[us + 20_000]] * 2
     other = bags.write(tmp_path / "other.mcap", several)
     with pytest.raises(ProblemError, match="names no recording, and there are 2; must have the column recording"):
-        references(str(table), "--labels", options.all([bag, other]))
+        references(str(table), options.all([bag, other]))

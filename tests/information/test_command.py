@@ -105,7 +105,7 @@ def test_notes_are_trials_as_rows_of_a_table_are(tmp_path):
     write_labels(beside(recording), [(label, int(t)) for t, label in rows])
     assert json.loads(run(recording, "--labels", "notes", *asked).stdout) == expected
     done = run(recording, "--labels", "notes", "--report", tmp_path / "other.html")
-    assert "--labels notes: give the trials' length by --window-ms" in str(done.exception)
+    assert "--window-ms: must say how long the trials are that notes begin" in str(done.exception)
     write_labels(beside(recording), [("left first", int(rows[0][0])), ("right first", int(rows[0][0]) + 100)])
     done = run(recording, "--labels", "notes", *asked)
     assert f"note at {int(rows[0][0]) + 100} us: begins 0.1 ms after note at {rows[0][0]} us" in str(done.exception)

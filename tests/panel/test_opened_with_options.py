@@ -23,6 +23,7 @@ from taxel import Array, Calibration, Frames
 from taxel.cli._opening import FileOptions
 from taxel.cli.view import _opening
 from taxel.live import Panel
+from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import recordings_in
 
 KINDS = ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")
@@ -87,8 +88,8 @@ def test_the_command_that_trains_in_a_shell_has_the_options_and_quotes_what_need
 
 def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
     bag, _ = palms(tmp_path, "grasp.bag")
-    opened_as, joined = [], FileOptions.joined
-    monkeypatch.setattr(FileOptions, "joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
+    opened_as, joined = [], OpenOptions.joined
+    monkeypatch.setattr(OpenOptions, "joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
     for shown in (bag, Path("grasp.bag")):
         monkeypatch.chdir(tmp_path)
         opened_as.clear()
@@ -262,7 +263,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
     (folder / "layout.toml" if beside else layout).write_text(text)
     given = {} if beside else {"layout": layout}
     for name in TABLES:
-        with Panel(folder / name, **given) as panel, Client(panel) as page:
+        with Panel(folder / name, options=OpenOptions(**given)) as panel, Client(panel) as page:
             shown_alike(page, [name], values)
     assert [one.name for one in taxel.open_all(folder, **given)] == list(TABLES)
     (folder / "labels.csv").write_text("recording,label,t_us\npalm,contact,100000\n")
@@ -295,15 +296,15 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
     rng = np.random.default_rng(4)
     trials = {}
     for number in range(1, 5):
-        raw = np.full((120, 60), 240) + rng.integers(-1, 2, (120, 60))
-        for begin in range(10, 110, 20):
+        raw = np.full((180, 60), 240) + rng.integers(-1, 2, (180, 60))
+        for begin in range(70, 170, 20):
             raw[begin : begin + 8, 20:40] -= 90
         trials[number] = np.clip(raw, 0, 255)
     file = write_icub(tmp_path, trials=trials)
     with viewed(tmp_path, file, "--rate-hz", 100) as page:
         for trial in ("ball/1", "ball/3"):
             opened(page, file.name, trial=trial)
-            for begin in range(10, 110, 20):
+            for begin in range(70, 170, 20):
                 assert page.ask("mark", label="touch", t_us=begin * 10_000)["type"] == "done"
         opened(page, file.name, trial="ball/3")
         labels = page.since_asked("labels")["labels"]

@@ -34,7 +34,7 @@ from tests.panel.protocol import word
 
 import taxel
 import taxel.device
-from taxel.detect import Example, train
+from taxel.detect import Example, fit
 
 __all__ = ["live", "page", "recording", "replay"]
 
@@ -192,7 +192,7 @@ def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: A
 
 
 def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, tmp_path: Path) -> None:
-    readout = train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
+    readout = fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
     readout.save(tmp_path / "touch.json")
     tare().save(tmp_path / "tare.json")
     events, truth = touches(11)
@@ -265,7 +265,7 @@ def test_what_does_not_arrive_is_said(chromium: Any, tmp_path: Path) -> None:
 
 
 def test_the_page_is_there_while_a_tare_waits(chromium: Any, tmp_path: Path) -> None:
-    train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe()).save(tmp_path / "touch.json")
+    fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe()).save(tmp_path / "touch.json")
     port = str(free_port())
     with running("emulate", "--port", port, "--control", "0", "--heartbeat", "10", folder=tmp_path) as board:
         control = board.wait_for(r"commands are accepted at (\S+)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import threading
 from collections.abc import Iterator
@@ -116,16 +117,18 @@ def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, ch
     table.unlink()
 
 
-def test_what_a_training_says_can_be_read_while_it_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_how_far_a_training_is_can_be_read_while_it_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     command, end = tmp_path / "python", tmp_path / "end"
     command.write_text(
         f"""#!{sys.executable}
-import pathlib, sys, time
-for line in ("starting, after 2 s", "fold 2 of 5, after 12 s; about 30 s in all", "warning: 3 labels are alone"):
-    print("taxel: " + line, file=sys.stderr, flush=True)
+import json, pathlib, sys, time
+assert json.load(sys.stdin)["overwrite"]
+for done in range(2):
+    print(json.dumps({{"type": "progress", "step": f"fold {{done + 1}} of 5", "done": done, "of": 5}}), flush=True)
+    time.sleep(0.6)
 while not pathlib.Path({str(end)!r}).exists():
     time.sleep(0.02)
-print("held out: all found")
+print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": {{"warnings": ["3 are alone"]}}}}))
 """
     )
     command.chmod(0o755)
@@ -135,10 +138,12 @@ print("held out: all found")
     printed: list[str] = []
     training = threading.Thread(target=lambda: printed.append(handler.train(tmp_path / "a.npz", tmp_path / "a.json")))
     training.start()
-    until(lambda: handler.progress() == "fold 2 of 5, after 12 s; about 30 s in all", "its estimate")
+    until(lambda: re.fullmatch(r"fold 2 of 5, after \d+ s; about \d+ s in all", handler.progress()), "its estimate")
     end.touch()
     training.join()
-    assert printed == ["held out: all found\nwarning: 3 labels are alone"]
+    [*lines, last] = printed[0].splitlines()
+    assert (lines[0], last) == ("held out: all found", "warning: 3 are alone")
+    assert lines[2].startswith("written to a.json; next: taxel detect RECORDING --readout ")
     assert handler.progress() == ""
 
 

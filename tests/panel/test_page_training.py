@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.detect.test_readout import touches
 from tests.formats import bags
 from tests.formats.bags import PALM
 from tests.panel.browser import running
@@ -27,6 +26,7 @@ from tests.panel.pages import (
     still,
     until,
 )
+from tests.tasks.recordings import rested
 
 import taxel
 import taxel.device
@@ -49,7 +49,7 @@ def pictures() -> tuple[taxel.Frames, dict[str, list[int]]]:
 
 def board(folder: Path) -> dict[str, list[int]]:
     """Write events of a board, and return their labels."""
-    events, truth = touches(11)
+    events, truth = rested(11)
     taxel.convert(events, folder / "played.mcap")
     return {label: list(map(int, times)) for label, times in truth.items()}
 

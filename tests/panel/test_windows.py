@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from panel.protocol import SOON, Client, head, heard, parts_of, say, section, word
 from tests.detect.test_readout import recipe, tare, touches
+from tests.tasks.recordings import rested
 
 import taxel
-from taxel.detect import Example, train
+from taxel.detect import Example, fit
 from taxel.live import Live, Panel, Source
 
 
@@ -134,12 +135,12 @@ def test_what_is_not_known_of_registers_is_not_shown_as_a_rate(tmp_path):
 
 
 def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
-    readout = train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
+    readout = fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
     readout.save(tmp_path / "touch.json")
     rule = taxel.detect.PlainRule("area", 2, noise_floor=3.0)
     rule.save(tmp_path / "rule.json")
     (tmp_path / "other.json").write_text('{"format": "something else"}')
-    events, _ = touches(11)
+    events, _ = rested(11)
     taxel.convert(events, tmp_path / "played.mcap")
     with (
         Live(0, host="127.0.0.1", array=events.array) as live,

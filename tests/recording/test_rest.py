@@ -169,18 +169,6 @@ def test_where_nothing_lay_or_the_whole_array_drifts_nothing_is_said(tmp_path: P
     assert "something lay" not in run("info", tmp_path / "a.npz").stdout
 
 
-def test_the_page_takes_its_tare_of_the_same_time_as_train(tmp_path: Path) -> None:
-    from taxel.live._requests.training import _rest
-
-    source, truth = lain()
-    taxel.convert(source, tmp_path / "a.npz")
-    rows = "".join(f"{label},{t}\n" for label, times in truth.items() for t in times)
-    (tmp_path / "a.notes.csv").write_text("label,t_us\n" + rows)
-    tare = _rest(taxel.open(tmp_path / "a.npz"))
-    assert (tare.start_us, tare.stop_us > 1_900_000) == (800_000, True)
-    assert np.abs(tare.rest - 50).max() < 1
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("sigma", [0.02, 0.3, 5.0])
 @pytest.mark.parametrize("cut_off", [False, True])

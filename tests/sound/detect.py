@@ -124,7 +124,7 @@ SOUND: dict[str, Sound] = {
         frame_us=192.0,
         progress=lambda _: None,
     ),
-    "taxel.detect.train": plain(taxel.detect.train, examples=[EXAMPLE], recipe=RECIPE, progress=lambda _: None),
+    "taxel.detect.fit": plain(taxel.detect.fit, examples=[EXAMPLE], recipe=RECIPE, progress=lambda _: None),
     "taxel.detect.Part": plain(
         lambda **given: judged(taxel.detect.Fold([taxel.detect.Part(0)], [taxel.detect.Part(**given)])),
         example=1,
@@ -138,7 +138,7 @@ SOUND: dict[str, Sound] = {
         inner=[],
     ),
     "taxel.detect.Example": plain(
-        lambda **given: taxel.detect.train([taxel.detect.Example(**given)], RECIPE),
+        lambda **given: taxel.detect.fit([taxel.detect.Example(**given)], RECIPE),
         source=EXAMPLE.source,
         labels={"a": [9000]},
         tare=None,

@@ -8,6 +8,7 @@ import numpy as np
 
 import taxel
 from sound.things import ARRAY, BYTES, Sound, fresh, method, plain
+from taxel.recording.open_options import OpenOptions
 
 
 def listen(**arguments: Any) -> None:
@@ -92,9 +93,7 @@ SOUND: dict[str, Sound] = {
         port=0,
         host="127.0.0.1",
         opens=taxel.open_all,
-        layout=None,
-        options=["--rate-hz", "100"],
-        rate_hz=100.0,
+        options=OpenOptions(rate_hz=100.0),
     ),
     "taxel.live.send": plain(
         taxel.live.send,

@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from taxel._core import Error
 
-__all__ = ["counted", "escaped", "escaped_lines", "first_line", "installing", "plain", "warn"]
+__all__ = ["collected", "counted", "escaped", "escaped_lines", "first_line", "installing", "plain", "warn"]
 
 #: C0, DEL and C1, the marks and overrides of direction, the separators of lines and paragraphs, and halves of surrogate
 #: pairs, which stand for bytes of file names that are no UTF-8. `crates/taxel-panel/web/dom.js` has the same.
@@ -41,8 +44,33 @@ def escaped_lines(text: object) -> str:
     return "\n".join(map(escaped, str(text).split("\n")))
 
 
+#: The warnings of the work that this thread does now, where they are collected.
+_texts: ContextVar[list[str] | None] = ContextVar("texts", default=None)
+
+
+@contextmanager
+def collected() -> Iterator[list[str]]:
+    """Collect the warnings of what this thread does as texts, each once; Python then issues none.
+
+    The filters of Python's own module belong to the whole process, and a panel runs several threads.
+    """
+    texts: list[str] = []
+    before = _texts.set(texts)
+    try:
+        yield texts
+    finally:
+        _texts.reset(before)
+
+
 def warn(text: str, category: type[Warning] = UserWarning, *, stacklevel: int = 1) -> None:
-    """Issue a warning of Python, without control characters; `stacklevel` counts as in `warnings.warn`."""
+    """Issue a warning of Python, without control characters; `stacklevel` counts as in `warnings.warn`.
+
+    Within `collected` it is collected.
+    """
+    texts = _texts.get()
+    if texts is not None and issubclass(category, UserWarning):
+        texts += [] if escaped(text) in texts else [escaped(text)]
+        return
     warnings.warn(escaped(text), category, stacklevel=stacklevel + 1)  # noqa: TID251  the place where it is allowed
 
 

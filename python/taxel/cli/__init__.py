@@ -15,12 +15,12 @@ from typing import Any, NoReturn
 import typer
 
 from taxel._base.child_process import make_safe
+from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import DeviceError, Error
 from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App
 from taxel.cli._commands import Commands
 from taxel.cli._recordings import SET_HELP, assignments
 from taxel.cli._say import say
-from taxel.cli._stopping import leave, stop_on_signals
 
 __all__ = ["SET_HELP", "App", "app", "assignments", "main", "program", "say"]
 

@@ -16,8 +16,8 @@ from rich.text import Text
 
 from taxel._base.messages import counted
 from taxel._core import ProblemError
+from taxel.array import of_size
 from taxel.cli._app import App, SecondsOption
-from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
     ArrayOption,
@@ -89,7 +89,7 @@ def bridge(
         Live(
             port,
             host=host,
-            array=None if array is None else geometry(array),
+            array=None if array is None else of_size(array),
             registers=preset,
             differences=differences,
             readout=trained,

@@ -14,7 +14,7 @@ from taxel._base.messages import plain
 from taxel._core import ProblemError
 from taxel.cli._app import App, with_out
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import READ_HELP, of_source, span_us
+from taxel.cli._recordings import READ_HELP, of_source
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def cut(
 
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {plain(start)} --to {plain(stop)}: the part must not end before it begins")
-    whole = of_source(files.one(recording), source)
+    whole = of_source(files.opener.one(recording), source)
     parts = taxel.cut(
         whole,
         start_us=float("-inf") if start is None else start * 1e6,
@@ -95,6 +95,8 @@ def _check_time(recording: Recording, start: float | None, stop: float | None) -
     """Refuse a time before or after the whole recording, as its file would be empty; a silence within it is allowed."""
     if start is None and stop is None:
         return
+    from taxel.recording.cut import span_us  # noqa: PLC0415  the command line starts quickly
+
     first, last = (t / 1e6 for t in span_us(recording))
     lasts = f"{recording.path} lasts from {plain(first)} to {plain(last)} s"
     if start is not None and start > last:

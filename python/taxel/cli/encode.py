@@ -6,15 +6,13 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from taxel._base.files import try_whole
-from taxel._base.messages import counted
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import App, with_out
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, progress, tare_or_by_unit
+from taxel.cli._recordings import SET_HELP, TARE_HELP, assignments, progress, say_warnings
 from taxel.cli._say import say
 
 __all__ = ["app", "encode"]
@@ -41,31 +39,16 @@ def encode(
     """
     if out.suffix != ".npz":
         raise ProblemError(f"{out}: spikes are written to a .npz")
+    from taxel.tasks import EncodeOptions  # noqa: PLC0415  the command line starts quickly
+    from taxel.tasks import encode as encode_by  # noqa: PLC0415
+
     try_whole(out, overwrite=overwrite)
-    chosen = encoder_of(encoder, values or [])
+    options = EncodeOptions(encoder, assignments(values or []), tare)
     with progress(as_json) as update:
-        update(f"reading {recording}")
-        opened = files.one(recording)
-        source = opened.events if opened.has_events else opened.frames()
-        rest = tare_or_by_unit(tare, opened)
-        if rest is not None:
-            chosen = chosen.with_tare(rest)
-        update(f"encoding {counted(len(source), 'event' if opened.has_events else 'picture')}")
-        trains = chosen.encode(opened)
-    trains.save(out, overwrite=overwrite)
-    counts = trains.counts
-    result = {
-        "recording": str(recording),
-        "encoder": {key: value for key, value in json.loads(chosen.to_json()).items() if key != "tare"},
-        "latency_ms": chosen.latency_ms,
-        "trains": len(trains),
-        "kind": trains.kind,
-        "signed": trains.signed,
-        "spikes": int(counts.sum()),
-        "silent_trains": int(np.count_nonzero(counts == 0)),
-        "start_ms": trains.start,
-        "stop_ms": trains.stop,
-        "written": str(out),
-    }
-    lines = [f"{trains!r}, {result['silent_trains']} silent", f"written to {out}"]
+        update(f"reading {recording}", 0, 0)
+        encoded = encode_by(files.opener.one(recording), options, progress=update)
+    encoded.trains.save(out, overwrite=overwrite)
+    say_warnings(encoded.warnings)
+    result = {"recording": str(recording), **encoded.to_dict(), "written": str(out)}
+    lines = [f"{encoded.trains!r}, {result['silent_trains']} silent", f"written to {out}"]
     say(*([json.dumps(result)] if as_json else lines))

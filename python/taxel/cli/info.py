@@ -18,7 +18,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, progress, tare_of
+from taxel.cli._recordings import TARE_HELP, progress, say_warnings
 from taxel.cli._say import say
 from taxel.cli._topics import listed
 from taxel.clock import doubt
@@ -70,9 +70,9 @@ def info(
     """
     from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.pressure import above_rest, series  # noqa: PLC0415
-    from taxel.recording.summary import summary  # noqa: PLC0415
+    from taxel.recording.pressure import above_rest  # noqa: PLC0415
     from taxel.recording.without_layout import are_spike_trains  # noqa: PLC0415
+    from taxel.tasks import info as info_of  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
@@ -86,22 +86,24 @@ def info(
         return
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {file}", 0, 0)
-        if file.exists() and is_bag(file) and not files.names_topic(file):
+        if file.exists() and is_bag(file) and not files.opener._names_topic(file):
             say(*listed(file, topics(file, files.types, files.ros), as_json))
             return
-        every = files.open(file)
+        every = files.opener.open(file)
         recording = every[0]
         if len(every) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:
                 raise ProblemError(_several(file, every))
-            of_each = [_facts(one, tare) for one in every]
+            infos = [info_of(one, tare) for one in every]
+            of_each = [one.facts for one in infos]
             result = [json.dumps(of_each if len(every) > 1 else of_each[0])]
             say(*(result if as_json else chain.from_iterable(map(_pages, of_each))))
+            say_warnings(dict.fromkeys(text for one in infos for text in one.warnings))
             return
-        rest = tare_of(tare, recording)
-        pressed = series(recording, rest)
-        facts = summary(recording, pressed)
+        found = info_of(recording, tare)
+        facts, pressed = found.facts, found.pressed
         facts["array_assumed"] &= not files.array
+    say_warnings(found.warnings)
     if table is not None:
         if pressed is None:
             raise ProblemError(f"{file}: holds events without intensities, so there is no pressure to write")
@@ -109,7 +111,7 @@ def info(
         write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
         facts["table"] = str(table)
     if picture is not None:
-        _draw(picture, recording, above_rest(recording, rest), overwrite)
+        _draw(picture, recording, above_rest(recording, found.tare), overwrite)
         facts["picture"] = str(picture)
     say(*([json.dumps(facts)] if as_json else _page(facts)))
 
@@ -165,47 +167,6 @@ def _several(file: Path, every: Sequence[Recording]) -> str:
         f"{file}: holds {len(every[0].sources)} sources ({names}); a picture or a table is of one: taxel convert "
         "--source NAME writes it to a file of its own"
     )
-
-
-def _facts(recording: Recording, tare: str | None) -> dict[str, Any]:
-    """Return the facts of a recording, or of each of its sources."""
-    from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
-    from taxel.recording.summary import summary  # noqa: PLC0415
-
-    if len(recording.sources) > 1:
-        return _sources(recording, tare)
-    return summary(recording, series(recording, tare_of(tare, recording)))
-
-
-def _sources(recording: Recording, tare: str | None) -> dict[str, Any]:
-    """Return the facts of each source of a file, with offset and drift of their clocks against the first one's."""
-    from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
-    from taxel.recording.summary import summary  # noqa: PLC0415
-
-    first = next(iter(recording.sources.values()))
-    sources: dict[str, Any] = {}
-    for name, source in recording.sources.items():
-        facts = summary(source, None if source.is_stream else series(source, tare_of(tare, source)))
-        clock, ours = source.clock, first.clock
-        if source.is_stream:
-            facts["columns"] = source.columns
-        if (
-            source is not first
-            and clock is not None
-            and ours is not None
-            and len(clock.board_us)
-            and len(ours.board_us)
-        ):
-            begins = int(clock.board_us.min())
-            facts["against"] = {
-                "source": next(iter(recording.sources)),
-                "offset_us": int(ours.board_us_at(int(clock.host_ns(begins)))) - begins,
-                "drift_ppm": clock.drift_ppm - ours.drift_ppm,
-            }
-        sources[name] = facts
-    verdict = recording.verdict
-    of_all = {"verdict": verdict, "verdict_details": verdict.to_dict(), "remarks": list(recording.remarks)}
-    return {"file": str(recording.path), **of_all, "sources": sources}
 
 
 def _pages(facts: dict[str, Any]) -> list[str]:

@@ -8,19 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from taxel._base.arguments import whole
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._bar import bar, duration
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import SET_HELP, progress
+from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
-    from taxel.information import Answer, Estimate, LabelledTrial, Point
-    from taxel.recording import Recording
+    from taxel.information import Answer, Estimate, Point
 
 __all__ = ["app", "information"]
 
@@ -70,65 +68,59 @@ def information(
 
     Example: taxel information drops.mcap --labels drops.csv --window-ms 50
     """
-    from taxel.information import answer  # noqa: PLC0415  the command line starts quickly
-    from taxel.report.information import write_information  # noqa: PLC0415
+    from taxel.report.information import write_information  # noqa: PLC0415  the command line starts quickly
+    from taxel.tasks import InformationOptions  # noqa: PLC0415
+    from taxel.tasks import information as estimate  # noqa: PLC0415
 
     if report.suffix != ".html":
         raise ProblemError(f"--report {report}: is one page, so its name must end in .html")
     if report.exists() and not overwrite:
         raise FileExistsError(17, "exists already; give --overwrite or another --report", str(report))
-    chosen = _encoder(encoder, values or [])
-    known = _Known()
+    options = InformationOptions(
+        encoder,
+        assignments(values or []),
+        window_ms,
+        _numbers("--windows", windows_ms),
+        _numbers("--periods", periods_ms),
+        _whole("--taxels", taxels),
+        _whole("--pools", pools),
+        draws,
+        shuffles,
+        folds,
+        seed,
+        [name for name in classifiers.split(",") if name],
+    )
+    known, trials = _Known(), ""
     try:
         # `progress` prints the warnings; the bar shows the steps.
         with progress(quiet=True), bar(as_json) as update:
             opened = []
             for path in recordings:
                 update(f"reading {path}", 0, 0)
-                opened += files.all([path])
-            trials = _trials(labels, opened, window_ms)
-            if labels is None and len({trial.label for trial in trials}) == 1:
-                raise ProblemError(
-                    f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, "
-                    f"here {trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings "
-                    "a folder"
-                )
-            _check_folds(trials, str(recordings[0]) if labels in (None, "notes") else labels, count=folds, seed=seed)
+                opened += files.opener.all([path])
 
             def show(what: str, done: int, of: int) -> None:
-                if not done and not as_json:
+                nonlocal trials
+                if of and not done and not as_json:
                     say(
-                        f"{counted(len(trials), 'trial')}: about {duration(of / 1000)} on an idle processor; Ctrl-C "
-                        "prints what is known by then",
+                        f"{trials}: about {duration(of / 1000)} on an idle processor; Ctrl-C prints what is known by "
+                        "then",
                         err=True,
                     )
+                trials = trials if of else what
                 update(what, done, of)
 
-            result = answer(
-                trials,
-                encoder=chosen,
-                window_ms=window_ms,
-                windows_ms=_numbers("--windows", windows_ms),
-                periods_ms=_numbers("--periods", periods_ms),
-                taxels=_whole("--taxels", taxels),
-                pools=_whole("--pools", pools),
-                draws=draws,
-                folds=folds,
-                shuffles=shuffles,
-                classifiers=[name for name in classifiers.split(",") if name],
-                seed=seed,
-                progress=show,
-                watch=known.add,
-            )
+            result = estimate(opened, labels, options, progress=show, watch=known.add)
             update("drawing", 0, 0)
-            write_information(report, result, overwrite=overwrite)
+            write_information(report, result.answer, overwrite=overwrite)
     except KeyboardInterrupt:
         say(known.line(draws), err=True)
         raise
+    say_warnings(result.warned)
     if as_json:
         say(json.dumps({**result.to_dict(), "report": str(report)}))
         return
-    for line in lines(result):
+    for line in lines(result.answer):
         say(line)
     say(f"written to {report}")
 
@@ -155,30 +147,6 @@ class _Known:
             for period, by_window in self._bits.items()
         )
         return f"stopped; bits of {done} of {counted(draws, 'draw')}, without intervals: {by_period}"
-
-
-def _trials(labels: str | None, opened: list[Recording], window_ms: float | None) -> list[LabelledTrial]:
-    from taxel.information import notes_as_trials, read_trials, recordings_as_trials  # noqa: PLC0415  starts quickly
-
-    if labels is None:
-        return recordings_as_trials(opened, window_ms=window_ms)
-    if labels != "notes":
-        return read_trials(labels, opened, window_ms=window_ms)
-    if window_ms is None:
-        raise ProblemError("--labels notes: give the trials' length by --window-ms, as notes have no end")
-    return notes_as_trials(opened, window_ms=window_ms)
-
-
-def _check_folds(trials: list[LabelledTrial], place: str, *, count: int, seed: int) -> None:
-    """Refuse labels and groups that cannot be split into folds; the error names their table."""
-    from taxel.information import folds  # noqa: PLC0415  starts quickly
-
-    whole("folds", count, 2), whole("seed", seed, 0)
-    groups = [trial.group for trial in trials]
-    try:
-        folds([trial.label for trial in trials], count=count, groups=groups if any(groups) else None, seed=seed)
-    except ProblemError as error:
-        raise ProblemError(f"{place}: {error}") from None
 
 
 def lines(answer: Answer) -> list[str]:
@@ -256,14 +224,6 @@ def _bits(estimate: Estimate | None) -> str:
 def _interval(estimate: Estimate) -> str:
     low, high = estimate.interval
     return f"{estimate.bits:.2f} of {estimate.most:.2f} bits [{low:.2f} {high:.2f}]"
-
-
-def _encoder(name: str, settings: list[str]):  # type: ignore[no-untyped-def]
-    from taxel.cli._recordings import encoder_of  # noqa: PLC0415  the command line starts quickly
-
-    if name not in ("change_events", "fa1"):
-        raise ProblemError(f"--encoder {name}: must be change_events or fa1, which have one train a taxel")
-    return None if name == "change_events" and not settings else encoder_of(name, settings)
 
 
 def _numbers(option: str, text: str | None) -> list[float] | None:

@@ -17,10 +17,10 @@ from rich.text import Text
 
 from taxel._base.files import try_whole
 from taxel._base.messages import counted, plain
+from taxel._base.stopping import asked_to_end
 from taxel._core import ProblemError
-from taxel.array import Array
+from taxel.array import Array, of_size
 from taxel.cli._app import App, SecondsOption, with_typed
-from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
     BitsOption,
@@ -47,7 +47,6 @@ from taxel.cli._board import (
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
 from taxel.cli._say import say
-from taxel.cli._stopping import asked_to_end
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout, load
@@ -144,7 +143,7 @@ def live(typed: _Typed) -> None:
     _together(typed)
     trained = None if typed.readout is None else load(typed.readout)
     # The wire's pitch is that of the board; a sensor of one's own has the one that is stated, or none.
-    given = None if typed.array is None else geometry(typed.array, of_wire=typed.rate_hz is None)
+    given = None if typed.array is None else of_size(typed.array, of_wire=typed.rate_hz is None)
     stated = None if trained is None else trained.array
     stated = stated if given is None else given
     registers = stated_registers(typed.preset, typed.rate_hz, typed.bits, typed.address, stated)

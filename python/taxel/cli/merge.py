@@ -45,7 +45,7 @@ def merge(
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
 
-    opened = [files.one(path) for path in recordings]
+    opened = [files.opener.one(path) for path in recordings]
     parts = opened if label is None else [part for each in opened for part in taxel.cut(each, label=label)]
     merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6, beside=beside)
     lost = taxel.convert(merged, out, overwrite=overwrite)

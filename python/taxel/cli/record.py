@@ -16,8 +16,8 @@ from rich.live import Live as Display
 from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import ProblemError
+from taxel.array import of_size
 from taxel.cli._app import OUTSIDE, App, SecondsOption, with_out
-from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
     ArrayOption,
@@ -105,7 +105,7 @@ def record(
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
     if length is not None and seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
-    sensor = None if array is None else geometry(array, of_wire=rate_hz is None)
+    sensor = None if array is None else of_size(array, of_wire=rate_hz is None)
     live: dict[str, Any] = {
         "port": port,
         "host": host,

@@ -4,39 +4,24 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
-from time import perf_counter
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
-from taxel._base.messages import warn
+from taxel._base.messages import collected
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import (
-    READ_HELP,
-    SET_HELP,
-    TARE_HELP,
-    assignments,
-    labelled_trials,
-    progress,
-    references,
-    tare_before,
-    tare_if_any,
-    tare_of,
-    try_report,
-)
+from taxel.cli._recordings import READ_HELP, SET_HELP, TARE_HELP, assignments, progress, say_warnings, try_report
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
-    from taxel.cli._trained import Result
-    from taxel.detect import Example, Judged, Outcome, PlainScore, Readout, Recipe
+    from taxel.detect import PlainScore
     from taxel.recording import Recording
-    from taxel.tare import Tare
+    from taxel.tasks import Training
 
 __all__ = ["app", "train"]
 
@@ -112,57 +97,58 @@ def train(
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
     from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import recipes  # noqa: PLC0415
-    from taxel.detect.floors import measured_floor  # noqa: PLC0415
-    from taxel.recorded import recorded  # noqa: PLC0415
+    from taxel.tasks import TrainOptions  # noqa: PLC0415
+    from taxel.tasks import train as train_on  # noqa: PLC0415
 
     try_whole(out, overwrite=overwrite)
     if report is not None:
         try_report(report)
-    if folds == 1:
-        raise ProblemError("--folds 1: must be 2 or more, or 0 for none")
     changes = assignments(values or []) | {
         key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
     }
-    _planned(recipe, changes)  # reports errors of the recipe before the recordings are read
+    options = TrainOptions(recipe, changes, tare, folds, search, window_ms)
     with progress(as_json) as update:
-        update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3))
-        opened = labelled_trials(labels, files.all(recordings))
-        labelled = references(labels, "--labels", opened)
-        if not any(labelled):
-            table = "; give --labels FILE, a table label,t_us" if labels == "notes" else ""
-            raise ProblemError(f"--labels {labels}: names no event in {', '.join(one.title for one in opened)}{table}")
-        names = sorted({label for events in labelled for label in events})
-        _try_rules(rule, names, overwrite=overwrite)
-        if recipe is None and "encoder.name" not in changes:
-            recipe, why = recipes.chosen(recorded(opened[0]), names)
-            update(f"recipe {recipe}, chosen for {why}")
-        plan = _planned(recipe, changes, names)
-        assert plan is not None
-        if search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
-            raise ProblemError("--search: the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
-        examples = _examples(opened, labelled, tare, plan)
-        plan = _planned(recipe, changes, names, measured_floor(examples))
-        assert plan is not None
-        result, outcomes = _Training(opened, examples, search, window_ms, update).result(plan, folds)
-    result.made.readout.save(out, overwrite=overwrite)
-    result = replace(result, rules=_write_rules(result.scored.plain, rule, overwrite=overwrite))
+        update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3), 0, 0)
+        opened = files.opener.all(recordings)
+        _try_rules(rule, labels, opened, overwrite=overwrite)
+        training = train_on(opened, labels, options, progress=update)
+        training.readout.save(out, overwrite=overwrite)
+        rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     if report is not None:
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
-        title, held_out = f"Training of {out}", () if result.why else result.scored.scores
-        more: dict[str, Any] = {"held_out": held_out, "alignments": result.made.alignments, "scored": result.scored}
-        write_listening(report, result.made.readout, outcomes, title=title, judged=result.how, **more)
-    taken = _taken(examples) if tare is None else []
-    page = result.page(out, recipe, report, _tares(taken), _tare_again(taken) if tare is None else tare)
-    say(*([json.dumps(result.to_dict(out, recipe, report))] if as_json else page))
+        write_listening(
+            report,
+            training.readout,
+            training.outcomes,
+            title=f"Training of {out}",
+            judged=training.how,
+            held_out=training.scored.scores if training.held_out else (),
+            alignments=training.made.alignments,
+            scored=training.scored,
+        )
+    say_warnings(training.warned)
+    if as_json:
+        written: dict[str, Any] = {"rules": {str(path): each for path, each in rules.items()}} if rules else {}
+        written |= {} if report is None else {"report": str(report / "report.html")}
+        say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
+        return
+    lines = [*training.lines(), "", f"written to {out}; next: {_next(training, out, tare)}"]
+    lines += [f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()]
+    lines += [] if report is None else [f"report: {report / 'report.html'}"]
+    say(*lines, *(f"warning: {one}" for one in training.unreliable()))
 
 
-def _try_rules(place: Path | None, labels: Sequence[str], *, overwrite: bool) -> None:
+def _try_rules(place: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:
     """Check that plain rules can be written, before the work whose result they hold."""
     from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel.tasks.labels import references  # noqa: PLC0415
 
-    for one in () if place is None else (place, *(_of_label(place, label) for label in labels)):
+    if place is None:
+        return
+    with collected():  # the training warns of the same
+        names = {label for events in references(labels, recordings) for label in events}
+    for one in (place, *(_of_label(place, label) for label in sorted(names))):
         try_whole(one, overwrite=overwrite)
 
 
@@ -185,175 +171,19 @@ def _of_label(place: Path, label: str) -> Path:
     return place.parent / f"{place.stem}.{re.sub('[^A-Za-z0-9_-]', '_', label)}{place.suffix}"
 
 
-def _taken(examples: Sequence[Example]) -> list[tuple[int, int, int]]:
-    """Return from when to when each recording's tare was taken, and how long it lasts, us.
-
-    Of those whose rest is 0 by their unit nothing.
-    """
-    from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
-    from taxel.recording.rest import BY_UNIT  # noqa: PLC0415
-    from taxel.spikes import SpikeTrains  # noqa: PLC0415
-
-    spans = []
-    for one in examples:
-        source = recorded(one.source)
-        if one.tare is not None and one.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
-            first = int(source.t[0])
-            spans.append((one.tare.start_us - first, one.tare.stop_us - first, int(source.t[-1]) - first))
-    return spans
+def _next(training: Training, out: Path, tare: str | None) -> str:
+    """Return the command that detects by a readout, with the --tare, if any, of the training."""
+    again = tare or ("" if _are_quiet(training.recordings) else training.beginning())
+    option = f" --tare {quote(again)}" if again and training.readout._needs_tare else ""
+    return f"taxel detect RECORDING --readout {quote(str(out))}{option}"
 
 
-def _tares(spans: Sequence[tuple[int, int, int]]) -> str:
-    """Return the line of which tares were taken from the recordings."""
-    from taxel.spikes import to_ms  # noqa: PLC0415  the command line starts quickly
+def _are_quiet(recordings: Sequence[Recording]) -> bool:
+    """Return whether a detection finds the rest of each recording by itself."""
+    from taxel.tasks import rest  # noqa: PLC0415  the command line starts quickly
 
-    lengths = [to_ms(end - begin) for begin, end, _ in spans]
-    said = f"of each of {len(spans)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long" if spans else ""
-    if len(spans) == 1:
-        said = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, spans[0][:2]))
-    return f"tare: {said}; --tare gives another" if said else ""
-
-
-def _tare_again(spans: Sequence[tuple[int, int, int]]) -> str:
-    """Return the --tare of the seconds that each recording begins with at rest; "" where none needs one."""
-    if not spans or any(begin > 0 for begin, *_ in spans):
-        return "SECONDS" if spans else ""
-    # More than half of a recording is refused.
-    return f"{min(min(end, lasts // 2) for _, end, lasts in spans) / 1e6:g}"
-
-
-def _planned(
-    recipe: str | None,
-    changes: Mapping[str, Any],
-    labels: Sequence[str] | None = None,
-    noise_floor: float | None = None,
-) -> Recipe | None:
-    """Return the recipe that is named, or that of the encoder that is; None of neither."""
-    from taxel.detect import Recipe  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect.recipe import changed, with_floor  # noqa: PLC0415
-
-    if recipe is None and "encoder.name" in changes:
-        values = changed({}, changes)
-        return Recipe.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
-    return None if recipe is None else Recipe.load(recipe, changes, labels, noise_floor)
-
-
-def _examples(
-    opened: Sequence[Recording], labelled: Sequence[Mapping[str, Any]], tare: str | None, plan: Recipe
-) -> list[Example]:
-    """Return recordings as examples; if no tare is given, it is taken from each recording.
-
-    Where the encoder needs none, only plain rules use it, and a recording from which it cannot be taken has none.
-    """
-    from taxel.detect import Example  # noqa: PLC0415
-
-    rests = [part.tare for part in plan.encoder._each() if hasattr(part, "tare")]
-    if tare is not None or any(rest is not None for rest in rests):
-        rest: Callable[..., Tare | None] = lambda _, one: tare_of(tare, one)  # noqa: E731
-    else:
-        rest = tare_before if rests else tare_if_any
-    return [
-        Example(one, events, rest(events, one), one.title.removesuffix(one.label), one.title)
-        for one, events in zip(opened, labelled, strict=True)
-    ]
-
-
-@dataclass(frozen=True)
-class _Training:
-    """Hold the labelled recordings of a training, and how it is scored."""
-
-    opened: Sequence[Recording]
-    examples: Sequence[Example]
-    search: bool
-    window_ms: float
-    update: Callable[[str], None]
-
-    def result(self, plan: Recipe, folds: int | None) -> tuple[Result, list[Outcome]]:
-        """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
-
-        Say first where values fall from their rest. An error says that too, or by how much labels are off.
-        """
-        from taxel.detect.advice import fallen  # noqa: PLC0415  the command line starts quickly
-        from taxel.detect.examples import checked  # noqa: PLC0415
-        from taxel.detect.label_times import off_by  # noqa: PLC0415
-        from taxel.detect.plain_score import floor_of  # noqa: PLC0415
-        from taxel.detect.training import UNFELT  # noqa: PLC0415
-
-        if fall := fallen(self.examples):
-            warn(fall, stacklevel=2)
-        try:
-            return self._result(plan, folds)
-        except ProblemError as error:
-            if fall and str(error).endswith(UNFELT):
-                raise ProblemError(f"{str(error).removesuffix(UNFELT)}: {fall}") from None
-            names = sorted({label for one in self.examples for label in one.labels})
-            off = off_by(checked(self.examples), names, floor_of(plan.encoder))
-            said = (f"{label}: {one}" for label, one in off.items())
-            raise ProblemError("; ".join([str(error), *said])) from None
-
-    def _result(self, plan: Recipe, folds: int | None) -> tuple[Result, list[Outcome]]:
-        from taxel.cli._trained import Result  # noqa: PLC0415  the command line starts quickly
-        from taxel.detect import choose, judge  # noqa: PLC0415
-        from taxel.detect.advice import advised  # noqa: PLC0415
-        from taxel.detect.folds import INNER, count_of_folds  # noqa: PLC0415
-        from taxel.detect.training import trained  # noqa: PLC0415
-
-        count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "--folds 0")
-        scored = None
-        if count:
-            registers = self.opened[0].registers
-            frame_us = None if registers is None else registers.frame_us
-            how: dict[str, Any] = {"search": self.search, "window_ms": self.window_ms, "frame_us": frame_us}
-            try:
-                scored = judge(self.examples, plan, count, **how, progress=self.update)
-            except ProblemError as error:
-                # These folds are the default, not a request, and all of the data may still be learnt from.
-                if folds is not None:
-                    raise
-                count, why = 0, f"a part of the training data cannot be learnt from: {error}"
-        if self.search:
-            plan = choose(self.examples, plan, window_ms=self.window_ms, progress=self.update)
-        begun = perf_counter()
-        made = trained(self.examples, plan, self.update)
-        outcomes = self._outcomes(made.readout)
-        a_point_s = None if self.search else (perf_counter() - begun) * INNER * (count + 1)
-        own = _own(outcomes, self.window_ms)
-        if scored is None:
-            own = replace(own, plain=self._plain_score(plan, [one.example.labels for one in outcomes]))
-        scored = own if scored is None else scored
-        advice = advised(made, self.examples, scored.together, own.together, a_point_s, scored.plain)
-        return Result(self.opened, made, scored, why, advice, self.window_ms, self.search), outcomes
-
-    def _plain_score(self, plan: Recipe, truths: Sequence[Mapping[str, Any]]) -> PlainScore:
-        """Return how plain rules do on the recordings that they were tuned on."""
-        from taxel.detect.examples import checked  # noqa: PLC0415
-        from taxel.detect.loads import clock_of  # noqa: PLC0415
-        from taxel.detect.plain_score import floor_of, plain_score  # noqa: PLC0415
-
-        clocks = [clock_of(one) for one in self.examples]
-        rest = checked(self.examples), list(truths[0]), clocks, floor_of(plan.encoder)
-        return plain_score(*rest, [], truths, self.window_ms, self.update)
-
-    def _outcomes(self, readout: Readout) -> list[Outcome]:
-        """Return the outcomes of the readout on the recordings that it was trained on."""
-        from taxel.detect import Example, Outcome, score  # noqa: PLC0415  the command line starts quickly
-        from taxel.detect.readout import run_counting  # noqa: PLC0415
-
-        outcomes = []
-        for one, example in zip(self.opened, self.examples, strict=True):
-            self.update(f"scoring on {one.title}")
-            truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
-            detections, outside = run_counting(readout, one, tare=example.tare)
-            own = score(detections, truth, self.window_ms)
-            outcomes.append(Outcome(one.title, Example(one, truth, example.tare), detections, own, outside))
-        return outcomes
-
-
-def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
-    """Return the scores of a readout on its own training data."""
-    from taxel.detect import Judged  # noqa: PLC0415
-    from taxel.detect.scoring import score_together  # noqa: PLC0415
-
-    truths = [one.example.labels for one in outcomes]
-    together = score_together([one.found for one in outcomes], truths, window_ms)
-    return Judged(tuple(one.score for one in outcomes if one.score is not None), together, "its own training data")
+    try:
+        with collected():
+            return all(rest(one) for one in recordings)
+    except ProblemError:
+        return False

@@ -91,9 +91,7 @@ def view(
                 host=panel_host,
                 port=panel_port,
                 opens=reading,
-                layout=files.layout,
-                options=files.words(),
-                rate_hz=files.rate_hz,
+                options=files.opener,
             )
         )
         external = viewers(shown, panel, to or (), spikes, 1.0 if speed is None else speed)
@@ -125,13 +123,13 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         return None
     first = every[0]
     bag = is_bag(first)
-    if bag and not files.names_topic(first):
+    if bag and not files.opener._names_topic(first):
         raise ProblemError(*listed(first, topics(first, files.types, files.ros), as_json=False))
-    if not files.words() and calibration is None and not bag:
+    if not files.opener.words() and calibration is None and not bag:
         return None
 
     def opens(file: Path) -> list[Recording]:
-        opened = files.joined(file)
+        opened = files.opener.joined(file)
         if calibration is None:
             return opened
         return [Recording(calibrated_by(one._contents, calibration)) for one in opened]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel.demo.script import TRAINING_SEED, left_to_rest, script
-from taxel.detect import Example, Readout, Recipe, train
+from taxel.detect import Example, Readout, Recipe, fit
 from taxel.encode import ContactArea
 from taxel.simulate import Contact, Scene, play, truth
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -39,7 +39,7 @@ def trained(
     with warnings.catch_warnings():
         # The base of the foam loses the ball long before a slow lift ends: such targets are out of reach.
         warnings.filterwarnings("ignore", ".* out of reach")
-        return train(labelled, recipe(), progress=progress)
+        return fit(labelled, recipe(), progress=progress)
 
 
 def examples(

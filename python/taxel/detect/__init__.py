@@ -10,7 +10,7 @@ from taxel.detect.readout import Learner, Readout, load, run
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron
-from taxel.detect.training import Trained, train
+from taxel.detect.training import Trained, fit
 from taxel.detect.tuning import tune
 
 __all__ = [
@@ -31,10 +31,10 @@ __all__ = [
     "Trained",
     "TrainedNeuron",
     "choose",
+    "fit",
     "judge",
     "load",
     "run",
     "score",
-    "train",
     "tune",
 ]

@@ -41,6 +41,11 @@ class _Detector(Saved):
 
     @property
     @abstractmethod
+    def _needs_tare(self) -> bool:
+        """Whether it reads no recording without a tare."""
+
+    @property
+    @abstractmethod
     def labels(self) -> tuple[str, ...]:
         """The labels that it detects."""
 

@@ -45,7 +45,7 @@ class Example(NamedTuple):
 
     Raises
     ------
-    ProblemError : values that are invalid, when `train`, `judge` or `choose` gets it
+    ProblemError : values that are invalid, when `fit`, `judge` or `choose` gets it
 
     Examples
     --------

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import callback, finite, flag, instance, several, shown, whole, window
-from taxel._base.messages import counted, warn
+from taxel._base.messages import collected, counted, warn
 from taxel._core import ProblemError
 from taxel.detect.ages import in_pictures
 from taxel.detect.examples import Example, array_of, checked, unit_of
@@ -358,7 +357,7 @@ def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Rea
 
 def _quiet() -> Any:
     """Return a context without warnings of readouts that are only scored: their scores show what they miss."""
-    return warnings.catch_warnings(action="ignore", category=UserWarning)
+    return collected()
 
 
 def _detected(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:

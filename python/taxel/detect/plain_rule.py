@@ -160,6 +160,10 @@ class PlainRule(_Detector):
         return None if tare is None else Tare.from_json(json.dumps(tare))
 
     @property
+    def _needs_tare(self) -> bool:
+        return self.tare is None
+
+    @property
     def array(self) -> Array | None:
         """The sensor of its own tare, or None where any will do."""
         tare = self.tare

@@ -219,6 +219,10 @@ class Readout(_Detector):
         return (inputs if received is None else inputs.select(received)).delayed(self.delays_ms)
 
     @property
+    def _needs_tare(self) -> bool:
+        return any(part.tare is None for part in self.encoder._each() if hasattr(part, "tare"))
+
+    @property
     def labels(self) -> tuple[str, ...]:
         """The labels that it detects."""
         return tuple(self._parts["neurons"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, instance, parameters, shown
-from taxel._base.messages import counted, warn
+from taxel._base.messages import collected, counted, warn
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -33,7 +32,7 @@ from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
-__all__ = ["Trained", "train"]
+__all__ = ["Trained", "fit"]
 
 
 #: Parameters of a learner that its rows do not depend on. Bounds could be among them, but that those of a train without
@@ -84,7 +83,7 @@ class Trained(NamedTuple):
     alignments: Mapping[str, Alignment]
 
 
-def train(
+def fit(
     examples: Sequence[Example],
     recipe: Recipe,
     *,
@@ -123,14 +122,14 @@ def train(
     >>> from taxel.encode import LevelCrossing
     >>> frames = Frames([[[v]] for v in (0.0, 0.0, 9.0, 9.0, 0.0, 0.0)], range(0, 60_000, 10_000), unit="N")
     >>> recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
-    >>> train([Example(frames, {"contact": [20_000]})], recipe)
+    >>> fit([Example(frames, {"contact": [20_000]})], recipe)
     Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
     """
     return trained(examples, recipe, progress).readout
 
 
 def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str], object] | None) -> Trained:
-    """Train a readout as `train` does, and return how its labels were aligned as well."""
+    """Train a readout as `fit` does, and return how its labels were aligned as well."""
     sound, clocks = checked(examples), [clock_of(one) for one in examples]
     report = (lambda _: None) if progress is None else callback("progress", progress)
     recipe = in_pictures(instance("recipe", recipe, Recipe), sound, clocks)
@@ -220,7 +219,7 @@ def readout_of(
 
 
 def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
-    """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
+    """Fit the learner of each of a recipe's labels on encoded examples; see `fit`."""
     learners, delays, alignments, ranges = {}, {}, {}, {}
     points = dict(recipe.neurons)
     for label in _labels_to_learn(examples.patterns, recipe):
@@ -240,7 +239,7 @@ class _Fit(NamedTuple):
     fitting: Fitting
     learner: ConeR
     point: Mapping[str, Any]
-    caught: list[warnings.WarningMessage]
+    caught: list[str]
 
 
 def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, report: Callable[[str], object]) -> _Fit:
@@ -285,7 +284,7 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
         assert refused is not None
         raise refused
     for one in best.caught:
-        warn(str(one.message), stacklevel=5)
+        warn(one, stacklevel=5)
     return best
 
 
@@ -302,8 +301,7 @@ def _fitted(
     count: bool,
 ) -> _Fit:
     """Fit the point that a recipe has of a label's neuron; `count` what it leaves missed and false."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with collected() as caught:
         fitting = Fitting(patterns, plan, label, array, report, place, known)
         learner = fitting.fit(plan)
     return _Fit(fitting.wrong(learner, plan.run_threshold) if count else 0, fitting, learner, point, caught)
@@ -462,8 +460,7 @@ class Fitting:
     def fit(self, recipe: Recipe) -> ConeR:
         """Fit the learner that a recipe describes, beginning at the fit before, if any; warnings name events."""
         cone, _ = recipe.learner_of(self._label)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with collected() as caught:
             self._before = self._rows.fit(
                 cone,
                 start=self._before,
@@ -528,7 +525,7 @@ def _remarks(
     names: Sequence[str],
     shift_ms: float,
     begins_ms: Sequence[float],
-    caught: Sequence[warnings.WarningMessage],
+    caught: Sequence[str],
 ) -> Iterator[str]:
     """Yield the warnings of a fit, which name events and examples."""
     missed, count = cone.unreachable_, sum(map(len, targets))
@@ -553,7 +550,7 @@ def _remarks(
                 "recipe's points (taxel train --search) may reach them"
             )
     # The learner names unreachable targets, if any, first.
-    yield from (str(one.message) for one in caught[bool(missed) :])
+    yield from caught[bool(missed) :]
 
 
 def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:

@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from taxel.labels import Labels, beside
 from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.health import health
+from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import is_recording, open_joined
 from taxel.recording.rest import flickering, loaded_from, of_pictures, ticks_by_unit
 
@@ -52,19 +53,14 @@ class Opening:
         Opens a file, with the feet of each trial joined.
     file : path, optional
         The file that is opened so; default: each file.
-    options : sequence of str
-        The options of ``taxel train`` that open it so.
-    rate_hz : float, optional
-        By which numbered pictures have times; their labels are in numbers of pictures.
-    layout : path, optional
-        The layout file by which it opens tables and arrays of other programs; default: the one beside each.
+    options : OpenOptions
+        Those by which it is opened so. Labels of numbered pictures that have times by its `rate_hz` are in numbers of
+        pictures.
     """
 
     opens: Callable[[Path], Sequence[Recording]] = open_joined
     file: Path | None = None
-    options: Sequence[str] = ()
-    rate_hz: float | None = None
-    layout: str | os.PathLike[str] | None = None
+    options: OpenOptions = field(default_factory=OpenOptions)
 
     def open(self, file: Path) -> Sequence[Recording]:
         """Open a file."""
@@ -72,16 +68,17 @@ class Opening:
 
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""
-        return is_recording(file, self.layout if self.file in (None, file) else None)
+        return is_recording(file, self.options_of(file).layout)
 
-    def options_of(self, file: Path) -> Sequence[str]:
-        """Return the options of ``taxel train`` for a file."""
-        return self.options if self.file in (None, file) else ()
+    def options_of(self, file: Path) -> OpenOptions:
+        """Return the options by which a file is opened."""
+        return self.options if self.file in (None, file) else OpenOptions()
 
     def unit_us(self, table: Path) -> float:
         """Return how many us a unit of time in a table of labels is."""
-        applies = self.rate_hz is not None and (self.file is None or beside(self.file) == table)
-        return 1e6 / self.rate_hz if applies and self.rate_hz else 1.0
+        rate_hz = self.options.rate_hz
+        applies = self.file is None or beside(self.file) == table
+        return 1e6 / rate_hz if applies and rate_hz else 1.0
 
 
 class ShownFiles:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import threading
 from collections.abc import Callable, Sequence
@@ -10,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 
 from taxel import _core
-from taxel._base.arguments import callback, flag, several, text, whole
+from taxel._base.arguments import callback, flag, instance, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.detect import load
@@ -22,7 +21,8 @@ from taxel.live._requests.board import BoardRequests
 from taxel.live._shown_files import Opening
 from taxel.live.live import Live
 from taxel.recording import Recording
-from taxel.recording.opening import check_recording, open_joined, recordings_in
+from taxel.recording.open_options import OpenOptions
+from taxel.recording.opening import check_recording, recordings_in
 from taxel.recording.pictures import period_us
 from taxel.tare import Tare
 
@@ -50,15 +50,11 @@ class Panel:
         The address of this machine to listen on. On any but loopback every user with the token of the panel's address
         can see the board and set registers, over a connection that is not encrypted.
     opens : function of a path, optional
-        Opens the recording that is shown first, or of a folder each of its files, and returns its trials; default:
-        `taxel.open`.
-    layout : path, optional
-        The layout file for tables and arrays of other programs, as of `taxel.open`, which `opens` must then heed too;
-        default: the one beside each.
-    options : sequence of str
-        The options of ``taxel train`` with which it opens a file as `opens` does, so that the page can train on it.
-    rate_hz : float, optional
-        By which `opens` gives times to pictures without any; their labels are saved in numbers of pictures.
+        Opens the recording that is shown first, or of a folder each of its files, and returns its trials, and must heed
+        `options`; default: `OpenOptions.joined`.
+    options : taxel.recording.open_options.OpenOptions, optional
+        What the files do not hold themselves; the page trains on a file by them too. Labels of pictures that have times
+        by its `rate_hz` are saved in numbers of pictures.
 
     Raises
     ------
@@ -81,30 +77,25 @@ class Panel:
         port: int = 0,
         host: str = "127.0.0.1",
         opens: Callable[[Path], Sequence[Recording]] | None = None,
-        layout: str | os.PathLike[str] | None = None,
-        options: Sequence[str] = (),
-        rate_hz: float | None = None,
+        options: OpenOptions | None = None,
     ) -> None:
         # Locked while one `Live` replaces another.
         self._restarting = threading.Lock()
         self._live = shows if isinstance(shows, Live) else None
         opened, shown = None, None
+        how = OpenOptions() if options is None else instance("options", options, OpenOptions)
         if self._live is None:
             place = Path(checked_path("shows", shows))
             if control is not None:
                 raise ProblemError("control: a recording has no board; give a taxel.live.Live")
             if folder is not None:
                 raise ProblemError("folder: is the recording's own")
-            if layout is not None:
-                layout = checked_path("layout", layout)
-            folder, opened = _shown(place, layout)
-            if layout is not None and opens is None:
-                opens, options = functools.partial(open_joined, layout=layout), ["--layout", layout, *options]
+            folder, opened = _shown(place, how.layout)
+            opens = how.joined if opens is None and how.given() else opens
             shown = None if place.is_dir() and not is_bag(place) else folder / opened
-        given = [text("options", option) for option in several("options", options)]
-        if rate_hz is not None:
-            period_us("rate_hz", rate_hz)
-        opening = Opening() if opens is None else Opening(callback("opens", opens), shown, given, rate_hz, layout)
+        if how.rate_hz is not None:
+            period_us("rate_hz", how.rate_hz)
+        opening = Opening() if opens is None else Opening(callback("opens", opens), shown, how)
         cable = None if control is None else Cable(text("control", control))
         board = BoardRequests(self.listen, self.delta_intensity, self.read_out, cable)
         self._requests = Requests(opening, board)

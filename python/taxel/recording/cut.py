@@ -17,7 +17,7 @@ from taxel.recording.contents import Contents, applied
 from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 
-__all__ = ["cut", "region"]
+__all__ = ["cut", "region", "span_us"]
 
 
 def cut(
@@ -155,3 +155,11 @@ def _cropped(
     held: NDArray[np.uint16] | None, top: int, bottom: int, left: int, right: int
 ) -> NDArray[np.uint16] | None:
     return None if held is None else np.ascontiguousarray(held[top:bottom, left:right])
+
+
+def span_us(recording: Recording) -> tuple[int, int]:
+    """Return the first and the last time of a recording; refuse an empty one."""
+    times = recording.events.t if recording.has_events else recording.frames().t
+    if not len(times):
+        raise ProblemError(f"{recording.path}: holds nothing")
+    return int(times.min()), int(times.max())

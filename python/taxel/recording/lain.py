@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -11,7 +12,7 @@ from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, of_quiet
 from taxel.tare import Tare
 
-__all__ = ["without_what_lay"]
+__all__ = ["free_of_what_lay", "without_what_lay"]
 
 #: A tare lasts so long at least, us, and so many pictures.
 _LEAST_US, _LEAST_PICTURES = 10_000, 20
@@ -34,14 +35,40 @@ def without_what_lay(recording: Recording, first_us: int) -> tuple[Tare | None, 
     return tare, f"{said}, so the tare is of a time without it"
 
 
-def _without(pictures: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:
-    """Return the longest time before the first label without what lay on the array, else a later quiet one, us."""
+def free_of_what_lay(recording: Recording, rest: Rest) -> tuple[tuple[int, int] | None, str]:
+    """Return a quiet stretch, us, without what lay on the array in that of a rest, and the line that says so.
+
+    Without one it is that of the rest.
+    """
+    source = recorded(recording)
+    read = (source,) if isinstance(source, Frames) else readings(recording)
+    assert read is not None  # a rest is of values
+    free, said = _free(read[0], rest), f"{recording.path}: the rest is {rest}"
+    span = _later(read[0], free) if len(free) else None
+    if span is None:
+        return rest.quiet_us, f"{said}, and there is no other rest, so the tare holds it; give --tare FILE"
+    return span, f"{said}, so the tare is of a time without it"
+
+
+def _free(pictures: Frames, rest: Rest) -> NDArray[np.int64]:
+    """Return the numbers of the pictures without what lay on the array in the quiet stretch of a rest."""
     assert rest.quiet_us is not None
     assert rest.lay is not None
     on = rest.lay > 0
     values = pictures.values.reshape(len(pictures), -1)[:, on]
     lain = values[slice(*np.searchsorted(pictures.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
-    free = np.flatnonzero((values < lain - rest.lay[on] / 2).all(axis=1))
+    return np.flatnonzero((values < lain - rest.lay[on] / 2).all(axis=1))
+
+
+def _later(pictures: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:
+    """Return the first quiet stretch from the first of these pictures on, us, unless something lies on the array."""
+    later = of_quiet(pictures.between(pictures.t[free[0]], np.inf))
+    return None if later.on else later.quiet_us
+
+
+def _without(pictures: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:
+    """Return the longest time before the first label without what lay on the array, else a later quiet one, us."""
+    free = _free(pictures, rest)
     if not len(free):
         return None
     runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
@@ -50,5 +77,4 @@ def _without(pictures: Frames, rest: Rest, first_us: int) -> tuple[int, int] | N
     count = np.count_nonzero((pictures.t >= begin) & (pictures.t < end))
     if end - begin >= _LEAST_US and count >= _LEAST_PICTURES:
         return begin, end
-    later = of_quiet(pictures.between(pictures.t[free[0]], np.inf))
-    return None if later.on else later.quiet_us
+    return _later(pictures, free)

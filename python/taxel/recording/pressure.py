@@ -33,7 +33,7 @@ from taxel.recording.rest import (
 )
 from taxel.tare import Tare
 
-__all__ = ["Series", "above_rest", "above_rest_at", "readings", "series"]
+__all__ = ["Series", "above_rest", "above_rest_at", "quiet_rest", "readings", "series"]
 
 #: The most pictures of a long recording, as a plot resolves no more points.
 MOST_PICTURES = 2000
@@ -480,6 +480,15 @@ def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Re
     The rest is as of `above_rest`, but that of a quiet stretch as it was there.
     """
     return _read(recording, tare)
+
+
+def quiet_rest(recording: Recording) -> Rest | None:
+    """Return the rest that a quiet stretch of a board's events shows, on their held values; None without intensities.
+
+    Its values are those of the taxels with events.
+    """
+    present = recording.events.present
+    return None if present is None or not present.any() else _Drawn.of(recording).found()
 
 
 def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float] | None:

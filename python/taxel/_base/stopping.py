@@ -1,4 +1,4 @@
-"""How a command is stopped: by Ctrl-C, by SIGTERM (a service that ends) and by SIGHUP (a terminal that closes)."""
+"""How a command or a task is stopped: by Ctrl-C, SIGTERM (a service that ends) and SIGHUP (a terminal that closes)."""
 
 from __future__ import annotations
 

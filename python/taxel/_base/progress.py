@@ -1,0 +1,60 @@
+"""The progress of a task: what its callback gets, and about how long all takes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from time import perf_counter
+from typing import TypeAlias
+
+from taxel._base.arguments import callback
+
+__all__ = ["Progress", "Steps", "lines_to"]
+
+#: Called with what is done next, how much of it is done, and all of it (0 if that is not known).
+Progress: TypeAlias = Callable[[str, int, int], object]
+
+
+#: The line of `taxel.detect.judge` before a fold.
+_FOLD = re.compile(r"fold (\d+) of (\d+)")
+
+
+def lines_to(progress: Progress | None) -> Callable[[str], object]:
+    """Return what the steps of `taxel.detect` call with their line; folds are counted."""
+    if progress is None:
+        return lambda _: None
+    show = callback("progress", progress)
+
+    def line(step: str) -> None:
+        fold = _FOLD.fullmatch(step)
+        show(step, int(fold[1]) - 1 if fold else 0, int(fold[2]) if fold else 0)
+
+    return line
+
+
+class Steps:
+    """Holds the current step of a task, and about how long all of them take by the folds that are done."""
+
+    def __init__(self) -> None:
+        self._begun = perf_counter()
+        self._step = "starting"
+        self._fold: tuple[int, int, float] | None = None
+        self._first_fold_s = 0.0
+
+    def update(self, step: str, done: int = 0, of: int = 0) -> None:
+        """Take the next step, as `Progress` does."""
+        self._step = step
+        if of:
+            after_s = perf_counter() - self._begun
+            self._first_fold_s = after_s if self._fold is None else self._first_fold_s
+            self._fold = done + 1, of, after_s
+
+    def __str__(self) -> str:
+        """Return the step, how long it is since the beginning, and about how long all take once that is known."""
+        after_s, all_s = perf_counter() - self._begun, 0.0
+        if self._fold is not None and self._fold[0] > 1:
+            number, count, at_s = self._fold
+            # The training on all data and the plain rules take as long as two more folds.
+            all_s = self._first_fold_s + (at_s - self._first_fold_s) / (number - 1) * (count + 2)
+        expected = f"; about {all_s:.0f} s in all" if all_s > after_s else ""
+        return f"{self._step}, after {after_s:.0f} s{expected}"

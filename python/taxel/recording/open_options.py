@@ -1,0 +1,167 @@
+"""The options that say of files what they do not hold themselves, and the opening."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from taxel._base.arguments import instance, several, text
+from taxel._base.arguments import path as checked_path
+from taxel._core import ProblemError
+from taxel.array import Array, of_size
+from taxel.formats.layout import Layout
+from taxel.recording import Recording, open_all
+from taxel.recording.contents import Contents
+from taxel.recording.layout import on_array
+from taxel.recording.opening import joined, sensors
+from taxel.recording.read_foreign import is_lone_array
+
+__all__ = ["OpenOptions", "sensors_of"]
+
+
+@dataclass(frozen=True)
+class OpenOptions:
+    """Hold what says of files what they do not hold themselves; each command that reads files has these options.
+
+    Parameters
+    ----------
+    array : sequence of str, optional
+        Rows, columns and pitch (mm) of the sensor, as "24x20x5"; of a ROS bag one for each topic, or one for all.
+    layout : path, optional
+        The layout file; default: that beside the file.
+    topic, field : sequence of str, optional
+        The topics of a ROS bag that are opened, and their fields.
+    types : path, optional
+        A folder of .msg or .idl files, for a ROS bag that lacks definitions.
+    ros : str, optional
+        The release of ROS whose messages a bag holds undefined, as "humble".
+    rate_hz : float, Hz, optional
+        Pictures a second, for recordings without times.
+    limit : int, bytes, optional
+        How much of a recording may be read into memory.
+    """
+
+    array: Sequence[str] | None = None
+    layout: str | os.PathLike[str] | None = None
+    topic: Sequence[str] | None = None
+    field: Sequence[str] | None = None
+    types: str | os.PathLike[str] | None = None
+    ros: str | None = None
+    rate_hz: float | None = None
+    limit: int | None = None
+
+    def open(self, path: str | os.PathLike[str]) -> list[Recording]:
+        """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
+
+        Raises
+        ------
+        ProblemError : an `array` that differs from the sensor that a file holds; a `rate_hz` of one with times
+        """
+        place = Path(checked_path("path", path))
+        given = [] if self.array is None else several("array", self.array)
+        arrays = [of_size(text("array", size), of_wire=False) for size in given]
+        opened = open_all(
+            place,
+            array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
+            layout=self.layout or self._instead_of_layout(place),
+            topic=self.topic,
+            field=self.field,
+            types=self.types,
+            ros=self.ros,
+            limit=self.limit,
+        )
+        return [self._timed(self._on_array(one)) for one in opened]
+
+    def given(self) -> dict[str, Any]:
+        """Return the options that differ from their defaults, as JSON holds them."""
+        given = ((one.name, getattr(self, one.name)) for one in fields(self))
+        return {name: str(one) if isinstance(one, Path) else one for name, one in given if one not in (None, [], ())}
+
+    def words(self) -> list[str]:
+        """Return the options as words of a command line."""
+        words: list[str] = []
+        for name, value in self.given().items():
+            for each in value if isinstance(value, list | tuple) else [value]:
+                words += [f"--{name.replace('_', '-')}", str(each)]
+        return words
+
+    def _names_topic(self, bag: Path) -> bool:
+        """Return whether these options, or the layout file of a ROS bag, say which topic to open."""
+        place = self.layout or Layout.beside(bag)
+        return bool(self.topic) or (place is not None and "topic" in Layout.read(Path(place)).ros)
+
+    def _instead_of_layout(self, path: Path) -> Any:
+        """Return an empty layout for an array without one, whose rate `rate_hz` says; else None."""
+        if self.rate_hz is None:
+            return None
+        return Layout(path) if Layout.beside(path) is None and is_lone_array(path) else None
+
+    def _on_array(self, recording: Recording) -> Recording:
+        """Return a recording on the sensor of `array`; refuse one that holds a sensor that differs from it."""
+        # A bag holds no sensor, so that its messages are of the given one or are left out.
+        if not self.array or recording.kind == "ros":
+            return recording
+        own, given = recording.array, of_size(self.array[0], of_wire=False)
+        if _is_row_of(recording, given):
+            return _laid_on(recording, given)
+        differs = given.pitch_mm is not None and (own.pitch_mm, own.places) != (given.pitch_mm, None)
+        if own.shape != given.shape or differs:
+            sizes = ", ".join(self.array)
+            raise ProblemError(f"--array {sizes}: {recording.path} holds its own sensor, {own!r}; leave it out")
+        # A .mcap holds its sensor, whose pitch may be unknown.
+        if not recording.has_events or own._is_measured or recording.kind == "mcap":
+            return recording
+        # A size without a pitch says nothing of it, and events without one are of the board's wire.
+        wire = of_size(self.array[0])
+        return _laid_on(recording, Array(*own.shape, wire.pitch_mm, own.exists, wire.name))
+
+    def joined(self, path: str | os.PathLike[str]) -> list[Recording]:
+        """Open a file or a folder, with the feet of each trial joined as its sources."""
+        return joined(self.open(path))
+
+    def all(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
+        """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
+
+        Each sensor of a file with several is a recording of its own (`Recording.title`).
+        """
+        return [one for path in several("paths", paths) for each in self.open(path) for one in sensors(each)]
+
+    def _timed(self, recording: Recording) -> Recording:
+        return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
+
+    def one(self, path: str | os.PathLike[str]) -> Recording:
+        """Open a file that holds one recording, with its feet joined.
+
+        Raises
+        ------
+        ProblemError : it holds several
+        """
+        every = self.joined(path)
+        if len(every) != 1:
+            some = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
+            raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")
+        return every[0]
+
+
+def _laid_on(recording: Recording, array: Array) -> Recording:
+    """Return a recording on another description of its sensor."""
+    own = recording._contents
+    return type(recording)(Contents(on_array(own.one, array), own.sources))
+
+
+def _is_row_of(recording: Recording, given: Array) -> bool:
+    """Return whether pictures are a row of as many channels as a sensor has taxels, as tables and arrays may be."""
+    own, is_one = recording.array, len(recording.sources) < 2
+    row = own.shape == (1, given.rows * given.columns) and given.rows > 1 and own.taxels == own.columns
+    return is_one and row and not own._is_measured and not recording.has_events and not recording.is_stream
+
+
+def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
+    """Return each sensor of recordings as one of its own; refuse what is no recording."""
+    given = [recordings] if isinstance(recordings, Recording) else several(name, recordings)
+    if not len(given):
+        raise ProblemError(f"{name} is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
+    return [one for each in given for one in sensors(instance(name, each, Recording))]

@@ -1,0 +1,314 @@
+"""Calibrate readings (ticks, counts) to N or kPa by known loads, a table or the fabric's law."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import finite, flag, instance, mapping, several
+from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import text as checked_text
+from taxel._base.messages import collected
+from taxel._core import FormatError, ProblemError
+from taxel.array import Array
+from taxel.calibration import Calibration, Load
+from taxel.formats import text
+from taxel.frames import Frames
+from taxel.recording import Recording
+from taxel.recording.pressure import readings
+from taxel.tasks.rest import GivenTare, check_tare, given_tare
+
+__all__ = ["CalibrateOptions", "Calibrated", "KnownLoad", "calibrate", "read_loads"]
+
+
+@dataclass(frozen=True)
+class KnownLoad:
+    """Hold a load that was on the sensor for a while.
+
+    Parameters
+    ----------
+    load : float, above 0
+    unit : {"N", "kPa"}
+        Force in all, or the same pressure at every taxel.
+    from_s, to_s : float, s, optional
+        From when to when, by the board's time; default: from the beginning, to the end.
+    taxel : (int, int), optional
+        Column and row of the only taxel that bears it.
+    place : str
+        Where it is stated, for errors.
+
+    Raises
+    ------
+    ProblemError : times or a load that are none
+
+    Examples
+    --------
+    >>> KnownLoad(9.81, from_s=2, to_s=4).unit
+    'N'
+    """
+
+    load: float
+    unit: str = "N"
+    from_s: float | None = None
+    to_s: float | None = None
+    taxel: tuple[int, int] | None = None
+    place: str = "load"
+
+    def __post_init__(self) -> None:
+        """Refuse times that are none; the load is checked where it is fitted."""
+        checked_text("place", self.place)
+        for name in ("from_s", "to_s"):
+            if getattr(self, name) is not None:
+                finite(name, getattr(self, name), "s")
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """Hold by what and how readings are calibrated, beside known loads.
+
+    Parameters
+    ----------
+    law : bool
+        Whether the law of the fabric, amplifier and ramp is used; loads correct its gain.
+    sensor : mapping of str to value
+        Parameters of the law, as "v_trans".
+    table : path, optional
+        A .csv of reading,value (above rest), with columns x,y for each taxel; loads correct its gain.
+    unit : {"N", "kPa"}
+        Of the calibrated values, at a taxel.
+    each : bool
+        Whether a gain is fitted for each taxel.
+    exponent : float, above 0, optional
+        The exponent, given instead of fitted.
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning. Default: that of a quiet
+        stretch.
+    date, note : str
+        Date of the calibration (default: today), and which sensor and weights.
+
+    Raises
+    ------
+    ProblemError : options that contradict each other, or values that are none
+
+    Examples
+    --------
+    >>> CalibrateOptions(law=True, sensor={"exponent": 1.0}, unit="kPa").each
+    False
+    """
+
+    law: bool = False
+    sensor: Mapping[str, Any] = field(default_factory=dict)
+    table: str | os.PathLike[str] | None = None
+    unit: str = "N"
+    each: bool = False
+    exponent: float | None = None
+    tare: GivenTare | None = None
+    date: str | None = None
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse options that contradict each other, before the recording is read."""
+        flag("law", self.law), flag("each", self.each), mapping("sensor", self.sensor)
+        check_tare(self.tare)
+        if self.table is not None:
+            checked_path("table", self.table)
+        if self.law and self.table is not None:
+            raise ProblemError("--law and --table: one of the two")
+        if self.sensor and not self.law:
+            raise ProblemError("--set: values of the law; give --law with it")
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """Hold a calibration.
+
+    Attributes
+    ----------
+    calibration : Calibration
+        Saved by its `save`.
+    warnings : tuple of str
+    """
+
+    calibration: Calibration
+    warnings: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what it calibrates, and how well it meets the loads, as plain values for JSON."""
+        of = self.calibration
+        result: dict[str, Any] = {"unit": of.unit, "of": of.of, "date": of.date, "residual": of.residual}
+        loads = [{"load": load, "unit": unit, "made": made} for load, unit, made in of.loads]
+        return result | {"loads": loads, "warnings": list(self.warnings)}
+
+
+def calibrate(
+    recording: Recording,
+    loads: str | os.PathLike[str] | Sequence[KnownLoad] = (),
+    options: CalibrateOptions | None = None,
+) -> Calibrated:
+    """Calibrate readings (ticks, counts) to N or kPa.
+
+    ``taxel calibrate`` calls this function.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of the sensor, with the loads on it if there are any.
+    loads : path or sequence of KnownLoad
+        A .csv load,unit,from_s,to_s[,x,y], or the loads.
+    options : CalibrateOptions, optional
+
+    Raises
+    ------
+    ProblemError : nothing to calibrate by, options that contradict each other, nothing recorded under a load
+    FormatError : a table that is none
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> import taxel
+    >>> values = np.full((200, 2, 2), 50.0)
+    >>> values[100:] += 30.0
+    >>> frames = taxel.Frames(values, 10_000 * np.arange(200), unit="counts", array=taxel.Array(2, 2, 5.0))
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "weight.npz"
+    >>> _ = taxel.convert(frames, place)
+    >>> made = calibrate(taxel.open(place), [KnownLoad(12.0, from_s=1.2, to_s=1.8)], CalibrateOptions(exponent=1.0))
+    >>> made.calibration.of, made.calibration.unit, [round(one["made"], 6) for one in made.to_dict()["loads"]]
+    ('counts', 'N', [12.0])
+    """
+    instance("recording", recording, Recording)
+    asked = CalibrateOptions() if options is None else instance("options", options, CalibrateOptions)
+    table = isinstance(loads, str | os.PathLike)
+    known = read_loads(checked_path("loads", loads)) if table else several("loads", loads)
+    if not known and not asked.law and asked.table is None:
+        raise ProblemError("nothing to calibrate by: give --load, --loads, --table or --law")
+    if not known and (asked.each or asked.exponent is not None):
+        raise ProblemError("--each and --exponent belong to a fit: give --load")
+    with collected() as warnings:
+        made = _calibrated(recording, [instance("loads", one, KnownLoad) for one in known], asked)
+    return replace(Calibrated(made), warnings=tuple(warnings))
+
+
+def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: CalibrateOptions) -> Calibration:
+    read = _read(recording, options.tare)
+    how: dict[str, Any] = {
+        "unit": options.unit,
+        "rest": read.rest,
+        "floor": read.floor,
+        "date": options.date,
+        "note": options.note,
+    }
+    calibration: Calibration | None = None
+    if options.law:
+        if read.frames.unit != "ticks":
+            raise ProblemError(
+                f"--law: turns ticks of a board into {options.unit}; {recording.path} holds {read.frames.unit}"
+            )
+        registers = recording.registers
+        ramp = 150.0 if registers is None else float(registers.ramp)
+        calibration = Calibration.law(recording.array, ramp=ramp, sensor=options.sensor, **how)
+    elif options.table is not None:
+        points = _points(Path(options.table), recording.array)
+        calibration = Calibration.table(recording.array, *points, of=read.frames.unit, **how)
+    measured = [_load(read.frames, one) for one in known]
+    if measured:
+        calibration = Calibration.fit(measured, start=calibration, exponent=options.exponent, each=options.each, **how)
+    assert calibration is not None  # one of the three is given
+    return calibration
+
+
+@dataclass(frozen=True)
+class _Read:
+    """The readings, those at rest, and the floor above rest from which a taxel counts as loaded."""
+
+    frames: Frames
+    rest: NDArray[np.float64] | None
+    floor: float
+
+
+def _read(recording: Recording, tare: GivenTare | None) -> _Read:
+    values = readings(recording, None if tare is None else given_tare(tare, recording))
+    if values is None:
+        raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
+    frames, rest, floor = values
+    if rest.source == "none" and recording.has_events:
+        raise ProblemError(f"{recording.path}: the rest of its taxels is not known, as no half second is quiet; --tare")
+    known = rest.source not in ("unit", "none")
+    return _Read(frames, rest.values.reshape(recording.array.shape) if known else None, floor)
+
+
+def _load(frames: Frames, known: KnownLoad) -> Load:
+    first, last = (None if s is None else s * 1e6 for s in (known.from_s, known.to_s))
+    loaded = frames.between(float("-inf") if first is None else first, float("inf") if last is None else last)
+    if not len(loaded):
+        raise ProblemError(f"{known.place}: nothing was recorded{_span(known.from_s, known.to_s)}")
+    return Load(loaded, known.load, known.unit, known.taxel)
+
+
+def _span(start: float | None, stop: float | None) -> str:
+    """Return a stretch of time, s, as the end of a sentence; None is the recording's own beginning or end."""
+    if stop is None:
+        return "" if start is None else f" from {start} s on"
+    return f" before {stop} s" if start is None else f" from {start} to {stop} s"
+
+
+def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
+    """Read a table of loads, load,unit,from_s,to_s and, for a load on a single taxel, x,y.
+
+    Raises
+    ------
+    FormatError : a table that is none (names the line)
+    """
+    path, loads = Path(path), []
+    for row in text.table(path, ["load", "unit", "from_s", "to_s"]):
+        line = int(row["line"])
+
+        def value(name: str, row: dict[str, str] = row, line: int = line) -> float:
+            return text.number(row[name], path, line, name)
+
+        place = f"{path.name}, line {line}"
+        if row["unit"].strip() not in {"N", "kPa"}:
+            raise FormatError(f"{place}: unit is {row['unit']!r}; must be N or kPa")
+        taxel = None
+        if row.get("x", "").strip() or row.get("y", "").strip():
+            x, y = value("x"), value("y")
+            if x != int(x) or y != int(y):
+                raise FormatError(f"{place}: taxel at row {y:g}, column {x:g}; must be whole numbers")
+            taxel = (int(x), int(y))
+        unit, stretch = row["unit"].strip(), (value("from_s"), value("to_s"))
+        loads.append(KnownLoad(value("load"), unit, *stretch, taxel, place))
+    if not loads:
+        raise FormatError(f"{path.name}: no load in it")
+    return loads
+
+
+def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Read a table of readings and values, for all taxels or, with columns x and y, for each that exists."""
+    rows = text.table(path, ["reading", "value"])
+    pairs = text.numbers([[row["reading"], row["value"]] for row in rows], path, 2, ["reading", "value"])
+    if not rows or "x" not in rows[0] or "y" not in rows[0]:
+        return pairs[:, 0], pairs[:, 1]
+    places = text.numbers([[row["x"], row["y"]] for row in rows], path, 2, ["x", "y"])
+    exists = np.ones(array.shape, bool) if array.exists is None else array.exists
+    values = np.unique(pairs[:, 1])
+    # Taxels that do not exist get rising values, which are never used.
+    every = np.where(exists, np.nan, np.arange(1.0, len(values) + 1)[:, None, None])
+    for k, ((x, y), (reading, value)) in enumerate(zip(places, pairs, strict=True), start=2):
+        if x != int(x) or y != int(y) or not (0 <= x < array.columns and 0 <= y < array.rows):
+            raise FormatError(
+                f"{path.name}, line {k}: taxel at row {y:g}, column {x:g}; the array has {array.rows} x {array.columns}"
+            )
+        every[np.searchsorted(values, value), int(y), int(x)] = reading
+    missing = np.argwhere(np.isnan(every))
+    if len(missing):
+        point, y, x = missing[0]
+        raise FormatError(
+            f"{path.name}: no reading of row {y}, column {x} under {values[point]:g}; each taxel needs each value"
+        )
+    return every, values

@@ -1,0 +1,272 @@
+"""Detect events in recordings by a trained readout or a plain rule, and score them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import isnan
+from typing import Any
+
+import numpy as np
+
+from taxel._base.arguments import finite, instance
+from taxel._base.messages import collected, counted, warn
+from taxel._base.progress import Progress, lines_to
+from taxel._core import ProblemError
+from taxel.detect import Example, Outcome, PlainRule, Readout, Score, score
+from taxel.detect.advice import drifted
+from taxel.detect.detector import detector
+from taxel.detect.readout import run_counting
+from taxel.detect.scoring import score_together
+from taxel.encode import ContactArea, Moments
+from taxel.frames import Frames
+from taxel.recorded import recorded
+from taxel.recording import Recording
+from taxel.recording.open_options import sensors_of
+from taxel.recording.rest import FORCE_UNITS, of_pictures
+from taxel.spikes import SpikeTrains
+from taxel.tasks.labels import GivenLabels, references
+from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
+
+__all__ = ["DetectOptions", "Detected", "Detecting", "detect"]
+
+#: No event.
+_NONE = np.empty(0, np.int64)
+
+
+@dataclass(frozen=True)
+class DetectOptions:
+    """Hold how events are detected and scored.
+
+    Parameters
+    ----------
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of each recording. Default: as
+        of `taxel.tasks.rest`.
+    frame_us : float, us, optional
+        Length of the board's frame. Default: by the registers or the frames, else 192.
+    window_ms : float, ms
+        Largest distance of a detection from its event.
+
+    Raises
+    ------
+    ProblemError : values that no recordings could make valid
+
+    Examples
+    --------
+    >>> DetectOptions(tare=0.5).window_ms
+    50.0
+    """
+
+    tare: GivenTare | None = None
+    frame_us: float | None = None
+    window_ms: float = 50.0
+
+    def __post_init__(self) -> None:
+        """Refuse values that no recordings could make valid, before these are read."""
+        check_tare(self.tare)
+        finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
+        finite("window_ms", self.window_ms, "ms", least=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Detected:
+    """Hold what was detected in one recording.
+
+    Attributes
+    ----------
+    recording : Recording
+    outcome : taxel.detect.Outcome
+        Detections, score and what was outside the range of the training.
+    rest : TakenRest, optional
+        Which rest was taken; None where the readout needs none.
+    hint : str, optional
+        What may keep detections away or make false ones: values that fall from their rest, or a drifted rest.
+    """
+
+    recording: Recording
+    outcome: Outcome
+    rest: TakenRest | None
+    hint: str | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the detections as plain values for JSON; a detection has the keys of ``taxel live --json``."""
+        verdict, found = self.recording.verdict, self.outcome.score
+        return {
+            "recording": self.outcome.name,
+            "verdict": verdict,
+            "verdict_details": verdict.to_dict(),
+            "outside": self.outcome.outside,
+            "rest": None if self.rest is None else self.rest.to_dict(),
+            "hint": self.hint,
+            "detections": [
+                {
+                    "label": d.label,
+                    "t_us": d.t,
+                    "known_us": d.known,
+                    "slope_mv_per_ms": None if isnan(d.slope) else d.slope,
+                    "repaired": d.repaired,
+                }
+                for d in self.outcome.found
+            ],
+        } | ({} if found is None else {"score": found.to_dict()})
+
+
+@dataclass(frozen=True, eq=False)
+class Detecting:
+    """Hold what a readout detected in recordings.
+
+    Attributes
+    ----------
+    each : tuple of Detected
+    score : taxel.detect.Score, optional
+        Over all recordings, if the truth is known.
+    not_scored : tuple of str
+        The labels of the truth that the readout does not have.
+    window_ms : float, ms
+    warnings : tuple of str
+    """
+
+    each: tuple[Detected, ...]
+    score: Score | None
+    not_scored: tuple[str, ...]
+    window_ms: float
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def outcomes(self) -> list[Outcome]:
+        """The outcome of each recording, as a report takes them."""
+        return [one.outcome for one in self.each]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the detections and scores as plain values for JSON."""
+        result: dict[str, Any] = {"recordings": [one.to_dict() for one in self.each], "warnings": list(self.warnings)}
+        if self.score is None:
+            return result
+        return result | {"window_ms": self.window_ms, "score": self.score.to_dict()}
+
+
+def detect(
+    readout: Readout | PlainRule,
+    recordings: Recording | Sequence[Recording],
+    truth: GivenLabels | None = None,
+    options: DetectOptions | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Detecting:
+    """Detect events in recordings by a trained readout or a plain rule; score them where the truth is given.
+
+    ``taxel detect`` and the page call this function.
+
+    Parameters
+    ----------
+    readout : Readout or PlainRule
+        `taxel.detect.load` reads one from its file.
+    recordings : Recording or sequence of Recording
+        What `taxel.open` or, of a folder, `taxel.open_all` returns.
+    truth : "notes", path or sequence of mapping, optional
+        Labels to score against, as of `taxel.train`.
+    options : DetectOptions, optional
+    progress : function of (step, done, all), optional
+
+    Returns
+    -------
+    Detecting
+
+    Raises
+    ------
+    ProblemError : recordings or a truth that do not fit; a recording that is never quiet, whose readout needs the rest
+    FormatError : a table or a tare that is none
+
+    Notes
+    -----
+    The rest is the same on the page, in the shell and in Python: see `taxel.tasks.rest`. The truth never counts.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> import taxel
+    >>> values = np.full((100, 4, 4), 50.0)
+    >>> values[70:90, 1:3, 1:3] += 200
+    >>> frames = taxel.Frames(values, 10_000 * np.arange(100), unit="counts", array=taxel.Array(4, 4))
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "press.npz"
+    >>> _ = taxel.convert(frames, place)
+    >>> [found] = detect(taxel.detect.PlainRule("area", 2, noise_floor=40.0), taxel.open(place)).each
+    >>> found.outcome.found.t, str(found.rest)
+    (array([700000, 900000]), 'its first quiet stretch, 0.000 to 0.500 s')
+    """
+    detector("readout", readout)
+    asked = DetectOptions() if options is None else instance("options", options, DetectOptions)
+    update = lines_to(progress)
+    opened = sensors_of(recordings)
+    with collected() as warnings:
+        events = [None] * len(opened) if truth is None else references(truth, opened, "truth")
+        if truth is not None and not any(events):
+            raise ProblemError(f"truth is {truth}: names no event in {', '.join(one.title for one in opened)}")
+        each = []
+        for one, labelled in zip(opened, events, strict=True):
+            update(f"detecting in {one.title}")
+            each.append(_detected(readout, one, labelled, asked))
+    outcomes = [one.outcome for one in each]
+    truths = [one.example.labels for one in outcomes if one.score is not None]
+    together = score_together([one.found for one in outcomes], truths, asked.window_ms) if truths else None
+    unknown = sorted({label for of in events if of is not None for label in of} - set(readout.labels))
+    return Detecting(tuple(each), together, tuple(unknown), asked.window_ms, tuple(warnings))
+
+
+def _detected(
+    readout: Readout | PlainRule, recording: Recording, labels: Mapping[str, Any] | None, options: DetectOptions
+) -> Detected:
+    if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
+        # Detections may lack or have wrong times.
+        warn(f"{recording.title}: {recording.verdict}", stacklevel=3)
+    with _naming(recording.title):
+        taken = _rest(readout, recording, options.tare)
+        tare, begin_us = (None, None) if taken is None else (taken.tare, taken.detect_from_us)
+        found, outside = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
+    # Labels that the readout does not have do not count as missed.
+    true = None if labels is None else {label: labels.get(label, _NONE) for label in readout.labels}
+    scored = None if true is None else score(found, true, options.window_ms)
+    outcome = Outcome(recording.title, Example(recording, true or {}, tare), found, scored, outside)
+    return Detected(recording, outcome, taken, _hint(outcome, readout))
+
+
+def _rest(readout: Readout | PlainRule, recording: Recording, tare: GivenTare | None) -> TakenRest | None:
+    """Return the rest of a recording; None of one without a rest by its unit, if the readout needs none.
+
+    None of one of another sensor too, which the readout refuses.
+    """
+    if readout.array is not None and not readout.array.fits(recording.array):
+        return None
+    source = recorded(recording, hold=False)
+    known = tare is not None or (isinstance(source, Frames) and source.unit in FORCE_UNITS)
+    return rest(recording, tare) if known or readout._needs_tare else None
+
+
+@contextmanager
+def _naming(recording: str) -> Iterator[None]:
+    """Name the recording that an error is about."""
+    try:
+        yield
+    except ProblemError as error:
+        said = str(error)
+        raise ProblemError(said if said.startswith(recording) else f"{recording}: {said}") from None
+
+
+def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
+    source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
+    if isinstance(source, Frames) and (quiet := of_pictures(source)).falls:
+        return f"rest: {quiet.text(getattr(outcome.example.source, 'path', None))}"
+    # The local load tracks the rest.
+    floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []
+    for part in readout.encoder._each() if isinstance(readout, Readout) else ():
+        floors += [float(part.noise_floor)] if isinstance(part, ContactArea | Moments) else []
+    if tare is None or not floors or isinstance(source, SpikeTrains):
+        return None
+    count = drifted(source, tare, max(floors))
+    what = (
+        f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that lifts are missed"
+    )
+    return f"{what}: take another tare" if count else None

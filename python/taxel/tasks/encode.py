@@ -1,0 +1,135 @@
+"""Encode a recording as spike trains."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from taxel._base.arguments import callback, instance, mapping, parameters, text
+from taxel._base.messages import collected, counted
+from taxel._base.progress import Progress
+from taxel.encode import Encoder
+from taxel.recording import Recording
+from taxel.spikes import SpikeTrains
+from taxel.tasks.rest import GivenTare, check_tare, given_or_by_unit
+
+__all__ = ["EncodeOptions", "Encoded", "encode", "encoder_of"]
+
+
+def encoder_of(name: str | None, values: Mapping[str, Any]) -> Encoder:
+    """Return the encoder of a name with its parameters, of which `name` may be one."""
+    return Encoder.from_json(parameters({**mapping("parameters", values), **({"name": name} if name else {})}))
+
+
+@dataclass(frozen=True)
+class EncodeOptions:
+    """Hold how a recording is encoded.
+
+    Parameters
+    ----------
+    encoder : str
+        The encoder's name, as "fa1".
+    parameters : mapping of str to value
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of the recording. Default: 0
+        of pictures in a unit of force or pressure, else none.
+
+    Raises
+    ------
+    ProblemError : an encoder or parameters that are none
+
+    Examples
+    --------
+    >>> EncodeOptions("level_crossing", {"levels": [40.0, 80.0]}).encoder
+    'level_crossing'
+    """
+
+    encoder: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    tare: GivenTare | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no encoder, before the recording is read."""
+        check_tare(self.tare)
+        self._chosen()
+
+    def _chosen(self) -> Encoder:
+        """Return the encoder, without the tare."""
+        return encoder_of(text("encoder", self.encoder), self.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Encoded:
+    """Hold the spike trains of a recording.
+
+    Attributes
+    ----------
+    trains : SpikeTrains
+    encoder : Encoder
+        With the tare that was taken.
+    warnings : tuple of str
+    """
+
+    trains: SpikeTrains
+    encoder: Encoder
+    warnings: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what was encoded, but the spikes themselves, as plain values for JSON."""
+        trains, counts = self.trains, self.trains.counts
+        return {
+            "encoder": {key: value for key, value in json.loads(self.encoder.to_json()).items() if key != "tare"},
+            "latency_ms": self.encoder.latency_ms,
+            "trains": len(trains),
+            "kind": trains.kind,
+            "signed": trains.signed,
+            "spikes": int(counts.sum()),
+            "silent_trains": int(np.count_nonzero(counts == 0)),
+            "start_ms": trains.start,
+            "stop_ms": trains.stop,
+            "warnings": list(self.warnings),
+        }
+
+
+def encode(recording: Recording, options: EncodeOptions, *, progress: Progress | None = None) -> Encoded:
+    """Encode a recording as spike trains.
+
+    ``taxel encode`` calls this function.
+
+    Parameters
+    ----------
+    recording : Recording
+    options : EncodeOptions
+    progress : function of (step, done, all), optional
+
+    Raises
+    ------
+    ProblemError : an encoder that is none, or that needs a tare; a tare that does not fit
+    FormatError : a file that is no tare
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import taxel
+    >>> frames = taxel.Frames([[[0.0]], [[9.0]], [[0.0]]], [0, 10_000, 20_000], unit="N")
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "press.npz"
+    >>> _ = taxel.convert(frames, place)
+    >>> encode(taxel.open(place), EncodeOptions("level_crossing", {"levels": [5.0]})).trains.counts
+    array([2])
+    """
+    show = (lambda *_: None) if progress is None else callback("progress", progress)
+    asked = instance("options", options, EncodeOptions)
+    instance("recording", recording, Recording)
+    with collected() as warnings:
+        encoder = asked._chosen()
+        rest = given_or_by_unit(asked.tare, recording)
+        encoder = encoder if rest is None else encoder.with_tare(rest)
+        events = recording.has_events
+        count = len(recording.events) if events else len(recording.frames())
+        show(f"encoding {counted(count, 'event' if events else 'picture')}", 0, 0)
+        trains = encoder.encode(recording)
+    return Encoded(trains, encoder, tuple(warnings))

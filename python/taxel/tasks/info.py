@@ -1,0 +1,101 @@
+"""Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from taxel._base.arguments import instance
+from taxel._base.messages import collected
+from taxel.recording import Recording
+from taxel.recording.pressure import Series, series
+from taxel.recording.summary import summary
+from taxel.tare import Tare
+from taxel.tasks.rest import GivenTare, given_tare
+
+__all__ = ["Info", "info"]
+
+
+@dataclass(frozen=True, eq=False)
+class Info:
+    """Hold the summary of a recording.
+
+    Attributes
+    ----------
+    facts : mapping of str to value
+        Of several sources those of each, with offset and drift of their clocks against the first one's.
+    pressed : taxel.recording.pressure.Series, optional
+        The pressure over time; None of several sources, and without intensities.
+    tare : Tare, optional
+        The one that was given.
+    warnings : tuple of str
+    """
+
+    facts: dict[str, Any]
+    pressed: Series | None
+    tare: Tare | None
+    warnings: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the facts as plain values for JSON."""
+        return self.facts | {"warnings": list(self.warnings)}
+
+
+def info(recording: Recording, tare: GivenTare | None = None) -> Info:
+    """Summarise a recording, or each of its sources.
+
+    ``taxel info`` calls this function.
+
+    Parameters
+    ----------
+    recording : Recording
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a tare, its file, or the seconds at rest at the beginning. Default: that of a quiet
+        stretch.
+
+    Raises
+    ------
+    ProblemError : a tare that does not fit
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import taxel
+    >>> frames = taxel.Frames([[[0.0]], [[9.0]], [[0.0]]], [0, 10_000, 20_000], unit="N")
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "press.npz"
+    >>> _ = taxel.convert(frames, place)
+    >>> info(taxel.open(place)).facts["pressure"]["peak"]
+    {'most': 9.0, 't_us': 10000}
+    """
+    instance("recording", recording, Recording)
+    with collected() as warnings:
+        if len(recording.sources) > 1:
+            found = Info(_sources(recording, tare), None, None)
+        else:
+            rest = None if tare is None else given_tare(tare, recording)
+            pressed = series(recording, rest)
+            found = Info(summary(recording, pressed), pressed, rest)
+    return Info(found.facts, found.pressed, found.tare, tuple(warnings))
+
+
+def _sources(recording: Recording, tare: GivenTare | None) -> dict[str, Any]:
+    """Return the facts of each source of a file, with offset and drift of their clocks against the first one's."""
+    name_of_first, first = next(iter(recording.sources.items()))
+    ours, sources = first.clock, {}
+    for name, source in recording.sources.items():
+        rest = None if tare is None or source.is_stream else given_tare(tare, source)
+        facts = summary(source, None if source.is_stream else series(source, rest))
+        if source.is_stream:
+            facts["columns"] = source.columns
+        clock = source.clock
+        if source is not first and clock and ours and len(clock.board_us) and len(ours.board_us):
+            begins = int(clock.board_us.min())
+            facts["against"] = {
+                "source": name_of_first,
+                "offset_us": int(ours.board_us_at(int(clock.host_ns(begins)))) - begins,
+                "drift_ppm": clock.drift_ppm - ours.drift_ppm,
+            }
+        sources[name] = facts
+    verdict = recording.verdict
+    of_all = {"verdict": verdict, "verdict_details": verdict.to_dict(), "remarks": list(recording.remarks)}
+    return {"file": str(recording.path), **of_all, "sources": sources}

@@ -1,0 +1,183 @@
+"""Estimate how many bits labelled touches hold, by sampling period, time, number of taxels and data rate."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from taxel._base.arguments import callback, instance, mapping, several, text, whole
+from taxel._base.arguments import path as checked_path
+from taxel._base.messages import collected, counted
+from taxel._base.progress import Progress
+from taxel._core import ProblemError
+from taxel.encode import Encoder
+from taxel.information import Answer, LabelledTrial, answer, folds, notes_as_trials, read_trials, recordings_as_trials
+from taxel.recording import Recording
+from taxel.recording.open_options import sensors_of
+from taxel.tasks.encode import encoder_of
+
+__all__ = ["Information", "InformationOptions", "information"]
+
+
+@dataclass(frozen=True)
+class InformationOptions:
+    """Hold how bits are estimated; what is left out is as of `taxel.information.answer`, where each is described.
+
+    Parameters
+    ----------
+    encoder : {"change_events", "fa1"}
+    parameters : mapping of str to value
+        Of the encoder.
+    window_ms : float, ms, optional
+    windows_ms, periods_ms : sequence of float, ms, optional
+    taxels, pools : sequence of int, optional
+    draws, shuffles : int, 1 or more
+    folds : int, 2 or more
+    seed : int, 0 or more
+    classifiers : sequence of {"neighbours", "cone_r", "tempotron"}
+
+    Raises
+    ------
+    ProblemError : an encoder that is none of the two, or parameters that it has not
+
+    Examples
+    --------
+    >>> InformationOptions(window_ms=50.0, classifiers=[]).folds
+    10
+    """
+
+    encoder: str = "change_events"
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    window_ms: float | None = None
+    windows_ms: Sequence[float] | None = None
+    periods_ms: Sequence[float] | None = None
+    taxels: Sequence[int] | None = None
+    pools: Sequence[int] | None = None
+    draws: int = 5
+    shuffles: int = 20
+    folds: int = 10
+    seed: int = 0
+    classifiers: Sequence[str] = ("neighbours",)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no encoder, before the recordings are read."""
+        self._chosen()
+
+    def _chosen(self) -> Encoder | None:
+        """Return the encoder; None of that which the answer chooses by itself."""
+        if text("encoder", self.encoder) not in ("change_events", "fa1"):
+            raise ProblemError(f"encoder is {self.encoder}: must be change_events or fa1, which have one train a taxel")
+        mapping("parameters", self.parameters)
+        if self.encoder == "change_events" and not self.parameters:
+            return None
+        return encoder_of(self.encoder, self.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """Hold the answer about labelled touches.
+
+    Attributes
+    ----------
+    answer : taxel.information.Answer
+    warned : tuple of str
+        The warnings of the task.
+    """
+
+    answer: Answer
+    warned: tuple[str, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings of the task, and those of the answer."""
+        return (*self.warned, *self.answer.warnings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the answer as plain values for JSON."""
+        return self.answer.to_dict() | {"warnings": list(self.warnings)}
+
+
+def information(
+    recordings: Recording | Sequence[Recording],
+    labels: str | os.PathLike[str] | None = None,
+    options: InformationOptions | None = None,
+    *,
+    progress: Progress | None = None,
+    watch: Callable[[float, float, float], object] | None = None,
+) -> Information:
+    """Estimate how many bits labelled touches hold.
+
+    ``taxel information`` calls this function.
+
+    Parameters
+    ----------
+    recordings : Recording or sequence of Recording
+    labels : path or "notes", optional
+        A table recording,t_us,label[,stop_us][,group] whose rows are trials; or each note of the recordings is a trial
+        from its time on. Without either each recording is a trial, and its folder's name the label.
+    options : InformationOptions, optional
+    progress : function of (step, done, all), optional
+    watch : function of (period, window, bits), optional
+        Called with the bits of each setting of all taxels as they are known, draw by draw, so that a task that is
+        stopped has told them.
+
+    Raises
+    ------
+    ProblemError : labels that make no trials, or too few of them; options that do not fit
+    FormatError : a table that is none
+    """
+    asked = InformationOptions() if options is None else instance("options", options, InformationOptions)
+    show = (lambda *_: None) if progress is None else callback("progress", progress)
+    encoder, opened = asked._chosen(), sensors_of(recordings)
+    labels = None if labels is None else checked_path("labels", labels)
+    with collected() as warnings:
+        trials = _trials(labels, opened, asked.window_ms)
+        if labels is None and len({trial.label for trial in trials}) == 1:
+            raise ProblemError(
+                f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, "
+                f"here {trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings "
+                "a folder"
+            )
+        _check_folds(trials, str(opened[0].path) if labels in (None, "notes") else str(labels), asked)
+        show(counted(len(trials), "trial"), 0, 0)
+        found = answer(
+            trials,
+            encoder=encoder,
+            window_ms=asked.window_ms,
+            windows_ms=asked.windows_ms,
+            periods_ms=asked.periods_ms,
+            taxels=asked.taxels,
+            pools=asked.pools,
+            draws=asked.draws,
+            folds=asked.folds,
+            shuffles=asked.shuffles,
+            classifiers=several("classifiers", asked.classifiers),
+            seed=asked.seed,
+            progress=show,
+            watch=watch,
+        )
+    return Information(found, tuple(warnings))
+
+
+def _trials(
+    labels: str | os.PathLike[str] | None, opened: list[Recording], window_ms: float | None
+) -> list[LabelledTrial]:
+    if labels is None:
+        return recordings_as_trials(opened, window_ms=window_ms)
+    if labels != "notes":
+        return read_trials(labels, opened, window_ms=window_ms)
+    if window_ms is None:
+        raise ProblemError("window_ms: must say how long the trials are that notes begin, as notes have no end")
+    return notes_as_trials(opened, window_ms=window_ms)
+
+
+def _check_folds(trials: list[LabelledTrial], place: str, options: InformationOptions) -> None:
+    """Refuse labels and groups that cannot be split into folds; the error names their table."""
+    count, seed = whole("folds", options.folds, 2), whole("seed", options.seed, 0)
+    groups = [trial.group for trial in trials]
+    try:
+        folds([trial.label for trial in trials], count=count, groups=groups if any(groups) else None, seed=seed)
+    except ProblemError as error:
+        raise ProblemError(f"{place}: {error}") from None

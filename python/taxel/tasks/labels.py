@@ -1,0 +1,206 @@
+"""Which labelled events belong to which recordings: from a table, from notes, or given as times."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import column, mapping, several
+from taxel._base.messages import counted, warn
+from taxel._base.times import beginning_us, begun
+from taxel._core import ProblemError
+from taxel.labels import Labels, beside, trial_of
+from taxel.recording import Recording, kind_of_file
+from taxel.recording.cut import span_us
+
+__all__ = ["GivenLabels", "labelled_trials", "references"]
+
+#: "notes" (the recordings' own notes), the path of a table, or times (us) by label, a mapping for each recording.
+GivenLabels: TypeAlias = str | os.PathLike[str] | Sequence[Mapping[str, Any]]
+
+#: So long after the last event of a board a label may follow, us, as people mark late; one further than the window of a
+#: score is named, as no detection can lie so near to it.
+_LATE_US, _NEAR_US = 1_000_000, 50_000
+
+
+def references(
+    source: GivenLabels, recordings: Sequence[Recording], argument: str = "labels"
+) -> list[dict[str, NDArray[np.int64]]]:
+    """Return the reference events of each recording: from a table, or its own notes (a note's text is the label).
+
+    A table names recordings by path, file name or stem; in one that it does not name nothing happened, unless the
+    table also names a recording that is not there. `argument` is what errors call the source.
+    """
+    if not isinstance(source, str | os.PathLike):
+        return _mapped(source, recordings, argument)
+    if source == "notes":
+        noted = [_notes(recording) for recording in recordings]
+        outside = next((one for one in recordings if any(note.t is not None for note in one.notes)), None)
+        if outside is not None and not any(noted):
+            notes = counted(sum(note.t is not None for note in outside.notes), "note")
+            raise ProblemError(f"{outside.title}: has {notes}, none within {_span(outside)}")
+        return noted
+    table = Labels(source)
+    # The sources of one file are one recording.
+    count = len({(one.path, trial_of(one.name, one.label)) for one in recordings})
+    if count > 1 and any(not row.recording for row in table.rows):
+        raise ProblemError(
+            f"{argument} is {source}: names no recording, and there are {count}; must have the column recording"
+        )
+    _check_sources(table, argument, recordings)
+    named = {one.title: table.named(one.path, trial_of(one.name, one.label), one.label) for one in recordings}
+    unnamed = [title for title, name in named.items() if name is None]
+    known = set(named.values())
+    others = [name for name in table.recordings if name not in known]
+    if unnamed and (others or len(unnamed) == len(recordings)):
+        names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
+        raise ProblemError(f"{argument} is {source}: names no event in {', '.join(unnamed)}; {names}")
+    _warn_of_strangers(table, recordings)
+    return [_within(table, recording, argument) for recording in recordings]
+
+
+def _mapped(
+    source: Sequence[Mapping[str, Any]], recordings: Sequence[Recording], argument: str
+) -> list[dict[str, NDArray[np.int64]]]:
+    """Return the events that are given as times by label, a mapping for each recording."""
+    each = several(argument, source)
+    if len(each) != len(recordings):
+        have = counted(len(recordings), "recording")
+        raise ProblemError(f"{argument} is {counted(len(each), 'mapping')}: must be one for each of {have}")
+    named = [mapping(argument, one) for one in each]
+    return [{label: column(f"{argument}[{label!r}]", t, np.int64, "us") for label, t in one.items()} for one in named]
+
+
+def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
+    """Warn of events of recordings that are not there: their names may be misspelt."""
+    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
+    known = {
+        name for path, trial, label in trials for name in (table.named(path), table.named(path, trial, label), trial)
+    }
+    strange = [name for name in table.recordings if name not in known]
+    if strange:
+        count = counted(sum(row.recording in strange for row in table.rows), "event")
+        there = _few(dict.fromkeys(one.title for one in recordings))
+        warn(
+            f"{table.path}: left out {count} of {_few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
+            f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
+            stacklevel=3,
+        )
+
+
+def _few(names: Iterable[str]) -> str:
+    """Return the first five names, and how many more there are."""
+    every = list(names)
+    return ", ".join(every[:5]) + f" and {len(every) - 5} more" * (len(every) > 5)
+
+
+def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> list[Recording]:
+    """Leave out trials of a file that its labels do not name, if they name another: those have no labels.
+
+    A trial without labels would otherwise count as one in which nothing happened.
+    """
+    if not isinstance(source, str | os.PathLike):
+        return list(recordings)
+    trials: dict[Path, set[str]] = {}
+    for one in recordings:
+        trials.setdefault(one.path, set()).add(trial_of(one.name, one.label))
+    named: dict[Path, set[str]] = {}
+    for path, every in trials.items():
+        table = beside(path) if source == "notes" else Path(source)
+        named[path] = every & {row.recording for row in Labels(table).rows} if table.is_file() else set()
+        if 0 < len(named[path]) < len(every):
+            warn(
+                f"{path}: left out {len(every) - len(named[path])} of its {len(every)} trials, which have no labels",
+                stacklevel=2,
+            )
+    return [one for one in recordings if not named[one.path] or trial_of(one.name, one.label) in named[one.path]]
+
+
+def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]) -> None:
+    """Refuse labels of a source that their recording does not have."""
+    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
+    names = [(label, (table.named(path), table.named(path, trial, label), trial)) for path, trial, label in trials]
+    for row in table.rows:
+        labels = {label for label, every in names if row.recording in every}
+        if row.source and labels and row.source not in labels:
+            there = ", ".join(sorted(labels))
+            raise ProblemError(
+                f"{argument} is {table.path}: {row.text} at {row.t} us is of source {row.source}; there is {there}"
+            )
+
+
+def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
+    times: dict[str, list[int]] = {}
+    for note in recording.notes:
+        if note.t is not None:
+            times.setdefault(note.text, []).append(note.t)
+    events = {label: np.sort(np.array(t, np.int64)) for label, t in times.items()}
+    return _inside(events, recording, f"the notes of {recording.title}")
+
+
+def _within(table: Labels, recording: Recording, argument: str) -> dict[str, NDArray[np.int64]]:
+    """Return the events of a table that lie within a recording; refuse a table of which none does."""
+    events = table.of(recording)
+    if recording.clock is None and any(row.at_ns for row in table.rows):
+        warn(
+            f"the {kind_of_file(recording.kind)} holds no arrival times, so host_ns cannot show by how many periods of "
+            f"the board's clock (6.5536 s) {table.path} is ahead of it: its times are used unchanged",
+            stacklevel=2,
+        )
+    inside = _inside(events, recording, str(table.path))
+    if any(map(len, events.values())) and not any(map(len, inside.values())):
+        times = np.concatenate(list(events.values()))
+        ends = " to ".join(f"{t / 1e6:.3f}" for t in np.unique([times.min(), times.max()]))
+        held = f"{argument} is {table.path}: holds {counted(len(times), 'event')} ({ends} s)"
+        raise ProblemError(f"{held}, none within {_span(recording)}")
+    return inside
+
+
+def _span(recording: Recording) -> str:
+    first, last = span_us(recording)
+    more = "" if recording.timed else ", whose pictures are numbered: give --rate-hz"
+    begin = beginning_us(np.array([first]))
+    if begin:
+        more = f"; it begins {begun(begin)}, {begin} us since 1970, and labels must count from 1970 too"
+    return f"{recording.title} ({(first - begin) / 1e6:.3f} to {(last - begin) / 1e6:.3f} s){more}"
+
+
+def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where: str) -> dict[str, NDArray[np.int64]]:
+    """Return the events that lie within a recording; say which are left out as they do not, and which may not.
+
+    A picture holds until the next one would come. A board sends nothing where nothing changes, so that the end of its
+    recording may lie behind its last event: an event soon after that counts, and is named.
+    """
+    total = sum(map(len, events.values()))
+    if not total:
+        return dict(events)
+    first, last = span_us(recording)
+    if recording.has_events:
+        held, stretch = recording.events, recording._contents.one.timing.stretch
+        seen = [last, *(t for t, _ in held.markers), *(() if stretch is None else stretch()[1:])]
+        # A heartbeat or a frame without events is a sign of life, too.
+        end = max(seen if recording.clock is None else [*seen, *recording.clock.board_us[-1:].tolist()])
+        near_us, late_us = _NEAR_US, _LATE_US
+    else:
+        pictures = recording.frames().t
+        end = last + (int(np.median(np.diff(pictures))) if len(pictures) > 1 else 0)
+        near_us, late_us = 0, 0
+    inside = {label: t[(t >= first) & (t <= end + late_us)] for label, t in events.items()}
+    behind = sorted((int(one), label) for label, t in inside.items() for one in t[t > end + near_us])
+    if behind:
+        (at, label), begin = behind[0], beginning_us(np.array([first]))
+        warn(
+            f"{len(behind)} of the {total} events of {where} are behind the last that was recorded, at "
+            f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): they count, and as missed if the "
+            "recording stopped before them",
+            stacklevel=2,
+        )
+    outside = total - sum(map(len, inside.values()))
+    if outside:
+        warn(f"{outside} of the {total} events of {where} left out: outside {_span(recording)}", stacklevel=2)
+    return {label: t for label, t in inside.items() if len(t) or not len(events[label])}

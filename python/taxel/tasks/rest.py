@@ -1,0 +1,266 @@
+"""The rest of a recording's taxels that a training and a detection take, and where it is from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import instance, number
+from taxel._base.arguments import path as checked_path
+from taxel._base.messages import warn
+from taxel._base.number_text import float_of
+from taxel._base.times import beginning_us
+from taxel._core import ProblemError
+from taxel.detect import Example
+from taxel.detect.label_times import TOUCH, held_by_tare
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recorded import recorded
+from taxel.recording import Recording
+from taxel.recording.lain import free_of_what_lay, without_what_lay
+from taxel.recording.pressure import quiet_rest
+from taxel.recording.rest import NOISE_FLOOR, by_unit, of_quiet
+from taxel.spikes import to_ms
+from taxel.tare import Tare
+
+__all__ = ["GivenTare", "TakenRest", "given_or_by_unit", "given_tare", "rest", "tare_before", "tare_if_any"]
+
+#: A tare, the file of one, or how many seconds at the beginning of a recording are at rest.
+GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
+
+#: How long before the first label the rest ends, and how long it must last at least, us.
+_BEFORE_US, _LEAST_REST_US = 20_000, 10_000
+#: Of fewer pictures the noise is not known.
+_LEAST_PICTURES = 20
+#: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
+_MOST_UNKNOWN = 0.1
+#: What to give where no rest is found.
+_GIVE = "give --tare SECONDS or --tare FILE"
+
+
+@dataclass(frozen=True, eq=False)
+class TakenRest:
+    """Hold the rest that a detection takes for a recording.
+
+    Parameters
+    ----------
+    source : {"given", "beginning", "unit", "quiet"}
+        A given tare; seconds at the recording's beginning, as asked; 0, as the values are force or pressure; the
+        recording's first quiet stretch.
+    tare : Tare
+    begin_us : int, us
+        The time that text counts from: the recording's first if its times count from 1970, else 0.
+    """
+
+    source: str
+    tare: Tare
+    begin_us: int = 0
+
+    @property
+    def detect_from_us(self) -> int | None:
+        """When detection begins: at the end of a beginning that was said to be at rest; None: with the recording."""
+        return self.tare.stop_us if self.source == "beginning" else None
+
+    def __str__(self) -> str:
+        first, end = ((t - self.begin_us) / 1e6 for t in (self.tare.start_us, self.tare.stop_us))
+        return {
+            "given": "the given tare",
+            "beginning": f"its beginning, {first:.3f} to {end:.3f} s",
+            "unit": "0, as the values are force or pressure",
+            "quiet": f"its first quiet stretch, {first:.3f} to {end:.3f} s",
+        }[self.source]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return where the rest is from, and from when to when it was measured, as plain values."""
+        measured = self.source in ("beginning", "quiet")
+        return {"source": self.source, "us": [self.tare.start_us, self.tare.stop_us] if measured else None}
+
+
+def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
+    """Return the rest of a recording's taxels as each detection takes it: the page's, the shell's and Python's.
+
+    It is the given one; else 0 of pictures in a unit of force or pressure; else that of the first quiet stretch of half
+    a second in which nothing lies on the array, for a board's events on their held values. Labels and notes never
+    count.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of one sensor.
+    tare : Tare, path or float (s), optional
+        A tare, its file, or the seconds at rest at the recording's beginning.
+
+    Raises
+    ------
+    ProblemError : nothing is quiet, so that a tare must be given; a given one is invalid
+    FormatError : the file is not a tare
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import taxel
+    >>> values = np.full((100, 2, 2), 50.0)
+    >>> values[70:] += 200
+    >>> frames = taxel.Frames(values, 10_000 * np.arange(100), unit="counts", array=taxel.Array(2, 2))
+    >>> import pathlib, tempfile
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "press.npz"
+    >>> _ = taxel.convert(frames, place)
+    >>> taken = rest(taxel.open(place))
+    >>> str(taken), taken.tare.rest[0, 0]
+    ('its first quiet stretch, 0.000 to 0.500 s', np.float64(50.0))
+    """
+    source = recorded(instance("recording", recording, Recording), hold=False)
+    begin_us = beginning_us(source.t[:1])
+    if tare is not None:
+        seconds = seconds_of(tare)
+        return TakenRest("given" if seconds is None else "beginning", given_tare(tare, recording), begin_us)
+    if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
+        return TakenRest("unit", zero, begin_us)
+    found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
+    if found is not None and found.on:
+        span, said = free_of_what_lay(recording, found)
+        warn(said, stacklevel=2)
+    else:
+        span = None if found is None else found.quiet_us
+    if span is None:
+        raise ProblemError(
+            f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it; "
+            f"{_GIVE}"
+        )
+    return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
+
+
+def given_tare(tare: GivenTare, recording: Recording) -> Tare:
+    """Return the tare that is given: itself, that of a file, or of seconds at the beginning of the recording.
+
+    The rest ends early where the board marked the start of the recording, as a board that was tared does. A rest
+    longer than half of the recording is refused, because the sensor was hardly at rest for all of it.
+    """
+    if isinstance(tare, Tare):
+        return tare
+    seconds = seconds_of(tare)
+    if seconds is None:
+        return Tare.load(checked_path("tare", tare))
+    check_tare(tare)
+    source = recorded(recording)
+    if not len(source):
+        raise ProblemError(f"{recording.path}: holds nothing to take a tare from")
+    first, last = int(source.t[0]), int(source.t[-1])
+    if seconds * 2e6 > last - first:
+        raise ProblemError(
+            f"--tare {tare}: more than half of {recording.title}, which lasts {(last - first) / 1e6:g} s; "
+            "give the seconds at its beginning in which nothing was touched"
+        )
+    stop = first + int(seconds * 1e6)
+    if isinstance(source, Events):
+        stop = min([stop, *(t for t, start in source.markers if start and t > first)])
+    measured = _measured(recording, source, stop)
+    _warn_of_touch(tare, recording, source, measured)
+    return measured
+
+
+def check_tare(tare: GivenTare | None) -> None:
+    """Refuse what is neither a tare nor a path nor seconds above 0."""
+    seconds = None if tare is None else seconds_of(tare)
+    if seconds is not None and not 0 < seconds < np.inf:
+        raise ProblemError(f"--tare {tare}: must be seconds above 0, or a file")
+
+
+def seconds_of(tare: GivenTare) -> float | None:
+    """Return the seconds that a given tare says; None of a tare or a file."""
+    if isinstance(tare, Tare | os.PathLike):
+        return None
+    if not isinstance(tare, str):
+        return number("tare", tare, "s")
+    try:
+        return float_of(tare)
+    except ValueError:
+        return None
+
+
+def given_or_by_unit(tare: GivenTare | None, recording: Recording) -> Tare | None:
+    """Return the tare that is given; without one 0 of pictures in a unit of force or pressure, else none."""
+    if tare is not None:
+        return given_tare(tare, recording)
+    source = recorded(recording, hold=False)
+    return by_unit(source) if isinstance(source, Frames) else None
+
+
+def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frames, measured: Tare) -> None:
+    """Warn of a tare in which something was touched, by which lifts are missed or false."""
+    held = held_by_tare([Example(source, {}, measured)], NOISE_FLOOR)
+    if held >= TOUCH:
+        warn(
+            f"--tare {tare}: the beginning of {recording.title} is not quiet but holds a touch of {held} taxels; give "
+            "the seconds before it, or --tare FILE",
+            stacklevel=3,
+        )
+
+
+def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
+    """Return the tare of the time before a recording's first label, or before the board's start marker.
+
+    Of pictures in a unit of force or pressure it is 0, as everywhere (`taxel.recording.rest`).
+    A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 pictures come before
+    it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
+    away, the tare is of the longest time without it, before the label if there is one; a warning says so.
+    """
+    source = recorded(recording)
+    if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
+        return zero
+    first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
+    tare, said = without_what_lay(recording, first)
+    if said:
+        warn(said, stacklevel=2)
+    if tare is not None:
+        return tare
+    if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_PICTURES <= len(source):
+        quiet = of_quiet(source).quiet_us
+        if quiet is not None:
+            return Tare.take(source, start_us=quiet[0], stop_us=quiet[1], note=str(recording.path))
+    return _before(labels, recording)
+
+
+def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
+    source = recorded(recording)
+    ends = [int(times[0]) - _BEFORE_US for times in labels.values() if len(times)]
+    first = int(source.t[0]) if len(source) else 0
+    if isinstance(source, Events):
+        ends += [t for t, start in source.markers if start and t > first]
+    if not ends or min(ends) - first < _LEAST_REST_US:
+        what = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
+        raise ProblemError(f"{recording.path}: holds {what}, from which to take the taxels' rest; {_GIVE}")
+    return _measured(recording, source, min(ends))
+
+
+def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
+    """Return a recording's tare: 0 of force or pressure, else as `tare_before`, or None without such a time."""
+    source = recorded(recording)
+    if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
+        return zero
+    try:
+        return _before(labels, recording)
+    except ProblemError:
+        return None
+
+
+def _measured(recording: Recording, source: Events | Frames, stop_us: int, start_us: int | None = None) -> Tare:
+    """Return the rest before a time; warn of taxels whose first event is later, which encoders ignore."""
+    tare = Tare.take(source, start_us=start_us, stop_us=stop_us, note=str(recording.path))
+    if isinstance(source, Events):
+        present = np.zeros(source.array.shape, bool)
+        present[source.y, source.x] = True
+        unknown = int(np.count_nonzero(present & np.isnan(tare.rest)))
+        if unknown > _MOST_UNKNOWN * np.count_nonzero(present):
+            warn(
+                f"{recording.path}: the rest of {unknown} of {np.count_nonzero(present)} taxels is not known, as none "
+                f"of their changes lies in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are left "
+                "out; start the recording before the board, which then sends all values, or give --tare FILE",
+                stacklevel=2,
+            )
+    return tare

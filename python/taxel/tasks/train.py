@@ -1,0 +1,242 @@
+"""Train a readout on labelled recordings, and score it on data that it was not trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import instance
+from taxel._base.messages import collected, warn
+from taxel._base.progress import Progress, lines_to
+from taxel._core import ProblemError
+from taxel.detect import Example, Judged, Outcome, PlainScore, Recipe, choose, judge, recipes, score
+from taxel.detect.advice import advised, fallen
+from taxel.detect.examples import checked
+from taxel.detect.floors import measured_floor
+from taxel.detect.folds import INNER, count_of_folds
+from taxel.detect.label_times import off_by
+from taxel.detect.loads import clock_of
+from taxel.detect.plain_score import floor_of, plain_score
+from taxel.detect.readout import run_counting
+from taxel.detect.scoring import score_together
+from taxel.detect.training import UNFELT, Trained, trained
+from taxel.recorded import recorded
+from taxel.recording import Recording
+from taxel.recording.open_options import sensors_of
+from taxel.recording.rest import BY_UNIT
+from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
+from taxel.tasks.labels import GivenLabels, labelled_trials, references
+from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
+from taxel.tasks.training import Training, TrainOptions
+
+__all__ = ["train"]
+
+
+def train(
+    recordings: Recording | Sequence[Recording],
+    labels: GivenLabels = "notes",
+    options: TrainOptions | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Training:
+    """Train neurons to detect labelled events, and score them on held-out data.
+
+    `taxel.train` is this function; ``taxel train`` and the page call it.
+
+    Parameters
+    ----------
+    recordings : Recording or sequence of Recording
+        What `taxel.open` or, of a folder, `taxel.open_all` returns.
+    labels : "notes", path or sequence of mapping
+        The recordings' own notes; a table label,t_us or recording,label,t_us; or times (us) by label, one mapping for
+        each recording.
+    options : TrainOptions, optional
+    progress : function of (step, done, all), optional
+
+    Returns
+    -------
+    Training
+        Nothing is written; `Training.readout` is saved by its `save`.
+
+    Raises
+    ------
+    ProblemError : labels that name no event, recordings or options that cannot be trained on
+    FormatError : a recipe, a table or a tare that is none
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> import taxel
+    >>> values = np.zeros((300, 4, 4))
+    >>> begins = range(40, 280, 40)
+    >>> for k in begins:
+    ...     values[k : k + 15, 1:3, 1:3] = 60.0
+    >>> frames = taxel.Frames(values, 10_000 * np.arange(300), unit="N", array=taxel.Array(4, 4))
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "walk.npz"
+    >>> _ = taxel.convert(frames, place)
+    >>> training = taxel.train(taxel.open(place), [{"contact": [10_000 * k for k in begins]}])
+    >>> training.score["contact"].found, training.held_out, training.warnings
+    (6, True, ())
+    >>> training.readout.labels
+    ('contact',)
+    """
+    asked = TrainOptions() if options is None else instance("options", options, TrainOptions)
+    update = lines_to(progress)
+    with collected() as warnings:
+        training = _train(sensors_of(recordings), labels, asked, update)
+    return replace(training, warned=tuple(warnings))
+
+
+def _train(
+    recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Callable[[str], object]
+) -> Training:
+    opened = labelled_trials(labels, recordings)
+    labelled = references(labels, opened)
+    if not any(labelled):
+        table = "; give --labels FILE, a table label,t_us" if labels == "notes" else ""
+        titles = ", ".join(one.title for one in opened)
+        raise ProblemError(f"labels is {_named(labels)}: names no event in {titles}{table}")
+    names = sorted({label for events in labelled for label in events})
+    if options.recipe is None and "encoder.name" not in options.changes:
+        recipe, why = recipes.chosen(recorded(opened[0]), names)
+        update(f"recipe {recipe}, chosen for {why}")
+        options = replace(options, recipe=recipe)
+    plan = options._plan(names)
+    assert plan is not None
+    if options.search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
+        raise ProblemError("--search: the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
+    examples = _examples(opened, labelled, options.tare, plan)
+    plan = options._plan(names, measured_floor(examples))
+    assert plan is not None
+    return _Work(opened, examples, options, update).training(plan)
+
+
+def _named(labels: GivenLabels) -> str:
+    return str(labels) if isinstance(labels, str | Path) else "given as times"
+
+
+def _examples(
+    opened: Sequence[Recording],
+    labelled: Sequence[Mapping[str, NDArray[np.int64]]],
+    tare: GivenTare | None,
+    plan: Recipe,
+) -> list[Example]:
+    """Return recordings as examples; if no tare is given, it is taken from each recording.
+
+    Where the encoder needs none, only plain rules use it, and a recording from which it cannot be taken has none.
+    """
+    rests = [part.tare for part in plan.encoder._each() if hasattr(part, "tare")]
+
+    def rest(events: Mapping[str, NDArray[np.int64]], one: Recording) -> Tare | None:
+        if tare is not None:
+            return given_tare(tare, one)
+        if any(own is not None for own in rests):
+            return None
+        return tare_before(events, one) if rests else tare_if_any(events, one)
+
+    return [
+        Example(one, events, rest(events, one), one.title.removesuffix(one.label), one.title)
+        for one, events in zip(opened, labelled, strict=True)
+    ]
+
+
+def _taken(examples: Sequence[Example]) -> tuple[tuple[int, int, int], ...]:
+    """Return from when to when each recording's tare was taken, and how long it lasts, us.
+
+    Of those whose rest is 0 by their unit nothing.
+    """
+    spans = []
+    for one in examples:
+        source = recorded(one.source)
+        if one.tare is not None and one.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
+            first = int(source.t[0])
+            spans.append((one.tare.start_us - first, one.tare.stop_us - first, int(source.t[-1]) - first))
+    return tuple(spans)
+
+
+@dataclass(frozen=True)
+class _Work:
+    """Hold the labelled recordings of a training, and how it is scored."""
+
+    opened: Sequence[Recording]
+    examples: Sequence[Example]
+    options: TrainOptions
+    update: Callable[[str], object]
+
+    def training(self, plan: Recipe) -> Training:
+        """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
+
+        Say first where values fall from their rest. An error says that too, or by how much labels are off.
+        """
+        if fall := fallen(self.examples):
+            warn(fall, stacklevel=2)
+        try:
+            return self._training(plan)
+        except ProblemError as error:
+            if fall and str(error).endswith(UNFELT):
+                raise ProblemError(f"{str(error).removesuffix(UNFELT)}: {fall}") from None
+            names = sorted({label for one in self.examples for label in one.labels})
+            off = off_by(checked(self.examples), names, floor_of(plan.encoder))
+            said = (f"{label}: {one}" for label, one in off.items())
+            raise ProblemError("; ".join([str(error), *said])) from None
+
+    def _training(self, plan: Recipe) -> Training:
+        folds, search, window_ms = self.options.folds, self.options.search, self.options.window_ms
+        count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "--folds 0")
+        scored = None
+        if count:
+            registers = self.opened[0].registers
+            frame_us = None if registers is None else registers.frame_us
+            how: dict[str, Any] = {"search": search, "window_ms": window_ms, "frame_us": frame_us}
+            try:
+                scored = judge(self.examples, plan, count, **how, progress=self.update)
+            except ProblemError as error:
+                # These folds are the default, not a request, and all of the data may still be learnt from.
+                if folds is not None:
+                    raise
+                count, why = 0, f"a part of the training data cannot be learnt from: {error}"
+        if search:
+            plan = choose(self.examples, plan, window_ms=window_ms, progress=self.update)
+        begun = perf_counter()
+        made = trained(self.examples, plan, self.update)
+        outcomes = self._outcomes(made)
+        a_point_s = None if search else (perf_counter() - begun) * INNER * (count + 1)
+        own = _own(outcomes, window_ms)
+        if scored is None:
+            own = replace(own, plain=self._plain_score(plan, [one.example.labels for one in outcomes]))
+        scored = own if scored is None else scored
+        advice = advised(made, self.examples, scored.together, own.together, a_point_s, scored.plain)
+        taken = _taken(self.examples) if self.options.tare is None else ()
+        return Training(self.options, self.opened, made, scored, why, advice, outcomes, taken)
+
+    def _plain_score(self, plan: Recipe, truths: Sequence[Mapping[str, Any]]) -> PlainScore:
+        """Return how plain rules do on the recordings that they were tuned on."""
+        clocks = [clock_of(one) for one in self.examples]
+        rest = checked(self.examples), list(truths[0]), clocks, floor_of(plan.encoder)
+        return plain_score(*rest, [], truths, self.options.window_ms, self.update)
+
+    def _outcomes(self, made: Trained) -> list[Outcome]:
+        """Return the outcomes of the readout on the recordings that it was trained on."""
+        readout, outcomes = made.readout, []
+        for one, example in zip(self.opened, self.examples, strict=True):
+            self.update(f"scoring on {one.title}")
+            truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
+            detections, outside = run_counting(readout, one, tare=example.tare)
+            own = score(detections, truth, self.options.window_ms)
+            outcomes.append(Outcome(one.title, Example(one, truth, example.tare), detections, own, outside))
+        return outcomes
+
+
+def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
+    """Return the scores of a readout on its own training data."""
+    truths = [one.example.labels for one in outcomes]
+    together = score_together([one.found for one in outcomes], truths, window_ms)
+    return Judged(tuple(one.score for one in outcomes if one.score is not None), together, "its own training data")

@@ -1,0 +1,94 @@
+"""Which rest a detection takes: 0 by the unit, else the first quiet stretch; labels and notes never count."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.recording.test_rest import lain
+from tests.shell import run
+
+import taxel
+from taxel import Array, Frames, ProblemError, Tare
+from taxel.detect import PlainRule
+from taxel.tasks import detect, rest
+
+from .recordings import board, mat, trials
+
+
+def test_forces_rest_at_0_and_other_values_at_their_first_quiet_stretch(tmp_path: Path) -> None:
+    force = rest(taxel.open_all(trials(tmp_path))[0])
+    assert (force.source, force.tare.rest.any(), force.to_dict()["us"]) == ("unit", np.False_, None)
+    pictures = rest(taxel.open(mat(tmp_path)))
+    assert (pictures.source, pictures.to_dict()["us"], pictures.detect_from_us) == ("quiet", [0, 500_000], None)
+    assert np.abs(pictures.tare.rest - 40).max() < 0.5
+    events = rest(taxel.open(board(tmp_path)))
+    assert (events.source, events.tare.stop_us - events.tare.start_us) == ("quiet", 500_000)
+    assert events.tare.stop_us < 700_000
+
+
+@pytest.mark.parametrize("label_us", [None, 40_000, 250_000, 900_000])
+def test_no_label_moves_the_rest_nor_a_detection(tmp_path: Path, label_us: int | None) -> None:
+    place = mat(tmp_path)
+    rule = PlainRule("area", 2, noise_floor=20.0)
+    rule.save(tmp_path / "rule.json")
+    found = detect(rule, taxel.open(place)).to_dict()["recordings"][0]["detections"]
+    table = place.with_name("mat3.notes.csv")
+    table.write_text("label,t_us\n" + ("" if label_us is None else f"contact,{label_us}\n"))
+    assert rest(taxel.open(place)).to_dict() == {"source": "quiet", "us": [0, 500_000]}
+    truth = () if label_us is None else ("--truth", "notes")
+    shown = json.loads(run("detect", place, "--readout", tmp_path / "rule.json", "--json", *truth).stdout)
+    assert (shown["detections"], shown["rest"]) == (found, {"source": "quiet", "us": [0, 500_000]})
+
+
+def test_the_first_stretch_counts_wherever_it_is_and_nothing_before_it_is_left_out(tmp_path: Path) -> None:
+    values = np.full((300, 4, 4), 50.0)
+    for begin in (5, 30, 55, 80, 200):
+        values[begin : begin + 10, 1:3, 1:3] = 250
+    taxel.convert(Frames(values, 10_000 * np.arange(300), unit="counts", array=Array(4, 4)), tmp_path / "a.npz")
+    rule = PlainRule("area", 2, noise_floor=40.0)
+    [each] = detect(rule, taxel.open(tmp_path / "a.npz")).each
+    assert each.rest is not None
+    assert (each.rest.tare.start_us, each.rest.tare.stop_us) == (1_000_000, 1_500_000)
+    assert each.outcome.found.t.tolist() == [10_000 * (k + at) for k in (5, 30, 55, 80, 200) for at in (0, 10)]
+    rule.save(tmp_path / "rule.json")
+    said = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json").stdout
+    assert "rest taken: its first quiet stretch, 1.000 to 1.500 s; --tare gives another" in said
+
+
+def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) -> None:
+    values = np.full((300, 4, 4), 50.0)
+    for begin in range(5, 300, 30):
+        values[begin : begin + 10, 1:3, 1:3] = 250
+    taxel.convert(Frames(values, 10_000 * np.arange(300), unit="counts", array=Array(4, 4)), tmp_path / "a.npz")
+    rule = PlainRule("area", 2, noise_floor=40.0)
+    with pytest.raises(ProblemError, match=r"a\.npz: the rest .* not known, as no half second is quiet .* --tare FILE"):
+        detect(rule, taxel.open(tmp_path / "a.npz"))
+    rule.save(tmp_path / "rule.json")
+    refused = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json")
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+    assert "give --tare SECONDS or --tare FILE" in refused.stderr
+    assert run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json", "--tare", "0.04").returncode == 0
+    # One with its own tare, and one that reads none, need no quiet stretch.
+    tared = PlainRule(
+        "area", 2, noise_floor=40.0, tare=Tare.take(Frames(values, 10_000 * np.arange(300)), stop_us=40_000)
+    )
+    assert len(detect(tared, taxel.open(tmp_path / "a.npz")).outcomes[0].found) == 20
+    levels = taxel.Readout(
+        taxel.encode.LevelCrossing([100.0]), {"on": (taxel.Neuron(tau=2.0), [1.0] * 16 + [0.0] * 16)}
+    )
+    assert detect(levels, taxel.open(tmp_path / "a.npz")).each[0].rest is None
+
+
+@pytest.mark.parametrize("events", [False, True])
+def test_what_lay_on_the_array_in_its_first_quiet_stretch_is_no_rest(tmp_path: Path, events: bool) -> None:
+    source, _ = lain(events=events)
+    taxel.convert(source, tmp_path / "a.npz")
+    with pytest.warns(UserWarning, match="something lay on rows 2 to 4, columns 5 to 7 .* of a time without it"):
+        taken = rest(taxel.open(tmp_path / "a.npz"))
+    assert (taken.source, taken.tare.start_us >= 800_000) == ("quiet", True)
+    assert np.nanmax(np.abs(taken.tare.rest - 50)) < 2.5
+    rule = PlainRule("area", 2, noise_floor=6.0)
+    assert any("something lay on" in text for text in detect(rule, taxel.open(tmp_path / "a.npz")).warnings)
