@@ -3,6 +3,7 @@
 import fcntl
 import os
 import signal
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,10 @@ settings.load_profile("taxel")
 
 # Before NumPy and scikit-learn load: their threads wait for each other by computing, and each worker has one core.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# Tests start taxel a thousand times: each start would compile all of it where nothing compiled may be stored.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # A shell that starts the tests in the background makes them ignore Ctrl-C, which some tests send.
 signal.signal(signal.SIGINT, signal.default_int_handler)
