@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import is_hypothesis_test, settings
 
-settings.register_profile("taxel", deadline=None, derandomize=True)
-settings.load_profile("taxel")
+settings.register_profile("slow", deadline=None, derandomize=True)
+settings.register_profile("quick", settings.get_profile("slow"), max_examples=30)
 
 # Before NumPy and scikit-learn load: their threads wait for each other by computing, and each worker has one core.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -28,8 +28,17 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 collect_ignore_glob = ["data/*", "simulate/press_by_*.py"]
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that look at pages: they take longest, and the last one keeps all others waiting."""
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("slow" if config.option.markexpr == "slow" else "quick")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Begin with the files that look at pages, which take longest; with the slow tests run more random examples too."""
+    if config.option.markexpr == "slow":
+        for item in items:
+            if is_hypothesis_test(getattr(item, "obj", None)):
+                item.add_marker("slow")
     items.sort(key=lambda item: "chromium" not in getattr(item, "fixturenames", ()))
 
 
