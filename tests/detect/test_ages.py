@@ -100,7 +100,7 @@ def test_a_recipe_whose_later_age_was_chosen_is_sound_and_its_search_is_as_it_wa
     assert made.neurons["large"] == recipe.neurons["large"]
 
 
-@settings(max_examples=10)
+@settings(max_examples=settings.default.max_examples // 6)
 @given(st.floats(0.3, 200.0))
 def test_each_delay_has_one_picture(picture_ms: float) -> None:
     recipe = Recipe.load("touch", labels=KINDS)

@@ -86,7 +86,7 @@ def test_a_tare_that_ends_in_a_touch_holds_it(seed: int, share: float) -> None:
     assert held_by_tare([one._replace(tare=Tare.take(frames, stop_us=begin - 20_000))], FLOOR) == 0
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("shift_ms", [-200, 200])
 def test_training_says_first_by_how_much_labels_are_off(tmp_path: Path, capsys, seed: int, shift_ms: int) -> None:
     frames, truth = touched(seed)

@@ -466,7 +466,7 @@ def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.* out of reach")
-@settings(max_examples=10)
+@settings(max_examples=settings.default.max_examples // 6)
 @given(st.integers(0, 1000))
 def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed: int) -> None:
     frames, labels = squares([4, 3, 5, 4] * 3)
