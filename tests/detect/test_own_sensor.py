@@ -413,7 +413,9 @@ def test_a_plain_rule_is_written_and_detects_what_the_training_says(
     assert (code, "known (ms)" in out, "nan" in out, "slope" in out) == (0, True, False, False)
 
 
-@pytest.mark.parametrize("unit", ["N", "kPa", "mN", "Pa", "N/cm2"])
+@pytest.mark.parametrize(
+    "unit", ["N", "kPa", *(pytest.param(one, marks=pytest.mark.slow) for one in ("mN", "Pa", "N/cm2"))]
+)
 def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
     tmp_path: Path, capsys, unit: str
 ) -> None:
