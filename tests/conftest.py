@@ -23,6 +23,9 @@ sys.dont_write_bytecode = False
 
 # A shell that starts the tests in the background makes them ignore Ctrl-C, which some tests send.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# So does nohup with SIGHUP: processes that tests start do not inherit a handler.
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)
 
 #: Scripts that made kept data or that other programs run: not tests, and they need packages that are not installed.
 collect_ignore_glob = ["data/*", "simulate/press_by_*.py"]
