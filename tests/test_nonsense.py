@@ -206,7 +206,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def somewhere(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of that folder as the current one."""
-    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(made, tmp_path, copy_function=shutil.copyfile, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
