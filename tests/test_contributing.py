@@ -14,8 +14,8 @@ from typing import NamedTuple
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-FORMAT, STUDY, ENCODER, LEARNER = "channel", "quiet", "binary", "echo"
-#: The tests that check the laws and registries of formats, studies, encoders and learners.
+FORMAT, STUDY, ENCODER, LEARNER, PAGE = "channel", "quiet", "binary", "echo", "clients"
+#: The tests that check the laws and registries of formats, studies, encoders, learners, and parts of the page.
 TESTS = {
     FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
     STUDY: [
@@ -24,6 +24,7 @@ TESTS = {
     ],
     ENCODER: ["tests/encode/test_laws.py", "tests/encode/test_binary.py"],
     LEARNER: ["tests/learn/test_manners.py", "tests/learn/test_echo.py"],
+    PAGE: ["tests/panel/test_page.py", "tests/panel/test_page_clients.py"],
 }
 
 
@@ -38,7 +39,9 @@ class Piece(NamedTuple):
 def pieces() -> list[Piece]:
     said = (ROOT / "CONTRIBUTING.md").read_text()
     found = re.findall(
-        r"^```(?:python\n#|rust\n//) (\S+?)(?:, (at the end|after [^\n]+))?\n(.*?)^```", said, re.MULTILINE | re.DOTALL
+        r"^```(?:python\n#|(?:rust|js)\n//|html\n<!--) (\S+?)(?:, (at the end|after [^\n]+?))?(?: -->)?\n(.*?)^```",
+        said,
+        re.MULTILINE | re.DOTALL,
     )
     return [Piece(*piece) for piece in found]
 
@@ -111,7 +114,7 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("python/taxel/encode/binary.py", False),
         ("python/taxel/encode/__init__.py", True),
         ("tests/encode/test_binary.py", False),
-        ("benchmarks/encode_binary.py", False),
+        ("benchmarks/taxel_benchmarks/encode_binary.py", False),
     ]
     assert [(p.path, bool(p.after)) for p in of(LEARNER)] == [
         ("crates/taxel-core/src/learn/rivals/echo.rs", False),
@@ -120,7 +123,16 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("python/taxel/learn/__init__.py", True),
         ("tests/learn/test_echo.py", False),
     ]
-    assert sorted(pieces()) == sorted([*of(FORMAT), *of(STUDY), *of(ENCODER), *of(LEARNER)])
+    folder = "crates/taxel-panel"
+    assert [(p.path, bool(p.after)) for p in of(PAGE)] == [
+        (f"{folder}/web/clients.js", False),
+        (f"{folder}/web/index.html", True),
+        *3 * [(f"{folder}/web/main.js", True)],
+        *[(f"{folder}/src/{name}.rs", True) for name in ("assets", "request", "requests", "messages")],
+        ("tests/panel/test_page_clients.py", False),
+    ]
+    every = [*of(FORMAT), *of(STUDY), *of(ENCODER), *of(LEARNER), *of(PAGE)]
+    assert sorted(pieces()) == sorted(every)
 
 
 @pytest.mark.parametrize("name", [FORMAT, pytest.param(STUDY, marks=pytest.mark.slow)])
@@ -157,16 +169,17 @@ def test_a_part_that_is_left_out_is_named(copy: Path, name: str, without: str, s
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A whole copy with the pieces of encoder and learner, whose extension is built from them."""
+    """A whole copy with the pieces of encoder, learner and page, whose extension is built from them."""
     root = tmp_path_factory.mktemp("built")
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     for name in tracked:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
-    for piece in (*of(ENCODER), *of(LEARNER)):
+    for piece in (*of(ENCODER), *of(LEARNER), *of(PAGE)):
         add(root, piece)
     # Dependencies are not built again: the copy uses the checkout's.
-    made = ["build", "--release", "--quiet", "--target-dir", str(ROOT / "target"), "--out", str(root / "wheel")]
+    made = ["build", "--release", "--quiet", "--features", "test-hooks"]
+    made += ["--target-dir", str(ROOT / "target"), "--out", str(root / "wheel")]
     subprocess.run([Path(sys.executable).with_name("maturin"), *made], cwd=root, check=True, capture_output=True)
     (wheel,) = (root / "wheel").glob("*.whl")
     with zipfile.ZipFile(wheel) as inside:
@@ -206,6 +219,25 @@ def test_a_part_of_a_learner_that_is_left_out_is_named(built: Path, without: str
         (built / without).write_text(whole)
     assert done.returncode != 0
     assert said in done.stdout + done.stderr, done.stdout[-3000:] + done.stderr[-1000:]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_what_contributing_says_of_the_page_is_enough(built: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(built / "python")}
+    for tool in ("messages", "page_types"):
+        done = subprocess.run(
+            [sys.executable, f"tools/{tool}.py"],
+            cwd=built,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert "export interface Clients {" in (built / "crates/taxel-panel/web/messages.d.ts").read_text()
+    done = tried(built, PAGE)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
 
 
 def test_a_learner_without_its_line_in_rust_is_named(copy: Path) -> None:

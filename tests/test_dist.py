@@ -98,7 +98,7 @@ def test_the_wheel_runs_the_demo_in_a_bare_environment(tmp_path: Path) -> None:
     assert hooks.stdout == "True False\n", "what only tests call does not ship"
     without = bare.run("taxel", "study", "fig6.1", "--size", "toy")
     assert without.returncode == 2
-    assert without.stderr == "taxel: taxel study is not installed: pip install 'taxel[studies]'\n"
+    assert without.stderr == "taxel: No such command 'study'; see taxel --help\n"
 
 
 def test_the_studies_install_beside_the_wheel(tmp_path: Path) -> None:
@@ -109,3 +109,12 @@ def test_the_studies_install_beside_the_wheel(tmp_path: Path) -> None:
     assert ended.returncode == 0, ended.stderr
     assert "fig6.1, size toy" in ended.stdout
     assert (tmp_path / "report" / "index.html").exists()
+
+
+def test_the_benchmarks_install_beside_the_wheel(tmp_path: Path) -> None:
+    bare = Bare(tmp_path)
+    bare.install("--find-links", str(DIST), str(the("taxel_benchmarks-*.whl")))
+    assert "\n  bench  " in bare.run("taxel", "--help").stdout
+    ended = bare.run("taxel", "bench", "encode_moments", "--quick")
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.startswith("encode_moments: ratios")

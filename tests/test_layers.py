@@ -6,6 +6,7 @@ It takes imports of a package for imports of all that lies in it, so it is told 
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -27,9 +28,21 @@ def name_of(file: Path) -> str:
 MODULES = {name_of(file): ast.parse(file.read_text()) for file in sorted(PYTHON.glob("taxel/**/*.py"))}
 
 
-def imports(module: str) -> list[tuple[str, ast.stmt]]:
+def named(call: ast.Call) -> set[str]:
+    """Return the modules that `import_module` may import by its text; a part that is computed stands for any word."""
+    if not ast.unparse(call.func).endswith("import_module") or not call.args:
+        return set()
+    text = call.args[0]
+    parts = text.values if isinstance(text, ast.JoinedStr) else [text]
+    if not any(isinstance(part, ast.Constant) for part in parts):
+        return set()
+    pattern = "".join(re.escape(str(part.value)) if isinstance(part, ast.Constant) else r"\w+" for part in parts)
+    return {name for name in MODULES if re.fullmatch(pattern, name)}
+
+
+def imports(module: str) -> list[tuple[str, ast.expr | ast.stmt]]:
     """List the modules of taxel that one imports, wherever it does so: a package, where it takes a name of its own."""
-    found: list[tuple[str, ast.stmt]] = []
+    found: list[tuple[str, ast.expr | ast.stmt]] = []
     for node in ast.walk(MODULES[module]):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "taxel":
             assert not node.level, f"{module}, line {node.lineno}: imports by full names"
@@ -38,6 +51,8 @@ def imports(module: str) -> list[tuple[str, ast.stmt]]:
                 found.append((inside if inside in MODULES or inside == "taxel._core" else node.module, node))
         elif isinstance(node, ast.Import):
             found += [(alias.name, node) for alias in node.names if alias.name.split(".")[0] == "taxel"]
+        elif isinstance(node, ast.Call) and module != "taxel":  # which installs `plot()`, and loads what is asked for
+            found += [(name, node) for name in named(node)]
     return [(name, node) for name, node in found if not name.startswith("taxel._core")]
 
 
@@ -77,7 +92,6 @@ THOUSANDS = {
     "taxel.information.codes": "Hz",
     "taxel.information.wire_rate": "kbit/s",
     "taxel.report.listening": "seconds",
-    "taxel.simulate.fem": "N/m, kPa",
     "taxel.live._to_foxglove": "ns",
 }
 

@@ -20,7 +20,7 @@ PAGE = (Path(__file__).parents[1] / "docs" / "terms.md").read_text()
 NAMES, OPTIONS = PAGE.split("## Names")[1].split("## Options of the command line")
 #: The names that `import taxel` shows, and the subpackages that are imported by their own names.
 ROOMS = [*(f"taxel.{n}" for n in taxel.__all__ if isinstance(getattr(taxel, n), ModuleType)), "taxel"]
-ROOMS += ["taxel.report", "taxel.simulate.circuit", "taxel.simulate.fem", "taxel_studies"]
+ROOMS += ["taxel.report", "taxel.simulate.circuit", "taxel_studies"]
 
 
 def first_cells(part: str) -> set[str]:

@@ -157,7 +157,7 @@ def as_formatted(text: str) -> str:
 def rust_table(source: Table) -> str:
     """Write the struct that holds the registers, and its words."""
     fields = source["field"]
-    struct, defaults = [], []
+    struct = []
     for field in fields:
         # A field with an offset: the manual's value is less by it, so the manual's name is no alias for ours.
         rename = (
@@ -165,11 +165,6 @@ def rust_table(source: Table) -> str:
             if field["manual"] == field["name"] or field["offset"]
             else f'    #[serde(alias = "{field["manual"]}")]\n'
         )
-        if field.get("later"):
-            rename += f'    #[serde(default = "at_reset::{field["name"]}")]\n'
-            defaults.append(
-                f"    pub(super) const fn {field['name']}() -> {rust_type(field)} {{\n        {field['default']}\n    }}"
-            )
         unit = "" if field["unit"] in ("flag", "lines", "channels", "version") else f" In units of {field['unit']}."
         struct.append(f"    /// {field['text']}{unit}\n{rename}    pub {field['name']}: {rust_type(field)},")
     words, masks, stores = [], [], []
@@ -206,11 +201,6 @@ def rust_table(source: Table) -> str:
 #[serde(deny_unknown_fields)]
 pub struct Registers {{
 {newline.join(struct)}
-}}
-
-/// Values at reset of the fields that older files lack.
-mod at_reset {{
-{newline.join(defaults)}
 }}
 
 impl Registers {{

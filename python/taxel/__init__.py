@@ -20,8 +20,8 @@ from taxel.tare import Tare
 if TYPE_CHECKING:
     from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire
     from taxel.detect import Readout
-    from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing
-    from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
+    from taxel.recording import BoardChange, Datagrams, Recording, Verdict, Zeroing, open_all
+    from taxel.recording import open_one as open  # noqa: A004  taxel.open is a recording's
     from taxel.recording.convert import convert
     from taxel.recording.cut import cut
     from taxel.recording.health import Health, health
@@ -70,6 +70,7 @@ __all__ = [
     "merge",
     "metrics",
     "open",
+    "open_all",
     "plot",
     "simulate",
     "wire",
@@ -79,13 +80,14 @@ __all__ = [
 #: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
 _ROOMS = (
     "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot", "recording", "simulate",
-    "wire", "wire_v2",
+    "wire",
 )  # fmt: skip
 _RECORDING = (
     "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",
+    "open_all",
 )  # fmt: skip
 _ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
-_ELSEWHERE |= {"open": ("taxel.recording", "open_any"), "Readout": ("taxel.detect", "Readout")}
+_ELSEWHERE |= {"open": ("taxel.recording", "open_one"), "Readout": ("taxel.detect", "Readout")}
 
 
 matplotlib_settings.ignore_current_folder()
@@ -102,8 +104,6 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(place), inside)
         globals()[name] = value
         return value
-    if name == "Label":  # its name until version 0.1
-        return import_module("taxel.labels")._label
     raise AttributeError(f"module 'taxel' has no attribute {name!r}")
 
 

@@ -16,9 +16,6 @@ from taxel._core import ProblemError
 
 __all__ = ["Array", "Places", "names_beside"]
 
-#: The pitch, mm, that a file states where it was unknown, from before a pitch could be unknown.
-_UNKNOWN_MM = 1.0
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Places:
@@ -448,10 +445,10 @@ class Array:
         return cls(rows, columns, pitch_mm, grid, name, places, names)
 
     def _geometry(self) -> dict[str, Any]:
-        """Return the array as JSON values; a pitch of 1 mm is a pair, as a single 1 in a file is an unknown one."""
+        """Return the array as JSON values."""
         rows, columns, _, name, exists, _, names = self._parts()
-        pitch = self.pitch_mm if self.pitch_mm != _UNKNOWN_MM else (_UNKNOWN_MM, _UNKNOWN_MM)
-        parts: dict[str, Any] = {"rows": rows, "columns": columns, "pitch_mm": pitch, "name": name, "exists": exists}
+        parts: dict[str, Any] = {"rows": rows, "columns": columns, "pitch_mm": self.pitch_mm}
+        parts |= {"name": name, "exists": exists}
         parts |= {} if self.places is None else {"places": self.places._json()}
         return parts if names is None else parts | {"names": names}
 
@@ -459,7 +456,7 @@ class Array:
     def _from_geometry(cls, geometry: dict[str, Any]) -> Array:
         """Return the array that a file describes."""
         pitch = geometry.get("pitch_mm")
-        pitch = tuple(pitch) if isinstance(pitch, list) else None if pitch == _UNKNOWN_MM else pitch
+        pitch = tuple(pitch) if isinstance(pitch, list) else pitch
         rows, columns, name = (geometry[field] for field in ("rows", "columns", "name"))
         exists, places = geometry.get("exists"), geometry.get("places")
         grid = None if exists is None else np.array(exists).reshape(rows, columns)

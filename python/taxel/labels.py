@@ -19,7 +19,7 @@ from taxel._base.arguments import shown, text
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named, whole_file
 from taxel._base.header_table import HeaderTable, text_of
-from taxel._base.messages import counted, escaped, warn
+from taxel._base.messages import counted, escaped
 from taxel._base.number_text import int_of
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
@@ -83,27 +83,6 @@ class Note:
     source: str = ""
     replaces: int | None = field(default=None, repr=False)
     others: tuple[tuple[str, str], ...] = field(default=(), repr=False)
-
-    def __getattr__(self, name: str) -> Any:
-        """Return a field by its old name in `taxel.Label`; this is removed in the next version."""
-        if name not in _OF_LABEL:
-            raise AttributeError(f"a Note has no {name!r}")
-        _warn(f"Label.{name} is Note.{_OF_LABEL[name]} now")
-        return getattr(self, _OF_LABEL[name])
-
-
-#: Fields of `Note` by their old names in `taxel.Label`.
-_OF_LABEL = {"label": "text", "t_us": "t", "host_ns": "at_ns"}
-
-
-def _warn(text: str) -> None:
-    warn(text, DeprecationWarning, stacklevel=3)
-
-
-def _label(recording: str, label: str, t_us: int, host_ns: int | None = None) -> Note:
-    """Return the note that replaces a `taxel.Label`; this is removed in the next version."""
-    _warn("taxel.Label is taxel.Note now, whose fields are text, t, at_ns, recording")
-    return Note(label, t_us, host_ns or 0, recording)
 
 
 class Labels:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,11 +11,9 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, shown, whole
-from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
-from taxel._base.documents import text_of_json
-from taxel._base.files import write_whole
 from taxel._base.messages import counted, escaped
+from taxel._base.saved import Saved
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -30,7 +26,7 @@ __all__ = ["Tare"]
 _OTHER = re.compile(r'\s*\{\s*"format":\s*"([\w ]+)"')
 
 
-class Tare:
+class Tare(Saved):
     """Hold the rest of each taxel: the time-weighted mean of its held values over an unloaded interval, and its noise.
 
     Made by `Tare.take`, `Tare.load` or `Tare.from_json`. Measure it with the board's noise floor at 0; otherwise a rest
@@ -43,7 +39,7 @@ class Tare:
         NaN for a taxel without any event.
     noise : float64, shape (rows, columns), in the sensor's unit
         The time-weighted standard deviation of each taxel's held values over the interval; NaN for a taxel without any
-        event, and for all in a tare that an older taxel saved.
+        event.
     start_us, stop_us : int, us
         The interval.
     note : str
@@ -60,6 +56,8 @@ class Tare:
     >>> tare.noise.round(3)
     array([[1.414]])
     """
+
+    _WHAT = "tare"
 
     array: Array
     rest: NDArray[np.float64]
@@ -153,66 +151,13 @@ class Tare:
         values: dict[str, Any] = json.loads(tare._text)
         tare.array = Array._from_geometry(values["array"])
         tare.rest = _of_taxels(values["rest"], tare.array)
-        tare.noise = _of_taxels(values.get("noise", [None] * len(values["rest"])), tare.array)
+        tare.noise = _of_taxels(values["noise"], tare.array)
         tare.start_us, tare.stop_us, tare.note = values["start_us"], values["stop_us"], values["note"]
         return tare
 
     def to_json(self) -> str:
         """Return the tare as JSON."""
         return self._text
-
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the tare to a JSON file, atomically.
-
-        Parameters
-        ----------
-        path : path
-        overwrite : bool
-            Whether an existing file may be replaced.
-
-        Returns
-        -------
-        Path
-
-        Raises
-        ------
-        FileExistsError : the file is there already and `overwrite` is false
-        """
-        return write_whole(path, lambda file: file.write(self.to_json().encode()), overwrite=overwrite)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Tare:
-        """Read a tare from the file that `save` wrote.
-
-        Parameters
-        ----------
-        path : path
-
-        Raises
-        ------
-        FormatError : the file is not a tare (names it)
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from taxel.frames import Frames
-        >>> rest = Tare.take(Frames([[[5.0]], [[7.0]]], [0, 100]))
-        >>> Tare.load(rest.save(Path(tempfile.mkdtemp()) / "tare.json")).rest
-        array([[5.]])
-        """
-        place = Path(checked_path("path", path))
-        text = text_of_json(place)
-        try:
-            return cls.from_json(text)
-        except _core.Error as error:
-            raise FormatError(f"{path}: {error}") from None
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Tare):
-            return NotImplemented
-        return self.to_json() == other.to_json()
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         known = int(np.count_nonzero(~np.isnan(self.rest)))

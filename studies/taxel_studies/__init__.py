@@ -31,6 +31,7 @@ STUDIES = {
     "fig5.7": "bits of an indentation by sampling period and by bits an event",
     "contact_choices": "how much each choice that the thesis leaves open moves the bits of an indentation",
     "drops": "a ball dropped on the array, and what its events and frames cost (5.10, 5.14)",
+    "which_drop": "which ball fell, from how high, on which slant, told soon after its contact",
     "fig5.11": "bits of a drop by sampling period, by parameter, and by time since impact (5.11 to 5.13)",
     "fig6.1": "input spikes, potential, threshold and refractory time, and the output spikes they make",
     "fig6.2": "kappa lifts the potential behind the target, steepens the crossing and keeps the spike's time",

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1
 from taxel.frames import Frames
-from taxel.simulate.fem import Course, KeptCourses, SamplingGrid, Yeoh, bodies
-from taxel.simulate.fem.solids import Solids
 from taxel_studies import indented
+from taxel_studies.fem import Course, KeptCourses, SamplingGrid, Yeoh, bodies
+from taxel_studies.fem.solids import Solids
 from taxel_studies.runner import SharedFolder
 from taxel_studies.study import Parameters, Row, Statement, Summary
 

@@ -8,8 +8,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from taxel.encode import FA1
-from taxel.simulate.fem import DRAGON_SKIN_10, Indentation, SamplingGrid, Yeoh
 from taxel_studies import indented
+from taxel_studies.fem import DRAGON_SKIN_10, Indentation, SamplingGrid, Yeoh
 from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
 

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel.encode import FA1
-from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented
+from taxel_studies.fem import SamplingGrid
 from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.information import FoldSums, folds
-from taxel.simulate.fem import TABLE_5_1, Condition, Course, Indentation, KeptCourses, SamplingGrid, Table, paths
+from taxel_studies.fem import TABLE_5_1, Condition, Course, Indentation, KeptCourses, SamplingGrid, Table, paths
 from taxel_studies.kept_bits import information
 from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Row

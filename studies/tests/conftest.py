@@ -4,6 +4,9 @@ from collections.abc import Iterator
 
 import pytest
 
+#: Programs that other engines run: not tests, and they need packages that are not installed.
+collect_ignore_glob = ["press_by_*.py"]
+
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_commit() -> Iterator[None]:

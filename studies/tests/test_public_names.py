@@ -1,9 +1,10 @@
-"""Studies stand on public names of taxel alone."""
+"""Studies and benchmarks stand on public names of taxel alone, and nothing of taxel on them."""
 
 from __future__ import annotations
 
 import ast
 import pkgutil
+import re
 import tomllib
 from importlib import import_module
 from pathlib import Path
@@ -14,9 +15,12 @@ import pytest
 import taxel
 import taxel_studies
 
-FOLDER = Path(taxel_studies.__file__).parent
-ROOT = FOLDER.parents[1]
-FILES = sorted(FOLDER.rglob("*.py"))
+ROOT = Path(taxel_studies.__file__).parents[2]
+FILES = sorted(
+    file
+    for package in ("studies/taxel_studies", "benchmarks/taxel_benchmarks")
+    for file in (ROOT / package).rglob("*.py")
+)
 
 
 def is_module(name: str) -> bool:
@@ -36,8 +40,8 @@ def wrong(source: str, taken: str) -> str | None:
     return None if taken in public or is_module(f"{source}.{taken}") else f"{source} does not name {taken} in __all__"
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(FOLDER)))
-def test_a_study_takes_public_names_of_taxel_alone(file: Path) -> None:
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(ROOT)))
+def test_a_study_or_a_benchmark_takes_public_names_of_taxel_alone(file: Path) -> None:
     found = []
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "taxel":
@@ -65,10 +69,19 @@ def test_what_is_private_or_unnamed_is_found() -> None:
     assert wrong("taxel.neuron", "np") == "taxel.neuron does not name np in __all__"
 
 
-def test_both_distributions_have_one_version_and_want_each_other() -> None:
-    ours = tomllib.loads((ROOT / "studies" / "pyproject.toml").read_text())["project"]
-    theirs = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert ours["version"] == theirs["version"] == taxel.__version__
+def test_taxel_imports_neither() -> None:
+    importing = re.compile(r"^\s*(from|import) (taxel_studies|taxel_benchmarks)\b", re.MULTILINE)
+    product = (ROOT / "python").rglob("*.py")
+    assert [str(file.relative_to(ROOT)) for file in product if importing.search(file.read_text())] == []
+
+
+def test_all_distributions_have_one_version_and_want_each_other() -> None:
+    ours, benchmarks, theirs = (
+        tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"]
+        for folder in ("studies", "benchmarks", "")
+    )
+    assert ours["version"] == benchmarks["version"] == theirs["version"] == taxel.__version__
     assert f"taxel=={theirs['version']}" in ours["dependencies"]
+    assert {f"taxel=={theirs['version']}", f"taxel_studies=={theirs['version']}"} <= {*benchmarks["dependencies"]}
     assert theirs["optional-dependencies"]["studies"] == [f"taxel_studies=={theirs['version']}"]
     assert theirs["optional-dependencies"]["cluster"] == [f"taxel_studies[cluster]=={theirs['version']}"]

@@ -15,10 +15,10 @@ from shell import run
 
 import taxel
 from taxel import Array, Frames
-from taxel.cli._added import ADDED, OWN
+from taxel.cli._commands import OWN, added
 from taxel.live import Viewer
-from taxel.live._requests import RequestHandler
-from taxel.live._shown_files import Opening
+from taxel.live._requests.training import TrainingRequests
+from taxel.live._shown_files import Opening, ShownFiles
 
 from .marked import TAXEL
 
@@ -112,18 +112,18 @@ def commands(folder: Path) -> dict[str, list[list[object]]]:
         "export": [["nir", folder / "readout.json", "graph.nir"]],
         "information": [[folder / "a.h5", "--labels", folder / "labels.csv", "--window-ms", 50, "--report", "r.html"]],
         "bridge": [live],
-        "bench": [["encode_contact_area", "--quick", "--folder", CHECKOUT / "benchmarks"]],
+        "bench": [["encode_contact_area", "--quick"]],
         "study": [["fig6.2", "--size", "toy", "--jobs", 2, "--report", "report"]],
     }
 
 
 def test_every_command_is_tried() -> None:
-    assert commands(Path()).keys() == {*OWN, *ADDED}
+    assert commands(Path()).keys() == {*OWN, *added()}
 
 
 @pytest.mark.parametrize(
     "command",
-    [pytest.param(name, marks=pytest.mark.slow if name in ("demo", "bench") else ()) for name in (*OWN, *ADDED)],
+    [pytest.param(name, marks=pytest.mark.slow if name in ("demo", "bench") else ()) for name in (*OWN, *added())],
 )
 def test_a_command_runs_no_code_of_a_strange_folder(command: str, here: Path, beside: Path) -> None:
     for words in commands(beside)[command]:
@@ -139,7 +139,7 @@ def test_a_training_of_the_page_runs_no_code_of_a_strange_folder(
     here: Path, beside: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(here)
-    handler = RequestHandler(lambda *_: None, lambda _: None, lambda _: None, None, Opening())
+    handler = TrainingRequests(Opening(), ShownFiles())
     assert "contact, neuron: " in handler.train(beside / "a.h5", here / "r.json")
     check_nothing_ran(here, beside)
 

@@ -128,7 +128,6 @@ def test_footfalls_of_a_plate_are_laid_over_the_array(tmp_path):
     [
         (["--noise", "0"], "noise"),
         (["--data", "nowhere"], "plate"),
-        (["--drops", "nowhere/x.json"], "nowhere: no such folder"),
     ],
 )
 def test_what_the_user_got_wrong_is_one_line(arguments, said, tmp_path):

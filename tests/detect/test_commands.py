@@ -505,7 +505,7 @@ def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path, monkeypatch
     page = (tmp_path / "r" / "report.html").read_text()
     felt = page[page.index("The sum over time") : page.index("<h2>contact</h2>")]
     assert re.findall(r">[^<>]*GaCo99_01 (\w+)</text>", felt) == ["left", "right"]
-    for foot, axes in zip(taxel.open(file), drawn[-1].axes, strict=True):
+    for foot, axes in zip(taxel.open_all(file), drawn[-1].axes, strict=True):
         curve = axes.lines[0]
         assert curve.get_label().startswith("sum, ")
         assert curve.get_ydata() == pytest.approx(foot.frames().values.sum(axis=(1, 2))), foot.label

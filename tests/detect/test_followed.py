@@ -1,7 +1,5 @@
 """The quantity that follows labels, and the point of a recipe that a training chooses."""
 
-import json
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,7 +9,7 @@ import taxel
 from taxel import Frames, ProblemError, SpikeTrains, Tare
 from taxel.detect import Example, Recipe, run, score
 from taxel.detect.followed import follow, silence
-from taxel.detect.training import trained
+from taxel.detect.training import possible, trained
 from taxel.encode import Composite, ContactArea, LocalLoad
 
 STEP_MS = 0.5
@@ -103,15 +101,13 @@ def test_a_point_that_leaves_no_more_counts_only_where_that_is_enough(fewer, inp
     assert made.recipe.neurons["contact"] == {**neuron, "inputs": inputs, "choose": choose}
 
 
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_with_a_tare_without_noise_the_area_is_left() -> None:
-    one = pictures(1, 10.0)
-    assert one.tare is not None
-    older = json.loads(one.tare.to_json())
-    del older["noise"]
-    recipe = Recipe.load("touch", labels=["contact"])
-    example = one._replace(tare=Tare.from_json(json.dumps(older)))
-    assert trained([example], recipe, None).recipe.neurons["contact"]["inputs"] == ["area"]
+def test_without_a_tare_no_input_that_needs_one_is_chosen() -> None:
+    recipe, one = Recipe.load("touch", labels=["contact"]), pictures(1, 10.0)
+    assert possible(recipe, [one]) == recipe
+    left = possible(recipe, [one._replace(tare=None)])
+    names = [name for point in left.neurons["contact"].get("choose", ()) for name in point.get("inputs", ())]
+    assert LocalLoad.name not in {left.encoder.parts[name].name for name in names}
+    assert len(left.neurons["contact"].get("choose", ())) < len(recipe.neurons["contact"]["choose"])
 
 
 def test_points_to_choose_from_are_checked_by_name() -> None:

@@ -61,18 +61,13 @@ def test_the_labels_of_which_the_rule_is_better_are_named(examples) -> None:
     assert judged.plain.to_dict(judged.together)["rules"]["hit"]["quantity"] == "area"
 
 
-def test_without_a_tare_there_is_no_rule_and_without_its_noise_none_by_local_load(examples) -> None:
+def test_without_a_tare_there_is_no_rule(examples) -> None:
     trains = [one._replace(source=ContactArea(tare=one.tare).encode(one.source)) for one in examples]
     judged = judge([one._replace(tare=None) for one in trains], RECIPE, 3)
     assert judged.plain.together is None
     assert judged.plain.rules == {"gone": None, "hit": None}
     assert judged.plain.lacks == "example 0 has no tare to measure a load from"
     assert judged.plain.better(judged.together) == ()
-    older = json.loads(examples[0].tare.to_json())
-    del older["noise"]
-    judged = judge([one._replace(tare=taxel.Tare.from_json(json.dumps(older))) for one in examples], RECIPE, 3)
-    assert judged.plain.lacks == "no rule by local load: the tare has no noise of the taxels"
-    assert judged.plain.rules["hit"] is not None
 
 
 def test_training_says_which_is_better_and_why_there_is_no_rule(examples, tmp_path: Path, capsys) -> None:

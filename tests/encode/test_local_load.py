@@ -286,15 +286,6 @@ def test_a_taxel_without_a_value_yet_does_not_hide_a_touch_beside_it():
     assert largest(pictures).tolist() == [0, 0, pytest.approx(2.0)]
 
 
-def test_an_older_tare_without_noise_is_refused():
-    older = json.loads(rest(scenes.ARRAY).to_json())
-    del older["noise"]
-    tare = Tare.from_json(json.dumps(older))
-    assert np.isnan(tare.noise).all()
-    with pytest.raises(taxel.ProblemError, match=r"no noise of the taxels .*: take it anew"):
-        LocalLoad(tare=tare).encode(Frames(np.zeros((1, 3, 4)), [0]))
-
-
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [

@@ -307,13 +307,13 @@ def test_a_folder_of_tables_opens_by_its_one_layout(tmp_path: Path) -> None:
         (tmp_path / name).write_text(lines(VALUES))
     (tmp_path / "layout.toml").write_text("rows = 2\ncolumns = 3\nrate_hz = 10\n")
     (tmp_path / "labels.csv").write_text("recording,label,t_us\nstep2,contact,100000\n")
-    opened = taxel.open(tmp_path)
+    opened = taxel.open_all(tmp_path)
     assert [one.name for one in opened] == ["step2.csv", "step10.csv"]
     assert [len(one.notes) for one in opened] == [1, 0]
 
 
 def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) -> None:
-    left, right = taxel.open(write_gaitpdb(tmp_path))
+    left, right = taxel.open_all(write_gaitpdb(tmp_path))
     assert (left.side, right.side) == ("left", "right")
     for foot, sign in ((left, -1), (right, 1)):
         places = foot.array.places
@@ -403,18 +403,70 @@ def test_a_name_with_a_comma_over_one_column_is_a_name(tmp_path: Path) -> None:
         (Frames(VALUES[:, None], [0, 1, 2], array=Array(1, 6, 3.0)), "pitch_mm = 4", "the file says 3 mm apart"),
     ],
 )
-def test_a_layout_that_contradicts_the_file_is_refused(tmp_path: Path, frames: Frames, layout: str, match: str) -> None:
+def test_a_layout_that_contradicts_the_file_is_refused_where_it_is_given(
+    tmp_path: Path, frames: Frames, layout: str, match: str
+) -> None:
     taxel.convert(frames, tmp_path / "one.npz")
     (tmp_path / "layout.toml").write_text(layout)
     with pytest.raises(FormatError, match=match):
-        taxel.open(tmp_path / "one.npz")
+        taxel.open(tmp_path / "one.npz", layout=tmp_path / "layout.toml")
+    # One that only lies beside it fills what is missing.
+    assert taxel.open(tmp_path / "one.npz").frames() == frames
+
+
+@pytest.mark.parametrize("ending", [".npz", ".h5", ".mcap"])
+@pytest.mark.parametrize("falls", ["true", "10"])
+def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
+    tmp_path: Path, ending: str, falls: str
+) -> None:
+    (tmp_path / "layout.toml").write_text(f'falls = {falls}\nrate_hz = 100\nunit = "N"\nheel = "top"\nside = "left"\n')
+    (tmp_path / "step.txt").write_text(lines(VALUES))
+    recording = taxel.open(tmp_path / "step.txt")
+    np.testing.assert_array_equal(
+        recording.frames().values[:, 0], (float(falls != "true" and falls) - VALUES).astype("f4")
+    )
+    for name in ("again", "and_again"):
+        taxel.convert(recording, tmp_path / f"{name}{ending}")
+        recording, before = taxel.open(tmp_path / f"{name}{ending}"), recording
+        assert recording.frames() == before.frames()
+        assert (recording.side, recording.heel, recording.timed) == ("left", "top", True)
+    # The same again is no contradiction, another number is.
+    given = tmp_path / "given.toml"
+    given.write_text(f"falls = {falls}\n")
+    assert taxel.open(recording.path, layout=given).frames() == recording.frames()
+    for other in ("false", "255"):
+        given.write_text(f"falls = {other}\n")
+        was = falls.replace("true", "0")
+        with pytest.raises(FormatError, match=f"says falls = {other}; the readings of .* were turned by falls = {was}"):
+            taxel.open(recording.path, layout=given)
+    given.write_text('heel = "bottom"\n')
+    with pytest.raises(FormatError, match=r"says heel bottom; .* says top"):
+        taxel.open(recording.path, layout=given)
+
+
+def test_turned_readings_are_not_written_where_a_layout_would_turn_them_again(tmp_path: Path) -> None:
+    recording = table(tmp_path, lines(VALUES), "falls = true\nrate_hz = 100")
+    with pytest.raises(
+        taxel.ProblemError, match=r"turned already, which a \.csv cannot state, and .*step\.layout\.toml"
+    ):
+        taxel.convert(recording, tmp_path / "step.csv")
+    assert "that its readings were turned (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
+
+
+def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_folder(tmp_path: Path) -> None:
+    events = Events([0], [1], [1], [True], array=Array(2, 2), intensity=[7])
+    taxel.convert(events, tmp_path / "touch.mcap")
+    (tmp_path / "layout.toml").write_text("rows = 2\ncolumns = 3\nfalls = true\nrate_hz = 100\nunit = 'N'\n")
+    assert taxel.open(tmp_path / "touch.mcap").events == events
+    with pytest.raises(FormatError, match="says 2 x 3 taxels"):
+        taxel.open(tmp_path / "touch.mcap", layout=tmp_path / "layout.toml")
 
 
 def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: Path) -> None:
     write_gaitpdb(tmp_path)
     (tmp_path / "layout.toml").write_text("[places]\nx = [1, 2]\ny = [1, 2]\n")
     with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 8\), one a taxel"):
-        taxel.open(tmp_path)
+        taxel.open_all(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ def test_moticon_rows_that_are_missing_for_a_foot_are_missing_not_zero(tmp_path)
 
 
 def test_what_a_file_holds_beside_its_taxels_is_said_and_goes_with_the_file(tmp_path):
-    left, right = taxel.open(write_moticon(tmp_path))
+    left, right = taxel.open_all(write_moticon(tmp_path))
     columns = [
         f"left {what}" for what in ("acceleration X[g]", "angular Z[dps]", "center of pressure X[-0.5...+0.5]", "cop Y")
     ]

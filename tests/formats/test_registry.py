@@ -28,7 +28,7 @@ def test_a_folder_of_no_or_of_several_formats_is_refused(tmp_path):
     with pytest.raises(FormatError, match=r"several formats \(gaitpdb, pedar\)"):
         list(formats.trials(tmp_path))
     with pytest.raises(FormatError, match=r"several formats \(gaitpdb, pedar\): name one file"):
-        taxel.open(tmp_path)
+        taxel.open_all(tmp_path)
     assert len(list(formats.trials(tmp_path, "pedar"))) == 2
 
 
@@ -36,12 +36,12 @@ def test_the_folder_that_one_is_in_opens_by_a_dot(tmp_path, monkeypatch):
     (tmp_path / "trials").mkdir()
     write_pedar(tmp_path / "trials")
     monkeypatch.chdir(tmp_path / "trials")
-    names = [one.name for one in taxel.open(tmp_path / "trials")]
+    names = [one.name for one in taxel.open_all(tmp_path / "trials")]
     for place in (".", "./", Path()):
-        assert [one.name for one in taxel.open(place)] == names
+        assert [one.name for one in taxel.open_all(place)] == names
     (tmp_path / "trials" / "deeper").mkdir()
     monkeypatch.chdir(tmp_path / "trials" / "deeper")
-    assert [one.name for one in taxel.open("..")] == names
+    assert [one.name for one in taxel.open_all("..")] == names
 
 
 def test_a_format_is_one_that_there_is(tmp_path):
@@ -216,4 +216,4 @@ def test_the_command_line_says_what_is_in_it_trial_by_trial(
         assert len({one["file"] for one in every}) == len(every) == len(trials)
         assert {one["kind"] for one in every} == {name}
         assert all(one["file"].startswith(str(place)) for one in every)
-    assert taxel.open(tmp_path)[0].verdict == f"the {name} recording does not say what was lost"
+    assert taxel.open_all(tmp_path)[0].verdict == f"the {name} recording does not say what was lost"

@@ -40,8 +40,7 @@ def _each(name: str) -> list[taxel.Recording]:
         pytest.skip(f"no {name} in {SHARED}: set TAXEL_DATA")
     endings = (".h5", ".txt", ".asf")
     files = sorted(one for one in place.iterdir() if one.suffix in endings) if place.is_dir() else []
-    opened = [taxel.open(one) for one in files or [place]]
-    return [one for some in opened for one in (some if isinstance(some, list) else [some])]
+    return [one for file in files or [place] for one in taxel.open_all(file)]
 
 
 @pytest.mark.parametrize("name", EXPECTED)

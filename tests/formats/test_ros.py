@@ -468,11 +468,11 @@ def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:
     for name in KINDS:
         bags.write(tmp_path / f"{name[:3]}{KINDS.index(name)}{name[5:]}", palms())
     (tmp_path / "labels.csv").write_text(f"recording,label,t_us\ngra1,contact,{BEGIN_NS // 1000 + 5000}\n")
-    opened = taxel.open(tmp_path, topic="/palm", array=PALM_ARRAY)
+    opened = taxel.open_all(tmp_path, topic="/palm", array=PALM_ARRAY)
     assert [one.name for one in opened] == ["gra0.bag", "gra1.db3", "gra2.mcap", "gra3"]
     assert [len(one.notes) for one in opened] == [0, 1, 0, 0]
     with pytest.raises(FormatError, match=r"gra2\.mcap: a ROS bag; say what to open"):
-        taxel.open(tmp_path)
+        taxel.open_all(tmp_path)
 
 
 def test_without_rosbags_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:

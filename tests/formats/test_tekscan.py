@@ -41,8 +41,8 @@ def test_an_excerpt_as_published_is_read_as_by_hand(name, shape, unit, pitch, ta
 
 
 def test_times_are_those_that_the_frames_state_else_their_numbers_times_the_period():
-    assert taxel.open(EXCERPTS / "iscan.csv")[0].frames().t.tolist() == [5_550_000, 5_660_000, 5_760_000]
-    assert taxel.open(EXCERPTS / "fscan.asf")[0].frames().t.tolist() == [928_000, 960_000, 992_000]
+    assert taxel.open_all(EXCERPTS / "iscan.csv")[0].frames().t.tolist() == [5_550_000, 5_660_000, 5_760_000]
+    assert taxel.open_all(EXCERPTS / "fscan.asf")[0].frames().t.tolist() == [928_000, 960_000, 992_000]
 
 
 def test_a_missing_frame_and_unequal_spacings(tmp_path):

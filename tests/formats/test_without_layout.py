@@ -242,7 +242,7 @@ def test_a_folder_of_tables_without_a_layout_says_the_same(tmp_path: Path) -> No
     (tmp_path / "a.csv").write_text(lines(VALUES))
     (tmp_path / "read me.txt").write_text("of a hand")
     with pytest.raises(FormatError, match=r"a\.csv: holds a table of 6 columns, .*\nrows = 1\ncolumns = 6"):
-        taxel.open(tmp_path)
+        taxel.open_all(tmp_path)
 
 
 def test_a_text_without_numbers_prints_no_layout(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from .touches import folder
 estimating = importlib.import_module("taxel.information.estimate")
 
 #: The processor time between the signal and its answer, s: another load of the machine does not count. Half a second is
-#: the goal; what is reached stands in docs/limits.md.
+#: the goal; the page of limits says where it is missed.
 SOON_S = 1.5
 
 CHILD = """

@@ -1,9 +1,8 @@
-"""How far apart taxels are, or where: what needs mm refuses without them; files of before read with the new rule."""
+"""How far apart taxels are, or where: what needs mm refuses without them."""
 
 from __future__ import annotations
 
 import json
-import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -18,8 +17,6 @@ import taxel
 from taxel import Array, Calibration, Events, Frames, Places, ProblemError, Readout, Tare
 from taxel.calibration import Load
 
-#: Files that the version before wrote, in which a pitch was always a number.
-OLD = Path(__file__).parent.parent / "data" / "geometry"
 PLATE = Array(4, 3, (7.62, 5.08), name="plate")
 FOOT = Array(1, 3, name="foot", places=Places([0.0, 10.0, 4.0], [0.0, 2.0, 8.0], [4.0, 9.0, 1.0], "mm"))
 VAGUE = Array(1, 3, name="vague", places=Places([0.0, 10.0, 4.0], [0.0, 2.0, 8.0]))
@@ -75,42 +72,6 @@ def test_tares_readouts_and_recordings_of_events_keep_all_of_a_sensor(
     place = tmp_path_factory.mktemp("events") / "one.mcap"
     taxel.convert(Events([0], [0], [0], [True], array=array, intensity=[5]), place)
     assert taxel.open(place).array == array
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("insole.npz", None), ("insole.h5", None), ("mat.npz", None), ("some.npz", None), ("some.h5", None),
-        ("plate.npz", 5.08), ("events.mcap", None), ("skin.mcap", 5.0), ("board.mcap", 2.67),
-    ],
-)  # fmt: skip
-def test_a_pitch_of_1_of_before_is_unknown_and_others_are_kept(name: str, expected: float | None) -> None:
-    recording = taxel.open(OLD / name)
-    assert recording.array.pitch_mm == expected
-    table = recording.events if recording.has_events else recording.frames()
-    assert table.array == recording.array
-    assert len(table) > 0
-
-
-def test_the_board_s_recording_of_before_is_of_the_thesis_array_and_is_written_the_same(tmp_path: Path) -> None:
-    recording = taxel.open(OLD / "board.mcap")
-    assert recording.array == Array.thesis()
-    again = tmp_path / "again.mcap"
-    taxel.convert(recording, again)
-    header = re.search(rb'"array":\{[^}]*\}', (OLD / "board.mcap").read_bytes())
-    assert header is not None
-    assert header[0] in again.read_bytes()
-
-
-def test_tare_calibration_and_readout_of_before_load() -> None:
-    assert Tare.load(OLD / "tare.json").array.pitch_mm is None
-    calibration = Calibration.load(OLD / "mat.calibration.json")
-    assert calibration.array.pitch_mm is None
-    readout = Readout.load(OLD / "readout.json")
-    assert readout.array is not None
-    assert (readout.array.pitch_mm, readout.array.is_channels) == (None, True)
-    taxel.detect.run(readout, taxel.open(OLD / "insole.npz"))
-    assert taxel.open(OLD / "mat.npz").calibrated().unit == "N"
 
 
 @pytest.mark.parametrize(

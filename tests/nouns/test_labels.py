@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import taxel
 from taxel import _core
 from taxel.labels import TURN_US, write_labels
-from taxel.live._requests import RequestHandler
+from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
 from taxel.recording.opening import is_recording
 
@@ -172,8 +172,8 @@ def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(row
         with place.open("w", newline="") as file:
             table = csv.writer(file)
             table.writerows([("label", "t_us", "source", "recording", "comment", "sure"), *rows])
-        handler = RequestHandler(*[lambda *_: None] * 3, None, Opening())
-        shown, _ = handler.read_labels(place, "walk.mcap")
+        handler = LabelRequests(Opening())
+        shown, _ = handler.read(place, "walk.mcap")
         assert len(shown) == len(rows)
         at = random.randrange(len(rows))
         left = [row if row[3] != "walk" else (*row[:3], "", *row[4:]) for row in rows]
@@ -189,7 +189,7 @@ def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(row
             del left[at]
         else:
             left[at] = (*changed, source, trial, *said)
-        outcomes, (written, _) = handler.change_labels(place, "walk.mcap", [] if change == "none" else [[edit]])
+        outcomes, (written, _) = handler.change(place, "walk.mcap", [] if change == "none" else [[edit]])
         assert not any(isinstance(outcome, str) for outcome in outcomes)
         assert sorted(row[:4] for row in written) == sorted(row[:4] for row in left)
         again = taxel.Labels(place).rows
@@ -222,7 +222,7 @@ def test_an_empty_table_has_no_labels(text: bytes, name: str, tmp_path: Path) ->
     assert (table.rows, table.removed, table.recordings) == ((), (), ())
     assert taxel.open(made.path).notes == made.notes == ()
     # It is no recording of its folder.
-    assert [one.path for one in taxel.open(tmp_path)] == [made.path]
+    assert [one.path for one in taxel.open_all(tmp_path)] == [made.path]
     assert not is_recording(place)
     write_labels(place, [("heel", 5)])
     assert [row.text for row in taxel.Labels(place).rows] == ["heel"]

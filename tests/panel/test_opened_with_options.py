@@ -172,7 +172,7 @@ def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
         answer = page.ask("train")
         assert answer["type"] == "done", answer
         assert "contact, neuron: 5 of 5 found" in page.since_asked("trained")["text"]
-    opened_as = {one.name: [note.t for note in one.notes] for one in taxel.open(folder, topic="/palm")}
+    opened_as = {one.name: [note.t for note in one.notes] for one in taxel.open_all(folder, topic="/palm")}
     assert opened_as == times | {"b.bag": [times["b.bag"][0] + 10_000, *times["b.bag"][1:]]}
     for words in ((), ("--labels", folder / "labels.csv")):
         out = ("--folds", 0, "-o", tmp_path / "r.json", "--overwrite")
@@ -199,7 +199,7 @@ def test_labels_of_a_folder_are_of_the_topic_that_they_name(tmp_path):
     times = presses(tmp_path / "two", ("a.bag", "b.bag"), topics)["a.bag"]
     rows = [f"a.bag,,turn,{times[0]}", f"a.bag,/wrist,contact,{times[1]}"]
     (tmp_path / "two" / "labels.csv").write_text("\n".join(["recording,source,label,t_us", *rows]))
-    folder = taxel.open(tmp_path / "two", topic=topics)
+    folder = taxel.open_all(tmp_path / "two", topic=topics)
     for one, expected in zip(
         [*folder, taxel.open(tmp_path / "two" / "a.bag", topic=topics)], (True, False, True), strict=True
     ):
@@ -264,7 +264,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
     for name in TABLES:
         with Panel(folder / name, **given) as panel, Client(panel) as page:
             shown_alike(page, [name], values)
-    assert [one.name for one in taxel.open(folder, **given)] == list(TABLES)
+    assert [one.name for one in taxel.open_all(folder, **given)] == list(TABLES)
     (folder / "labels.csv").write_text("recording,label,t_us\npalm,contact,100000\n")
     (folder / "read me.txt.md").write_text("of the palm")
     with viewed(tmp_path, folder, *([] if beside else ["--layout", layout])) as page:
@@ -317,7 +317,7 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
     table = (tmp_path / "ball.csv.notes.csv").read_text().splitlines()
     assert table[0] == "label,t_us,recording"
     assert len(table) == 11
-    notes = [len(one.notes) for one in taxel.open(file)]
+    notes = [len(one.notes) for one in taxel.open_all(file)]
     assert notes == [5, 0, 5, 0]
     code, said, errors = call(
         capsys, "train", file, "--labels", "notes", "--rate-hz", 100, "-o", tmp_path / "again.json", "--json"

@@ -43,6 +43,26 @@ def test_every_part_that_the_program_looks_for_is_in_the_page() -> None:
             assert set(names.split()) <= set(ids), f"{attribute}={names}"
 
 
+def test_every_module_is_imported() -> None:
+    code = {file.name: file.read_text() for file in WEB.glob("*.js")}
+    named = {name for text in code.values() for name in re.findall(r'\bfrom "\./([\w-]+\.js)"', text)}
+    named |= set(re.findall(r'<script type="module" src="([\w-]+\.js)"', (WEB / "index.html").read_text()))
+    assert sorted(code.keys() - named) == [], "no module imports it, nor does the page"
+
+
+def test_every_element_with_an_id_is_named_by_code_or_by_another_element() -> None:
+    html = (WEB / "index.html").read_text()
+    code = "\n".join(re.sub(r"(?s:/\*.*?\*/)|(?m:^\s*//.*$)", "", file.read_text()) for file in WEB.glob("*.js"))
+    named = [re.escape(text) for text in re.findall(r'"([\w-]+)"', code)]
+    # Such as `${name}-lane`.
+    templates = re.findall(r"`((?:[\w-]+-)?\$\{\w+\}(?:-[\w-]+)?)`", code)
+    named += [re.sub(r"\$\{\w+\}", r"[\\w-]+", text) for text in templates if "-" in text]
+    written = re.compile("|".join(named))
+    titles = set(" ".join(re.findall(r'\b(?:for|list|aria-[a-z]+)="([^"]+)"', html)).split())
+    ids = re.findall(r'\bid="([^"]+)"', html)
+    assert [name for name in ids if name not in titles and not written.fullmatch(name)] == []
+
+
 def test_the_page_asks_nobody_else_for_anything() -> None:
     for name in SERVED:
         if not name.endswith("LICENSE") and name != "vendor/uPlot.js":

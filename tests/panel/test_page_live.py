@@ -111,10 +111,10 @@ def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Pat
         )
         assert listed == [port.place for port in taxel.device.ports()]
         page.locator("#control").fill("127.0.0.1:1")
-        page.locator("#control-connect").click()
+        page.locator("#control-form").get_by_role("button", name="Connect", exact=True).click()
         shows(page, "control-why", "refused")
         page.locator("#control").fill(control)
-        page.locator("#control-connect").click()
+        page.locator("#control-form").get_by_role("button", name="Connect", exact=True).click()
         shows(page, "where-info", re.escape(control))
         until(lambda: page.get_by_label("Noise floor", exact=True).is_enabled(), "registers can be written")
         shows(page, "board-lines", "REG")

@@ -18,8 +18,8 @@ from tests.panel.pages import clock, opened, press, recording, shown, shows, sti
 import taxel
 from taxel import Array, Frames
 from taxel.live import Panel
-from taxel.live._requests import RequestHandler
-from taxel.live._shown_files import Opening
+from taxel.live._requests.training import TrainingRequests
+from taxel.live._shown_files import Opening, ShownFiles
 from taxel.recording.pressure import readings
 from taxel.recording.rest import of_pictures
 
@@ -130,16 +130,16 @@ print("held out: all found")
     )
     command.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(command))
-    handler = RequestHandler(lambda *_: None, lambda _: None, lambda _: None, None, Opening())
-    assert handler.training_progress() == ""
+    handler = TrainingRequests(Opening(), ShownFiles())
+    assert handler.progress() == ""
     printed: list[str] = []
     training = threading.Thread(target=lambda: printed.append(handler.train(tmp_path / "a.npz", tmp_path / "a.json")))
     training.start()
-    until(lambda: handler.training_progress() == "fold 2 of 5, after 12 s; about 30 s in all", "its estimate")
+    until(lambda: handler.progress() == "fold 2 of 5, after 12 s; about 30 s in all", "its estimate")
     end.touch()
     training.join()
     assert printed == ["held out: all found\nwarning: 3 labels are alone"]
-    assert handler.training_progress() == ""
+    assert handler.progress() == ""
 
 
 def test_detections_of_a_recording_are_in_order_and_the_time_stays_without_them(chromium: Any, recording: Path) -> None:

@@ -141,7 +141,7 @@ def test_neither_marks_nor_lines_cover_the_headings_of_the_lanes(
 
 def test_notes_of_both_feet_are_used_as_labels_of_each(chromium: Any, tmp_path: Path) -> None:
     file = write_gaitpdb(tmp_path)
-    noted = {one.label: [(note.text, note.t) for note in one.notes] for one in taxel.open(file)}
+    noted = {one.label: [(note.text, note.t) for note in one.notes] for one in taxel.open_all(file)}
     count = sum(map(len, noted.values()))
     assert count > 0
     with shown(chromium, file) as page:
@@ -158,7 +158,7 @@ def test_notes_of_both_feet_are_used_as_labels_of_each(chromium: Any, tmp_path: 
     for foot, own in noted.items():
         assert sorted((row["label"], int(row["t_us"])) for row in table if row["source"] == foot) == sorted(own)
     # A note that is a label too is one event.
-    again = {one.label: [(note.text, note.t) for note in one.notes] for one in taxel.open(file)}
+    again = {one.label: [(note.text, note.t) for note in one.notes] for one in taxel.open_all(file)}
     assert {foot: sorted(own) for foot, own in again.items()} == {foot: sorted(own) for foot, own in noted.items()}
 
 
@@ -292,7 +292,7 @@ def test_the_head_of_pictures_has_their_number_and_each_foot_and_no_words_on_los
     chromium: Any, tmp_path: Path
 ) -> None:
     file = write_gaitpdb(tmp_path)
-    feet = taxel.open(file)
+    feet = taxel.open_all(file)
     assert {foot.verdict.status for foot in feet} == {"unknown"}
     with shown(chromium, file) as page:
         count = f"{sum(len(foot.frames()) for foot in feet):,}"

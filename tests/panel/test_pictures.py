@@ -16,6 +16,7 @@ from taxel import Array, Frames, Places
 from taxel.live import Panel
 from taxel.live import _shown_files as shown_files
 from taxel.live._shown_files import side_by_side
+from taxel.recording.contents import Contents, source_from
 from taxel.recording.opening import open_joined
 from taxel.recording.pressure import above_rest, force_n
 from taxel.recording.rest import ticks_by_unit
@@ -100,7 +101,7 @@ def test_both_feet_stand_side_by_side(tmp_path):
         assert page.ask("mark", label="turn", t_us=90_000)["type"] == "done"
         assert page.ask("cut", start_us=0, stop_us=100_000, name="cut.mcap")["type"] == "done"
     assert (tmp_path / "walk.notes.csv").read_text() == "label,t_us,source\nheel,50000,left\nturn,90000,\n"
-    again = taxel.open(file)
+    again = taxel.open_all(file)
     said = [[note.text for note in one.notes if note.text in ("heel", "turn")] for one in again]
     assert said == [["heel", "turn"], ["turn"]]
     part = taxel.open(tmp_path / "cut.mcap")
@@ -179,7 +180,7 @@ def test_spikes_of_both_feet_are_those_of_each(tmp_path):
 
 def test_an_encoder_that_does_not_fit_pictures_is_refused_with_the_reason(tmp_path):
     taxel.convert(frames_of(), tmp_path / "mat.mcap")
-    trial = taxel.open(write_icub(tmp_path))[0]
+    trial = taxel.open_all(write_icub(tmp_path))[0]
     taxel.convert(trial, tmp_path / "grasp.npz")
     with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
         opened(page, "mat.mcap")
@@ -197,8 +198,8 @@ def test_an_encoder_that_does_not_fit_pictures_is_refused_with_the_reason(tmp_pa
 
 def test_pictures_without_times_are_numbered(tmp_path):
     frames = Frames(np.arange(12.0).reshape(4, 1, 3), np.arange(4), array=Array(1, 3))
-    trial = taxel.open(write_icub(tmp_path))[0]._contents
-    taxel.convert(taxel.Recording(trial.but(frames=frames, array=frames.array)), tmp_path / "grasp.npz")
+    trial = taxel.open_all(write_icub(tmp_path))[0]._contents.one
+    taxel.convert(taxel.Recording(Contents.of(source_from(frames, trial.origin, untimed=True))), tmp_path / "grasp.npz")
     with Panel(tmp_path / "grasp.npz") as panel, Client(panel) as page:
         about = opened(page, "grasp.npz")
         us = about["pictures"]["picture_us"]
@@ -227,7 +228,7 @@ def test_a_file_of_several_trials_shows_each(tmp_path):
         assert page.ask("open", name=file.name, trial="ball/9")["type"] == "refused"
         assert page.ask("mark", label="slip", t_us=0)["type"] == "done"
     assert (tmp_path / "ball.csv.notes.csv").read_text() == "label,t_us,recording\nslip,0,ball/2\n"
-    assert [[note.text for note in one.notes] for one in taxel.open(file)] == [[], ["slip"]]
+    assert [[note.text for note in one.notes] for one in taxel.open_all(file)] == [[], ["slip"]]
 
 
 def test_events_of_a_table_are_shown_as_those_of_a_board(tmp_path):

@@ -244,7 +244,7 @@ def spoil_json(rng: np.random.Generator, text: str) -> str:
 def spoil_npz(rng: np.random.Generator, data: bytes) -> bytes:
     """Spoil what is inside, and pack it soundly again: checksums agree, so what is read is nonsense."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        # As in a file of before: by its checksum the file is refused before anything else is looked at.
+        # By its checksum the file is refused before anything else is looked at.
         members = {name: archive.read(name) for name in archive.namelist() if name != "digest.npy"}
     name = list(members)[int(rng.integers(len(members)))]
     way = rng.integers(0, 6)

@@ -251,11 +251,10 @@ KINDS: dict[str, Callable[[Path, int], Path]] = {
 QUICK = ("mcap of events", "mcap of pictures", "lsa", "npz of events", "npz of pictures", "npy", "gaitndd", "popu")
 
 
-def arrays_of(opened: Any) -> int:
+def arrays_of(every: Any) -> int:
     """Return the bytes of the arrays of recordings, each counted once."""
     import taxel
 
-    every = opened if isinstance(opened, list) else [opened]
     held: dict[int, int] = {}
     for recording in [source for one in every for source in (one.sources.values() or [one])]:
         table = recording.events if recording.has_events else recording.frames()
@@ -279,8 +278,7 @@ def answer(path: str, at_most: int, how: dict[str, Any]) -> None:
     if at_most:
         resource.setrlimit(resource.RLIMIT_AS, (at_most, at_most))
     try:
-        opened = taxel.open(path, **how)
-        said = {"arrays": arrays_of(opened), "peak": peak()}
+        said = {"arrays": arrays_of(taxel.open_all(path, **how)), "peak": peak()}
     except taxel.Error as error:
         said = {"refused": str(error), "peak": peak()}
     print(json.dumps(said), flush=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,10 @@ from hypothesis import strategies as st
 from shell import call
 
 import taxel
-from taxel import Frames
+from taxel import Frames, _core
 from taxel._core import FormatError, ProblemError
 
-from .making import record, some_events, some_frames
+from .making import HEADER, record, some_events, some_frames
 
 KINDS = (".mcap", ".lsa", ".npz", ".csv")
 THESIS = taxel.Array.thesis()
@@ -172,7 +173,7 @@ def test_a_csv_of_pictures_has_a_column_a_taxel_that_exists(tmp_path: Path) -> N
 def test_a_csv_of_pictures_keeps_each_value_to_the_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
 ) -> None:
-    monkeypatch.setattr(taxel.recording.csv, "_PICTURES", at_once)
+    monkeypatch.setattr(taxel.recording.write_csv, "_PICTURES", at_once)
     values = np.array([[0.0, -0.0, np.nan], [0.1, 1e-30, 1e30], [7.0, -7.5, 0.1]], np.float32)
     taxel.convert(taxel.Frames(values[:, None], [0, 5, 9]), tmp_path / "a.csv")
     read = taxel.open(tmp_path / "a.csv").frames()
@@ -272,3 +273,18 @@ def test_a_csv_loses_of_a_sensor_of_unknown_pitch_its_name_alone(
     code, out, error = call(capsys, "convert", tmp_path / "mat.npz", tmp_path / "mat.csv")
     assert (code, said in out) == (0, True), (out, error)
     assert ("the sensor (3" in out) == (pitch_mm is not None)
+
+
+@pytest.mark.parametrize("between", [".mcap", ".npz", ".h5"])
+def test_what_was_received_and_dropped_is_there_again_after_any_conversions(tmp_path: Path, between: str) -> None:
+    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
+    for number in (0, 1, 4):
+        writer.datagram(number, number, b"\xc0\x00\x00\x03\x04")
+    writer.finish(json.dumps({"received": 5, "dropped_by_kernel": 3, "dropped_by_queue": 2}))
+    first = last = taxel.open(tmp_path / "a.mcap")
+    for k, kind in enumerate((".mcap", between, ".mcap")):
+        taxel.convert(last, tmp_path / f"{k}{kind}")
+        last = taxel.open(tmp_path / f"{k}{kind}")
+    assert {name: last.counts[name] for name in first.counts} == first.counts
+    assert (last.counts["received"], last.counts["dropped_by_kernel"], last.counts["dropped_by_queue"]) == (5, 3, 2)
+    assert last.verdict == first.verdict

@@ -7,6 +7,7 @@ import json
 import re
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,11 @@ import pytest
 
 import taxel
 from taxel._core import FormatError
-from taxel.recording.npz import columns_of, contents_of
+from taxel.recording.contents import Contents
+from taxel.recording.once import known
+from taxel.recording.read_npz import source_of_columns
 from taxel.recording.verdict import Verdict
+from taxel.recording.write_npz import columns_of
 
 from .making import record, some_events, some_frames
 
@@ -30,7 +34,9 @@ def converted(folder: Path, kind: str) -> Path:
     lost = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 12345}})
     held = np.full((64, 64), 3, np.uint16)
     path = folder / f"b.{kind}"
-    taxel.convert(taxel.Recording(contents.but(verdict=lost, held=held)), path)
+    one = replace(contents.one, losses=replace(contents.one.losses, verdict=known(lost)))
+    one = replace(one, settings=replace(one.settings, held=known(held)))
+    taxel.convert(taxel.Recording(Contents.of(one)), path)
     assert "12345" in taxel.open(path).verdict
     return path
 
@@ -106,7 +112,7 @@ def test_what_is_not_as_written_is_refused_but_opens_without_its_checksum(
     within(path, change)
     with pytest.raises(FormatError, match=f"^{re.escape(str(path))}: {DAMAGED}$"):
         taxel.open(path)
-    # As files of before, and those that are changed on purpose.
+    # As of files that are changed on purpose.
     within(path, lambda columns: columns.pop("digest"))
     assert len(taxel.open(path).events) == 3000
 
@@ -134,9 +140,11 @@ def test_both_formats_have_the_checksum_that_the_page_states(order: Any, tmp_pat
 
 
 def test_rows_without_bytes_take_no_time(tmp_path: Path) -> None:
-    columns = columns_of(taxel.open(converted(tmp_path, "npz"))._contents) | {"held": np.empty((2**60, 0), np.uint16)}
+    columns = columns_of(taxel.open(converted(tmp_path, "npz"))._contents.one) | {
+        "held": np.empty((2**60, 0), np.uint16)
+    }
     with pytest.raises(FormatError, match=DAMAGED):
-        contents_of(tmp_path / "b.npz", "npz", columns, None)
+        source_of_columns(tmp_path / "b.npz", "npz", columns, None)
 
 
 def test_merged_recordings_have_their_doubtful_times_by_the_merged_times(tmp_path: Path) -> None:
@@ -146,7 +154,9 @@ def test_merged_recordings_have_their_doubtful_times_by_the_merged_times(tmp_pat
         told = "nothing lost" if after is None else "nothing lost; times after 700 us are doubtful"
         status = "complete" if after is None else "damaged"
         verdict = Verdict.from_dict({"status": status, "text": told, "doubtful_after_us": after})
-        parts.append(taxel.Recording(taxel.open(tmp_path / f"{name}.mcap")._contents.but(verdict=verdict)))
+        one = taxel.open(tmp_path / f"{name}.mcap")._contents.one
+        one = replace(one, losses=replace(one.losses, verdict=known(verdict)))
+        parts.append(taxel.Recording(Contents.of(one)))
     merged = taxel.merge(parts, gap_us=1000)
     shift = int(merged.events.t[300] - parts[1].events.t[0])
     assert shift > 1000

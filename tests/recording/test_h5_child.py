@@ -18,8 +18,8 @@ import taxel
 from taxel._base import h5_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
-from taxel.recording import h5
-from taxel.recording.h5 import is_ours
+from taxel.recording import read_h5
+from taxel.recording.read_h5 import is_ours
 
 from .making import some_events
 
@@ -210,6 +210,6 @@ def test_the_library_is_not_asked_whose_a_file_without_our_name_is(tmp_path: Pat
     (tmp_path / "empty.h5").write_bytes(b"")
     assert [is_ours(tmp_path / f"{name}.h5") for name in ("ours", "subj000", "empty", "none")] == [True] + 3 * [False]
     asked: list[Path] = []
-    monkeypatch.setattr(h5, "H5File", lambda path: contextlib.nullcontext(asked.append(path)))
+    monkeypatch.setattr(read_h5, "H5File", lambda path: contextlib.nullcontext(asked.append(path)))
     assert [is_ours(tmp_path / f"{name}.h5") for name in ("subj000", "empty", "none")] == 3 * [False]
     assert not asked

@@ -1,4 +1,4 @@
-"""What recordings once lost without a word, case by case; in any chain of steps see test_fates.py."""
+"""What recordings once lost without a word, case by case; in any chain of steps see test_chains.py."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from taxel.encode import LevelCrossing
 from taxel.wire import Registers
 
 from .making import some_events, some_frames
+from .test_chains import write
 from .test_commands import run
-from .test_fates import write
 
 SLOW = 7.81
 
@@ -187,3 +187,12 @@ def test_pressure_over_time_is_that_of_whole_pictures(tmp_path: Path) -> None:
 def _of(folder: Path, events: taxel.Events) -> Path:
     taxel.convert(events, folder / "none.npz")
     return folder / "none.npz"
+
+
+def test_recordings_that_are_shifted_apart_have_no_common_clock(tmp_path: Path) -> None:
+    whole = taxel.open(write(tmp_path / "a.mcap"))
+    parts = [whole.between(-np.inf, 100_000), whole.between(100_000, np.inf)]
+    assert np.array_equal(taxel.merge(parts).clock.board_us, whole.clock.board_us)
+    apart = taxel.merge(parts, gap_us=50_000)
+    assert apart.clock is None
+    assert "arrival times" in apart.lost

@@ -114,7 +114,7 @@ def test_the_recordings_of_a_folder_count_together(tmp_path: Path) -> None:
         size = large.arrays_of(taxel.open(tmp_path / f"{k}.npz"))
     with refused("--limit", FormatError):
         taxel.open(tmp_path, limit=3 * size)
-    assert len(taxel.open(tmp_path, limit=100 * size)) == 4
+    assert len(taxel.open_all(tmp_path, limit=100 * size)) == 4
 
 
 def gzip_bomb(folder: Path) -> Path:
@@ -478,7 +478,7 @@ def test_memory_that_is_missing_is_said_with_what_there_is(tmp_path: Path, monke
         raise MemoryError
 
     taxel.convert(some_events(), tmp_path / "a.npz")
-    monkeypatch.setattr("taxel.recording.npz.read_arrays", fail)
+    monkeypatch.setattr("taxel.recording.read_npz.read_arrays", fail)
     with refused(r"a.npz: needs more memory than there is \(\d+ bytes are available\): --limit BYTES", FormatError):
         taxel.open(tmp_path / "a.npz")
 

@@ -115,18 +115,18 @@ def test_what_lies_beside_a_recording_does_not_stop_it(name: str, no_file: Any, 
     assert taxel.open(tmp_path / "walk.npz").frames() == some_frames()
     if name == "labels.csv":
         with refused("labels.csv: .*; must be a file", FormatError):
-            taxel.open(tmp_path)
+            taxel.open_all(tmp_path)
     else:
-        assert len(taxel.open(tmp_path)) == 1
+        assert len(taxel.open_all(tmp_path)) == 1
 
 
 @pytest.mark.parametrize("kind", formats.FORMATS)
 def test_a_folder_of_another_maker_is_read_beside_a_pipe(kind: str, tmp_path: Path) -> None:
     path = KINDS[kind](tmp_path)
-    count = len(taxel.open(path))
+    count = len(taxel.open_all(path))
     for ending in (".txt", ".csv", ".asc", ".asf", ".lst", ".npz", ".toml"):
         os.mkfifo(tmp_path / f"a{ending}")
-    assert len(taxel.open(tmp_path)) == count
+    assert len(taxel.open_all(tmp_path)) == count
 
 
 def test_the_page_serves_a_folder_with_pipes(tmp_path: Path) -> None:

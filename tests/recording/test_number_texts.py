@@ -101,4 +101,4 @@ def test_no_number_is_made_of_it(number):
 def test_a_folder_of_files_with_strange_digits_in_their_names_is_listed(tmp_path):
     for name in ("a1\u00b22", "a\u0663", "a1", "a10"):
         (tmp_path / f"{name}.csv").write_text(events_table(1), encoding="utf-8")
-    assert [one.path.name for one in taxel.open(tmp_path)][:2] == ["a1.csv", "a1\u00b22.csv"]
+    assert [one.path.name for one in taxel.open_all(tmp_path)][:2] == ["a1.csv", "a1\u00b22.csv"]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from formats import making as foreign
 
 import taxel
 from taxel import Frames
@@ -147,14 +148,14 @@ def test_a_table_with_a_layout_beside_a_recording_is_left_out_with_a_warning(tmp
     (tmp_path / "layout.toml").write_text('[table]\ntime_column = "time_s"\ntime_unit = "s"\n')
     for name in ("day1", "day2"):
         (tmp_path / f"{name}.csv").write_text(f"time_s,a,b\n{rows}\n")
-    assert len(taxel.open(tmp_path)) == 2
+    assert len(taxel.open_all(tmp_path)) == 2
     taxel.convert(taxel.open(tmp_path / "day1.csv"), tmp_path / "day1.npz")
     with pytest.warns(UserWarning, match=r": day2.csv left out, as beside recordings \(day1.npz\) tables"):
-        assert [one.name for one in taxel.open(tmp_path)] == ["day1.npz"]
+        assert [one.name for one in taxel.open_all(tmp_path)] == ["day1.npz"]
     (tmp_path / "day2.csv").unlink()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert [one.name for one in taxel.open(tmp_path)] == ["day1.npz"]
+        assert [one.name for one in taxel.open_all(tmp_path)] == ["day1.npz"]
 
 
 @pytest.mark.parametrize("ending", ["npz", "h5"])
@@ -179,7 +180,7 @@ def test_a_csv_is_the_same_however_much_of_it_is_read_at_once(
     lines = path.read_bytes().split(b"\n")
     wrong = [*lines[:20], b"", lines[20].rpartition(b",")[0] + b",abc", *lines[21:]]
     for size in (1, 37, 400, 1 << 22):
-        monkeypatch.setattr(taxel.recording.csv, "_AT_ONCE", size)
+        monkeypatch.setattr(taxel.recording.read_csv, "_AT_ONCE", size)
         path.write_bytes(b"\r\n".join(lines))
         read = taxel.open(path).frames() if pictures else taxel.open(path).events
         assert read == table
@@ -341,3 +342,16 @@ def test_a_finished_writer_takes_no_more_and_nonsense_is_refused(tmp_path: Path)
     for call in (lambda: writer.datagram(0, 0, b""), lambda: writer.finish("{}")):
         with pytest.raises(ProblemError, match="the recording is finished"):
             call()
+
+
+def test_one_recording_is_opened_and_of_several_the_error_names_the_function_for_all(tmp_path: Path) -> None:
+    place = foreign.write_pedar(tmp_path)
+    left, right = taxel.open_all(place)
+    assert (left.side, right.side) == ("left", "right")
+    with pytest.raises(ProblemError, match=r"holds 2 recordings \(.* left, .* right\); taxel\.open_all opens each"):
+        taxel.open(place)
+    taxel.convert(left, tmp_path / "left.npz")
+    assert taxel.open(tmp_path / "left.npz").frames() == taxel.open_all(tmp_path / "left.npz")[0].frames()
+    with pytest.raises(ProblemError, match=r": a folder; taxel\.open_all opens its recordings"):
+        taxel.open(tmp_path)
+    assert [one.name for one in taxel.open_all(tmp_path)] == ["left.npz"]

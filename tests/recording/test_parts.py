@@ -63,7 +63,7 @@ def test_another_program_reads_a_h5_as_the_layout_says(tmp_path: Path) -> None:
 
 
 def test_other_peoples_h5_is_a_list_of_trials_whose_truth_is_notes(tmp_path: Path) -> None:
-    opened = taxel.open(making.write_plate(tmp_path))
+    opened = taxel.open_all(making.write_plate(tmp_path))
     trials = list(taxel.formats.trials(tmp_path))
     assert [rec.name for rec in opened] == [trial.name for trial in trials]
     for rec, trial in zip(opened, trials, strict=True):
@@ -84,7 +84,7 @@ def test_a_folder_is_a_list_in_the_order_of_the_names_with_its_labels_as_notes(t
         taxel.convert(some_events(40, seed=k), tmp_path / name)
     (tmp_path / "people.csv").write_text("person,age\n1,40\n")
     (tmp_path / "labels.csv").write_text("recording,label,t_us\nwalk2,heel,700\nwalk2,heel,300\na,toe,100\n")
-    opened = taxel.open(tmp_path)
+    opened = taxel.open_all(tmp_path)
     assert [rec.name for rec in opened] == ["a.h5", "walk1.csv", "walk2.mcap", "walk10.npz"]
     assert [[(n.text, n.t) for n in rec.notes] for rec in opened] == [
         [("toe", 100)],
@@ -94,25 +94,25 @@ def test_a_folder_is_a_list_in_the_order_of_the_names_with_its_labels_as_notes(t
     ]
     (tmp_path / "labels.csv").write_text("recording,label,t_us\nrun,heel,700\n")
     with pytest.raises(FormatError, match=r"run is no recording of this folder; there are a\.h5, walk1\.csv"):
-        taxel.open(tmp_path)
+        taxel.open_all(tmp_path)
 
 
 @pytest.mark.parametrize("name", taxel.formats.FORMATS)
 def test_a_folder_of_other_peoples_files_is_its_trials(tmp_path: Path, name: str) -> None:
     getattr(making, f"write_{name}")(tmp_path)
-    opened = taxel.open(tmp_path)
+    opened = taxel.open_all(tmp_path)
     assert {rec.name for rec in opened} == {trial.name for trial in taxel.formats.trials(tmp_path)}
 
 
 def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"holds no recording; there are .mcap, .lsa"):
-        taxel.open(tmp_path)
+        taxel.open_all(tmp_path)
 
 
 def test_a_folder_without_a_recording_names_bags_arrays_and_tables_too(tmp_path: Path) -> None:
     (tmp_path / "notes.pdf").write_bytes(b"%PDF")
     with pytest.raises(FormatError, match=r"there are .*ROS bags .*tekscan.*by a layout file \.npy, \.txt and") as said:
-        taxel.open(tmp_path)
+        taxel.open_all(tmp_path)
     assert "\n" not in str(said.value)
 
 

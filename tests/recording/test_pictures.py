@@ -23,8 +23,10 @@ from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
 from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
-from taxel.recording.contents import Contents, several
+from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.once import known
 from taxel.recording.opening import joined, open_joined
+from taxel.recording.parts import Losses, Marks, Origin
 
 WHOLE = st.integers(0, 65_535).map(float)
 ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True, allow_infinity=False), st.sampled_from([-0.0, 65_536.0]))
@@ -148,16 +150,16 @@ def test_each_source_has_low_rate_pictures_but_where_pictures_are_numbered(tmp_p
     left = Frames(np.ones((50, 2, 3)), np.arange(50) * 20_000 + 7, unit="N", array=array)
     right = Frames(np.ones((500, 2, 3)), np.arange(500) * 2000 - 3000, unit="N", array=array)
     both = {
-        name: Contents(tmp_path / "a", name, "npz", array, label=name, frames=frames)
+        name: source_from(frames, Origin(tmp_path / "a", name, "npz", name))
         for name, frames in (("left", left), ("right", right))
     }
-    taxel.convert(taxel.Recording(several(both)), tmp_path / "both.mcap")
+    taxel.convert(taxel.Recording(alone(both)), tmp_path / "both.mcap")
     shown = low_rate(tmp_path / "both.mcap")
     assert {topic: len(images) for topic, images in shown.items()} == {"/pressure": 10, "/right/pressure": 11}
     for images, frames in ((shown["/pressure"], left), (shown["/right/pressure"], right)):
         assert {one["t_us"] for one in images} <= set(frames.t.tolist())
         assert [one["log_us"] for one in images] == [one["t_us"] + 3000 for one in images]  # the file begins at 0
-    numbered = Contents(tmp_path / "n", "n", "npz", array, frames=right, untimed=True)
+    numbered = Contents.of(source_from(right, Origin(tmp_path / "n", "n", "npz"), untimed=True))
     taxel.convert(taxel.Recording(numbered), tmp_path / "numbered.mcap")
     assert low_rate(tmp_path / "numbered.mcap") == {}
 
@@ -165,17 +167,17 @@ def test_each_source_has_low_rate_pictures_but_where_pictures_are_numbered(tmp_p
 def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
     array = Array(1, 2, name="channels")
     frames = Frames([[[1.0, 2.5]], [[3.0, 4.0]]], [0, 10_000], unit="N", array=array)
-    of = Contents(
-        tmp_path / "a", "a", "npz", array, source="an amplifier", frames=frames,
-        notes=(Note("heel", 5000), Note("bare")), detections=taxel.Detections(["lift"], [100], [200]),
-        columns=("hip", "knee"), lost=("something",),
-    )  # fmt: skip
+    marks = Marks(
+        notes=known((Note("heel", 5000), Note("bare"))), detections=known(taxel.Detections(["lift"], [100], [200]))
+    )
+    origin, losses = Origin(tmp_path / "a", "a", "npz", source="an amplifier"), Losses(lost=known(("something",)))
+    of = Contents.of(source_from(frames, origin, columns=("hip", "knee"), marks=marks, losses=losses))
     lost = taxel.convert(taxel.Recording(of), tmp_path / "a.mcap")
     assert lost == ["something"]
     back = taxel.open(tmp_path / "a.mcap")
     assert back.frames() == frames
     assert [(note.text, note.t) for note in back.notes] == [("heel", 5000), ("bare", None)]
-    assert (back.detections, back.columns, back.lost) == (of.detections, ["hip", "knee"], ("something",))
+    assert (back.detections, back.columns, back.lost) == (of.one.marks.detections(), ["hip", "knee"], ("something",))
     assert (back.source, back.verdict, back.remarks) == (
         "an amplifier",
         "the .npz does not say what was lost",
@@ -209,7 +211,7 @@ def test_both_feet_of_a_file_become_sources_left_and_right(
 ) -> None:
     file = make(tmp_path)
     file = next(tmp_path.iterdir()) if file.is_dir() else file
-    trials = taxel.open(file)
+    trials = taxel.open_all(file)
     assert [one.name.rsplit(" ")[-1] for one in trials] == ["left", "right"]
     assert call(capsys, "convert", file, tmp_path / "both.mcap")[0] == 0
     both = taxel.open(tmp_path / "both.mcap")
@@ -252,11 +254,11 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
     array, quiet = Array(6, 6), np.random.default_rng(4).integers(0, 3, (400, 6, 6)).astype(np.float32)
     pressed = quiet.copy()
     pressed[30:80, 1:4, 1:4] += 300
-    sources: dict[str, Contents] = {}
+    sources: dict[str, Source] = {}
     for foot, values in (("left", quiet), ("right", pressed)):
         frames = Frames(values, np.arange(400) * 10_000, array=array)
-        sources[foot] = Contents(tmp_path / "a.asc", f"a {foot}", "pedar", array, label=foot, frames=frames)
-    [both] = joined([taxel.Recording(one) for one in sources.values()])
+        sources[foot] = source_from(frames, Origin(tmp_path / "a.asc", f"a {foot}", "pedar", foot))
+    [both] = joined([taxel.Recording(Contents.of(one)) for one in sources.values()])
     taxel.convert(both, tmp_path / "a.mcap")
     code, _, errors = call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")
     assert code == 0
@@ -266,10 +268,10 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     array = Array(1, 2)
     frames = Frames(np.ones((5, 1, 2)), np.arange(5) * 10_000, unit="N", array=array)
-    sources: dict[str, Contents] = {}
+    sources: dict[str, Source] = {}
     for foot in ("left", "right"):
-        sources[foot] = Contents(tmp_path / "walk.asc", f"walk {foot}", "pedar", array, label=foot, frames=frames)
-    [both] = joined([taxel.Recording(one) for one in sources.values()])
+        sources[foot] = source_from(frames, Origin(tmp_path / "walk.asc", f"walk {foot}", "pedar", foot))
+    [both] = joined([taxel.Recording(Contents.of(one)) for one in sources.values()])
     taxel.convert(both, tmp_path / "walk.mcap")
     (tmp_path / "walk.notes.csv").write_text("label,t_us,source\nheel,10000,left\nturn,20000,\ntoe,30000,right\n")
     back = taxel.open(tmp_path / "walk.mcap")
@@ -295,7 +297,7 @@ def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys
 def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = write_icub(tmp_path)
     file = file if file.is_file() else next(tmp_path.iterdir())
-    opened = taxel.open(file)
+    opened = taxel.open_all(file)
     assert not any(one.timed for one in opened)
     assert call(capsys, "convert", file, tmp_path / "out")[0] == 0
     for ending in (".npz", ".h5", ".mcap"):

@@ -170,7 +170,7 @@ def test_where_nothing_lay_or_the_whole_array_drifts_nothing_is_said(tmp_path: P
 
 
 def test_the_page_takes_its_tare_of_the_same_time_as_train(tmp_path: Path) -> None:
-    from taxel.live._requests import _rest
+    from taxel.live._requests.training import _rest
 
     source, truth = lain()
     taxel.convert(source, tmp_path / "a.npz")

@@ -22,7 +22,9 @@ from mcap.writer import Writer
 import taxel
 from taxel import Verdict, _core
 from taxel.live.summary import summary_of
-from taxel.recording.contents import Contents, several
+from taxel.recording.contents import alone, source_from
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Origin
 from taxel.recording.verdict import STATUSES
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
@@ -30,6 +32,7 @@ from taxel.wire import Registers
 from .making import HEADER, record, some_events
 
 START_NS = HEADER["started_ns"]
+FINE = Verdict.from_dict({"status": "complete", "text": "nothing lost"})
 
 
 def at_least(verdict: Verdict, status: str) -> bool:
@@ -614,8 +617,10 @@ def test_a_converted_file_that_is_cut_says_what_its_source_lost(of: str, share: 
     else:
         frames = taxel.Frames(np.random.default_rng(2).normal(size=(300, 16, 16)).astype(np.float32), np.arange(300))
         verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 7}})
-        one = Contents(tmp_path, "a.bag", "ros", frames.array, label="a", frames=frames, verdict=verdict)
-        first = taxel.Recording(one if of == "pictures" else several({"a": one, "b": one.but(label="b")}))
+        names = "a" if of == "pictures" else "ab"
+        origins = {name: Origin(tmp_path, "a.bag", "ros", name) for name in names}
+        losses = Losses(verdict=known(verdict))
+        first = taxel.Recording(alone({n: source_from(frames, origin, losses=losses) for n, origin in origins.items()}))
     lost = first.verdict.lost
     assert lost == {"dropped_by_kernel": 14 if of == "two" else 7}
     taxel.convert(first, tmp_path / "b.mcap")
@@ -665,7 +670,7 @@ def test_times_that_are_doubtful_move_with_the_recording() -> None:
     """Wherever a time stands in the text, it is the field, of the verdict or of one of its parts."""
     found = {"doubtful_after_us": 700, "damage": {"jumps_of_time": 1}}
     one = Verdict._of({"file": {"ending": {"finished": {"counts": {"received": 1, "recorded": 1}}}, "decoded": found}})
-    fine = Verdict("nothing lost")
+    fine = FINE
     both = Verdict._together([("a", one), ("b", one._later(-900)), ("a", fine)])
     assert both == f"a: {one}; b: {one._later(-900)}; a (2): nothing lost"
     cut = Verdict._of({"file": {"converted": both._held}})
@@ -723,32 +728,6 @@ def test_a_lsa_without_its_lss_is_unfinished_and_with_damage_still(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("line", "status"),
-    [
-        ("nothing lost", "complete"),
-        (
-            "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)",
-            "complete after arrival",
-        ),
-        ("nothing lost; 1 resets of the board", "complete after arrival"),
-        ("nothing lost; 1 reset of the board", "complete after arrival"),
-        ("the .csv does not say what was lost", "unknown"),
-        ("nothing lost; in the bytes that came: 3 bytes skipped", "damaged"),
-        ("damage in the file: 1 bad chunk skipped; while recording: nothing lost", "damaged"),
-        ("nothing lost; times after 5 us are doubtful", "damaged"),
-        ("not finished: what came last is missing; until then: nothing lost", "unfinished"),
-        ("a.mcap: nothing lost; b.mcap: LOST: 3 messages dropped by the kernel", "lost"),
-        ("converted from a.mcap, a recording that says: nothing lost", "complete"),
-        ("as another program has it", "unknown"),
-    ],
-)
-def test_the_line_of_an_earlier_version_has_a_status(line: str, status: str) -> None:
-    verdict = Verdict(line)
-    assert (verdict.status, verdict.lost) == (status, {})
-    assert verdict == line.rpartition("says: ")[2]
-
-
-@pytest.mark.parametrize(
     ("decoder", "words"),
     [
         (
@@ -771,11 +750,13 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
     import pickle
 
     verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
-    copies = (copy.deepcopy(verdict), pickle.loads(pickle.dumps(verdict)), Verdict(verdict))
+    copies = (copy.deepcopy(verdict), pickle.loads(pickle.dumps(verdict)))
     for again in (*copies, Verdict.from_dict(verdict.to_dict())):
         assert (again, again.to_dict()) == (verdict, verdict.to_dict())
         assert type(again) is Verdict
     assert json.loads(json.dumps([verdict])) == ["LOST: 2 messages dropped by the kernel"]
+    with pytest.raises(taxel.ProblemError, match="not built"):
+        Verdict("nothing lost")
     verdict.lost["dropped_by_kernel"] = 0
     assert verdict.lost == {"dropped_by_kernel": 2}
     with pytest.raises(AttributeError):
@@ -792,11 +773,6 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         {"status": "complete after arrival", "text": "nothing lost", "damaged": {"bytes_skipped": 1}},
         {"status": "unknown", "text": "nothing lost", "doubtful_after_us": 5},
         {"status": "complete", "text": "nothing lost", "parts": {"left": {"status": "lost", "text": "LOST"}}},
-        {"status": "complete", "text": "LOST: 5 datagrams lost or damaged on the way"},
-        {"status": "complete", "text": "not finished: what came last is missing; until then: nothing lost"},
-        {"status": "unknown", "text": "damage in the file: 3 bad chunks skipped"},
-        {"status": "complete", "text": "nothing lost but for what resets hide; 1 reset of the board"},
-        {"status": "lost", "text": "", "parts": {"b": {"status": "complete", "text": "nothing arrived"}}},
         {
             "status": "lost",
             "text": "",
@@ -916,7 +892,7 @@ def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:
     lost = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
     silent = Verdict._of({"counts": {}})
     assert (silent.status, Verdict._together([("a", silent), ("b", lost)]).status) == ("nothing arrived", "lost")
-    assert Verdict._together([("a", silent), ("b", Verdict("nothing lost"))]).status == "nothing arrived"
+    assert Verdict._together([("a", silent), ("b", FINE)]).status == "nothing arrived"
 
 
 def test_datagrams_without_bytes_are_no_recording_of_which_nothing_is_lost(tmp_path: Path) -> None:

@@ -49,17 +49,12 @@ LONG = {
             layer.press(sunk)
     """,
     "a day of silence": "begun(); play([Silence(86_400_000.0)], seed=1)",
-    "a half disc on fine elements": """
-        fine = fem.Indentation(mesh_mm=0.02, base_mesh_mm=0.02)
-        begun()
-        fem.press(fine)
-    """,
 }
 
 CHILD = """
 
 import numpy as np
-from taxel.simulate import Layer, Scene, Silence, fem, play
+from taxel.simulate import Layer, Scene, Silence, play
 
 def begun():
     print("begun", flush=True)

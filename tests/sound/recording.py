@@ -6,15 +6,29 @@ from typing import Any
 
 import taxel
 from sound.things import ARRAY, EVENTS, FRAMES, TARE, Sound, plain
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.parts import Origin
 
 #: A recording of numbered pictures, without times.
-NUMBERED = Contents(Path("grasp"), "grasp", "icub", ARRAY, frames=FRAMES, untimed=True)
+NUMBERED = Contents.of(source_from(FRAMES, Origin(Path("grasp"), "grasp", "icub"), untimed=True))
 
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.open": plain(
         taxel.open,
+        path="here_events.npz",
+        array=ARRAY,
+        layout=None,
+        pairing="direct",
+        differences=False,
+        topic=None,
+        field=None,
+        types=None,
+        ros=None,
+        limit=1 << 30,
+    ),
+    "taxel.open_all": plain(
+        taxel.open_all,
         path="here_events.npz",
         array=ARRAY,
         layout=None,

@@ -306,25 +306,6 @@ def test_both_versions_have_one_decoder():
     assert len(two.finish()) == len(two.end_of_datagram()) == 0
 
 
-def test_the_old_names_of_version_2_work_and_name_the_new_ones():
-    board = Board(Registers(wire_version=2))
-    sent = board.frame(np.full(4096, 40, np.uint16))
-    stream = b"".join(len(d).to_bytes(2, "little") + d for d in sent)
-    with pytest.warns(DeprecationWarning, match=r"taxel.wire_v2.Decoder is now taxel.wire.Decoder\(version=2\)"):
-        decoder = taxel.wire_v2.Decoder()
-    heard = [decoder.push(d) for d in sent]
-    assert sum(len(h.events) for h in heard) == 4096
-    assert (heard[-1].intact, heard[-1].until) == (decoder.last.intact, decoder.last.until)
-    with pytest.warns(DeprecationWarning, match="taxel.wire.decode"):
-        events, counts, skipped = taxel.wire_v2.decode(stream)
-    assert events == decode(stream, 2)
-    assert (counts, skipped) == (decoder.counts, 0)
-    with pytest.warns(DeprecationWarning, match="taxel.wire.StreamReader"):
-        assert taxel.wire_v2.StreamReader is StreamReader
-    with pytest.raises(AttributeError, match="no attribute 'decoders'"):
-        _ = taxel.wire_v2.decoders
-
-
 @pytest.mark.parametrize("first", [0, 5])
 def test_what_the_board_counted_as_dropped_is_lost_though_no_flag_came(first, tmp_path):
     """Where datagrams with the flag were lost, or the board sets none; before the first totals nothing is known."""

@@ -15,7 +15,7 @@ pub struct Array {
     /// Number of columns, from left to right.
     pub columns: u16,
     /// Distance between the centres of neighbours; `None` where it is unknown, or where `places` are known.
-    #[serde(default, with = "stated")]
+    #[serde(default)]
     pub pitch_mm: Option<Pitch>,
     /// Name of the sensor.
     pub name: String,
@@ -31,7 +31,8 @@ pub struct Array {
 }
 
 /// Distance between the centres of neighbours, mm.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Stated", into = "Stated")]
 pub struct Pitch {
     /// From one row to the next.
     pub rows: f64,
@@ -50,6 +51,29 @@ impl Pitch {
     #[must_use]
     pub fn area(self) -> f64 {
         self.rows * self.columns
+    }
+}
+
+/// The pitch in files.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged, expecting = "pitch_mm must be a number, a pair of numbers (rows, columns), or null")]
+enum Stated {
+    Square(f64),
+    Pair([f64; 2]),
+}
+
+impl From<Stated> for Pitch {
+    fn from(stated: Stated) -> Self {
+        match stated {
+            Stated::Square(pitch) => Self::square(pitch),
+            Stated::Pair([rows, columns]) => Self { rows, columns },
+        }
+    }
+}
+
+impl From<Pitch> for Stated {
+    fn from(Pitch { rows, columns }: Pitch) -> Self {
+        if rows == columns { Self::Square(rows) } else { Self::Pair([rows, columns]) }
     }
 }
 
@@ -74,42 +98,6 @@ pub struct Places {
 pub enum PlaceUnit {
     /// Millimetres.
     Mm,
-}
-
-/// The pitch in files: a number, or a pair of numbers (rows, columns), or null.
-///
-/// Before a pitch could be unknown, 1 stood for an unknown one: a file's 1 reads as unknown, and a pitch of 1 mm is
-/// written as a pair.
-mod stated {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    use super::Pitch;
-
-    #[derive(Serialize, Deserialize)]
-    #[serde(untagged, expecting = "pitch_mm must be a number, a pair of numbers (rows, columns), or null")]
-    enum Stated {
-        Square(f64),
-        Pair([f64; 2]),
-    }
-
-    /// The number that stood for an unknown pitch.
-    const UNKNOWN: f64 = 1.0;
-
-    pub(super) fn serialize<S: Serializer>(pitch: &Option<Pitch>, to: S) -> Result<S::Ok, S::Error> {
-        let stated = pitch.map(|Pitch { rows, columns }| match rows == columns && rows != UNKNOWN {
-            true => Stated::Square(rows),
-            false => Stated::Pair([rows, columns]),
-        });
-        stated.serialize(to)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Pitch>, D::Error> {
-        Ok(match Option::deserialize(from)? {
-            None => None,
-            Some(Stated::Square(pitch)) => (pitch != UNKNOWN).then(|| Pitch::square(pitch)),
-            Some(Stated::Pair([rows, columns])) => Some(Pitch { rows, columns }),
-        })
-    }
 }
 
 impl Array {
@@ -293,10 +281,10 @@ mod tests {
     }
 
     #[test]
-    fn a_pitch_of_1_in_an_old_file_is_unknown_and_a_known_one_is_kept() {
+    fn a_pitch_is_a_number_a_pair_or_unknown() {
         let of = |pitch: &str| read(&format!(r#"{{"rows": 2, "columns": 3, "pitch_mm": {pitch}, "name": "a"}}"#));
-        assert_eq!(of("1.0").pitch_mm, None);
-        assert_eq!(of("1").pitch_mm, None);
+        assert_eq!(of("1").pitch_mm, Some(Pitch::square(1.0)));
+        assert_eq!(of("[1, 1]").pitch_mm, Some(Pitch::square(1.0)));
         assert_eq!(of("null").pitch_mm, None);
         assert_eq!(of("2.67").pitch_mm, Some(Pitch::square(2.67)));
         assert_eq!(of("[7.62, 5.08]").pitch_mm, Some(Pitch { rows: 7.62, columns: 5.08 }));

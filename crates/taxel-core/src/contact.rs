@@ -25,7 +25,6 @@ pub mod sensor;
 pub mod shape;
 pub mod stage;
 pub mod touch;
-pub mod track;
 mod trajectory;
 mod waves;
 
@@ -42,7 +41,7 @@ pub use sensor::{Sensor, Taxels};
 pub use shape::Shape;
 pub use stage::{Prepared, Stage};
 pub use touch::{Contact, TouchKind};
-pub use track::Track;
+pub use trajectory::Track;
 
 /// The pitch of an array that a scene is played on, mm.
 fn pitch_of(array: &Array) -> Result<f64> {

@@ -10,7 +10,6 @@ mod kernel;
 mod model;
 mod points;
 mod population;
-mod rounding;
 mod running;
 mod streaming;
 mod threshold;
@@ -21,6 +20,15 @@ pub(crate) use model::AT_EDGE;
 pub use model::{AfterSpike, FirstThreshold, Neuron, Time};
 pub(crate) use points::{Grid, MOST_LAID_OUT, Place, check_points, points_between};
 pub use population::Weight;
-pub(crate) use rounding::rounding_ms;
 pub use streaming::NeuronStream;
 pub use threshold::OutputSpike;
+
+/// The rounding error allowed for a sum of times: an absolute one, ms, and one in units of the last place, which is the
+/// larger from about 20 minutes on.
+const ROUNDING_MS: f64 = 1e-9;
+const ROUNDINGS: f64 = 4.0;
+
+/// The distance up to which two sums of times near `t` count as equal, ms.
+pub(crate) fn rounding_ms(t: f64) -> f64 {
+    (ROUNDINGS * f64::EPSILON * t.abs()).max(ROUNDING_MS)
+}

@@ -9,7 +9,6 @@ mod cut;
 pub mod decoder;
 pub mod registers;
 pub mod sender_decoder;
-mod silence;
 pub mod v1;
 pub mod v2;
 
@@ -20,3 +19,11 @@ pub use decoder::{Counts, Decoder, Pairing, decode, most_rows};
 pub use registers::{Refusal, Registers};
 pub use sender_decoder::{Ahead, DatagramInfo, Order, SenderDecoder, StepBack};
 pub use v1::{STAMP_US, WORD_BYTES, Word, encode};
+
+/// A year, us: bounds a silence, so that no arrival time can overflow a board's 64-bit clock.
+const LONGEST: i64 = 365 * 86_400 * 1_000_000;
+
+/// Time between two arrivals, us; 0 if the host's clock stepped back.
+fn silence(before: i64, now: i64) -> i64 {
+    now.saturating_sub(before).clamp(0, LONGEST)
+}

@@ -16,6 +16,7 @@ pub struct Latencies {
 
 /// Quantiles of [`Latencies`], us; none if nothing was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Quantiles {
     /// Number of measured durations.
     pub count: u64,

@@ -16,4 +16,5 @@ pub mod pipeline;
 pub mod recording;
 
 pub use error::{Error, Result};
+pub use latency::Quantiles;
 pub use regular_file::open_regular;

@@ -7,6 +7,7 @@ use crate::{Error, Result};
 
 /// A serial port.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Port {
     /// Path of the device, as "/dev/ttyUSB0".
     pub place: String,

@@ -7,7 +7,6 @@
 //! A file is readable at any time: chunks are written whole, at the latest [`FLUSH_EVERY`] after their first datagram,
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
-mod base64;
 mod damage;
 mod event_pictures;
 mod grey_picture;

@@ -1,5 +1,8 @@
 //! The panel's files, inside the program: a table of exact names, so that no request can leave it.
 
+use std::borrow::Cow;
+use std::io;
+
 /// A file of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Asset {
@@ -7,8 +10,22 @@ pub struct Asset {
     pub name: &'static str,
     /// Its media type.
     pub media: &'static str,
-    /// What it holds.
+    /// What it held when the program was built.
     pub bytes: &'static [u8],
+}
+
+impl Asset {
+    /// What it holds. A build for development reads the folder, so that a change of the page needs no other build.
+    ///
+    /// # Errors
+    ///
+    /// Those of reading, in a build for development.
+    pub fn read(&self) -> io::Result<Cow<'static, [u8]>> {
+        #[cfg(feature = "development")]
+        return std::fs::read(format!("{}/web/{}", env!("CARGO_MANIFEST_DIR"), self.name)).map(Cow::Owned);
+        #[cfg(not(feature = "development"))]
+        Ok(Cow::Borrowed(self.bytes))
+    }
 }
 
 /// A row of the table: name and media type once, the bytes from the folder.

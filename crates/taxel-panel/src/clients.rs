@@ -3,8 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use serde_json::{Map, Value};
 use tokio::sync::{broadcast, watch};
+
+use super::messages::Message;
 
 /// Messages that wait for one client at most.
 pub(super) const MOST_WAITING: usize = 256;
@@ -15,7 +16,7 @@ pub(super) enum Broadcast {
     /// The same text for everybody.
     Text(Arc<str>),
     /// Counters, to which each session adds those of its client.
-    Counters(Arc<Map<String, Value>>),
+    Counters(Box<Message>),
     /// The labels of a recording have changed: for the clients that show it.
     Labels(String),
     /// A recording of which the beginning was shown is read as a whole.
@@ -66,8 +67,8 @@ impl Clients {
         let _ = self.messages.send(message);
     }
 
-    pub(super) fn send_json(&self, message: &Value) {
-        self.send(Broadcast::Text(message.to_string().into()));
+    pub(super) fn send_message(&self, message: &Message) {
+        self.send(Broadcast::Text(message.text().into()));
     }
 
     /// Announces to all sessions that a new picture can be shown.

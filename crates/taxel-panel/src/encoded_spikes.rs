@@ -5,11 +5,12 @@ use std::ops::Range;
 use std::slice;
 use std::sync::Arc;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use taxel_core::encode::{Encoder, Stream};
 use taxel_core::{Array, Events, Intensities, Spike, SpikeKind, problem};
 
 use super::keyframe_index::Pictures;
+use super::messages::Message;
 use super::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::Result;
@@ -252,18 +253,21 @@ impl EncodedSpikes {
     }
 
     /// The `spikes` message of the pending spikes, if there are any.
-    pub(super) fn message(&mut self) -> Option<Value> {
+    pub(super) fn message(&mut self) -> Option<Message> {
         if self.pending.is_empty() {
             return None;
         }
         let stream = &self.encoders.first()?.stream;
-        let message = json!({
-            "type": "spikes", "encoder": self.name, "trains": self.encoders.iter().map(|of| of.stream.trains()).sum::<usize>(),
-            "signed": stream.kind() == SpikeKind::Signed, "latency_ms": stream.latency_ms(), "left_out": self.left_out,
-            "t_ms": self.pending.iter().map(|s| s.t).collect::<Vec<_>>(),
-            "train": self.pending.iter().map(|s| s.train).collect::<Vec<_>>(),
-            "value": self.pending.iter().map(|s| s.value).collect::<Vec<_>>(),
-        });
+        let message = Message::Spikes {
+            encoder: self.name.clone(),
+            trains: self.encoders.iter().map(|of| of.stream.trains()).sum(),
+            signed: stream.kind() == SpikeKind::Signed,
+            latency_ms: stream.latency_ms(),
+            t_ms: self.pending.iter().map(|spike| spike.t).collect(),
+            train: self.pending.iter().map(|spike| spike.train).collect(),
+            value: self.pending.iter().map(|spike| spike.value).collect(),
+            left_out: self.left_out,
+        };
         self.pending.clear();
         self.left_out = 0;
         Some(message)

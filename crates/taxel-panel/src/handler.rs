@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use taxel_core::Array;
 use taxel_core::wire::Command;
 
@@ -25,13 +26,16 @@ pub struct BoardLines {
 }
 
 /// A value in a preset of the user, whose file may have been edited by hand.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
 pub enum PresetValue {
     /// Of a register of one bit.
     Flag(bool),
     /// Of any other register, in its own unit.
     Number(i64),
     /// Anything else in the file, which no register accepts.
+    #[cfg_attr(feature = "development", schemars(skip))]
     Other(String),
 }
 
@@ -48,7 +52,8 @@ pub struct UserPresets {
 }
 
 /// A label of a recording.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 pub struct LabelRow {
     /// Its text; empty where a note of the recording is to count no more, and no label does in its place.
     pub label: String,
@@ -61,6 +66,7 @@ pub struct LabelRow {
     /// Time of the recording's own note that it replaces, us.
     pub replaces_us: Option<i64>,
     /// Its time by the host's clock, ns since 1970, where its table has one and nobody has moved it since.
+    #[serde(skip)]
     pub host_ns: Option<i64>,
 }
 
@@ -106,7 +112,8 @@ pub struct LabelTable {
 pub type EditOutcome = Result<Vec<Option<LabelRow>>, String>;
 
 /// Taxels (column, row) that do not work as they should.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
 pub struct UnhealthyTaxels {
     /// That did nothing while they were touched, and hold 0 as far as is known.
     pub dead: Vec<(u16, u16)>,
@@ -164,11 +171,9 @@ pub struct Cut<'a> {
     pub stop_us: i64,
 }
 
-/// Handles the requests of a panel; called from any thread, and several at a time.
-///
-/// Every method returns the reason where it cannot do what was asked.
+/// Requests about the board: its serial line, and the source that receives its datagrams.
 #[allow(clippy::missing_errors_doc)]
-pub trait RequestHandler: Send + Sync {
+pub trait BoardRequests: Send + Sync {
     /// Sends a register command to the board; returns the value that the board reports.
     fn command(&self, command: Command) -> Reply<u32>;
 
@@ -190,6 +195,13 @@ pub trait RequestHandler: Send + Sync {
     /// Returns the IPv4 addresses of this machine, each with the name of its network interface.
     fn addresses(&self) -> Reply<Vec<(String, String)>>;
 
+    /// Reads the live source out with this readout from now on.
+    fn read_out(&self, readout: &Path) -> Reply<()>;
+}
+
+/// Requests about the recordings of the panel's folder.
+#[allow(clippy::missing_errors_doc)]
+pub trait FileRequests: Send + Sync {
     /// Finds taxels that are dead, stuck or noisy.
     fn health(&self, array: &Array, activity: &Activity) -> Reply<UnhealthyTaxels>;
 
@@ -204,34 +216,20 @@ pub trait RequestHandler: Send + Sync {
 
     /// Writes a stretch of a recording to a new file; returns what that file cannot hold.
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>>;
+}
 
-    /// Trains a readout on the labels of a recording, writes it to `out`, and returns how well it detects, in words.
-    fn train(&self, recording: &Path, out: &Path) -> Reply<String>;
-
-    /// Returns what does the same in a shell.
-    fn train_command(&self, recording: &Path, out: &Path) -> Reply<String>;
-
-    /// Returns how far the training that runs is, in words; empty where it has not said so.
-    fn training_progress(&self) -> Reply<String>;
-
-    /// Ends the training that runs.
-    fn end_training(&self) -> Reply<()>;
-
-    /// Detections of a readout in a recording, or in a trial of one with several.
-    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Detected>;
-
-    /// Reads the live source out with this readout from now on.
-    fn read_out(&self, readout: &Path) -> Reply<()>;
-
+/// Requests about the tables of labels beside recordings.
+#[allow(clippy::missing_errors_doc)]
+pub trait LabelRequests: Send + Sync {
     /// Returns a text that changes when a table of labels may have changed, or what was acknowledged of it.
-    fn label_stamp(&self, table: &Path) -> Reply<String>;
+    fn stamp(&self, table: &Path) -> Reply<String>;
 
     /// Reads the labels of a recording from a table, which need not exist.
-    fn read_labels(&self, table: &Path, recording: &str) -> Reply<LabelTable>;
+    fn read(&self, table: &Path, recording: &str) -> Reply<LabelTable>;
 
     /// Carries out requests in one write of the table as it is now, each of them whole or not at all. Returns when the table
     /// is on the disk.
-    fn change_labels(
+    fn change(
         &self,
         table: &Path,
         recording: &str,
@@ -239,17 +237,49 @@ pub trait RequestHandler: Send + Sync {
     ) -> Reply<(Vec<EditOutcome>, LabelTable)>;
 
     /// Ends a conflict: restores what was acknowledged, or accepts the table as it is.
-    fn settle_labels(
-        &self,
-        table: &Path,
-        recording: &str,
-        conflict: &LabelConflict,
-        restore: bool,
-    ) -> Reply<LabelTable>;
+    fn settle(&self, table: &Path, recording: &str, conflict: &LabelConflict, restore: bool) -> Reply<LabelTable>;
+}
 
+/// Requests about readouts: training one on a recording, and running it on another.
+#[allow(clippy::missing_errors_doc)]
+pub trait TrainingRequests: Send + Sync {
+    /// Trains a readout on the labels of a recording, writes it to `out`, and returns how well it detects, in words.
+    fn train(&self, recording: &Path, out: &Path) -> Reply<String>;
+
+    /// Returns what does the same in a shell.
+    fn command(&self, recording: &Path, out: &Path) -> Reply<String>;
+
+    /// Returns how far the training that runs is, in words; empty where it has not said so.
+    fn progress(&self) -> Reply<String>;
+
+    /// Ends the training that runs.
+    fn end(&self) -> Reply<()>;
+
+    /// Detections of a readout in a recording, or in a trial of one with several.
+    fn detect(&self, recording: &Path, trial: Option<&str>, readout: &Path) -> Reply<Detected>;
+}
+
+/// Requests about the user's presets of the board's registers.
+#[allow(clippy::missing_errors_doc)]
+pub trait PresetRequests: Send + Sync {
     /// Reads the presets of the user.
-    fn read_presets(&self) -> Reply<UserPresets>;
+    fn read(&self) -> Reply<UserPresets>;
 
     /// Writes the presets of the user.
-    fn write_presets(&self, presets: &BTreeMap<String, UserPreset>) -> Reply<()>;
+    fn write(&self, presets: &BTreeMap<String, UserPreset>) -> Reply<()>;
+}
+
+/// What handles the requests of a panel, called from any thread, and several at a time. Every method returns the reason where
+/// it cannot do what was asked.
+pub struct RequestHandlers {
+    /// About the board.
+    pub board: Box<dyn BoardRequests>,
+    /// About recordings.
+    pub files: Box<dyn FileRequests>,
+    /// About labels.
+    pub labels: Box<dyn LabelRequests>,
+    /// About readouts.
+    pub training: Box<dyn TrainingRequests>,
+    /// About presets.
+    pub presets: Box<dyn PresetRequests>,
 }

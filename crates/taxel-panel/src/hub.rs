@@ -1,11 +1,9 @@
 //! What all clients share: the live source, the board's registers, the folder of recordings, labels, and the recorder.
 
-use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
 use taxel_core::encode;
 use taxel_core::wire::Registers;
 use taxel_live::Result;
@@ -16,12 +14,12 @@ use taxel_live::recording::now_ns;
 use tokio::sync::{Notify, OwnedMutexGuard};
 
 use super::clients::{Broadcast, Clients};
-use super::folder::Folder;
-use super::handler::{Reply, RequestHandler, UserPresets};
+use super::folder::{Folder, Listed};
+use super::handler::{Reply, RequestHandlers, UserPresets};
 use super::labels::LabelTables;
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::live_source::LiveSource;
-use super::messages;
+use super::messages::{ArrayInfo, FileInfo, Message};
 use super::options::PanelOptions;
 use super::presets;
 use super::recorder::Recorder;
@@ -46,7 +44,7 @@ pub(super) struct BoardState {
 /// See the module.
 pub(super) struct Hub {
     options: PanelOptions,
-    handler: Arc<dyn RequestHandler>,
+    handlers: Arc<RequestHandlers>,
     live: Mutex<Option<Arc<LiveSource>>>,
     /// Labels of the readout that runs.
     readout: Mutex<Option<Vec<String>>>,
@@ -65,16 +63,12 @@ pub(super) struct Hub {
 }
 
 impl Hub {
-    pub(super) fn new(
-        options: PanelOptions,
-        live: Option<Handle>,
-        handler: Box<dyn RequestHandler>,
-    ) -> Result<Arc<Self>> {
+    pub(super) fn new(options: PanelOptions, live: Option<Handle>, handlers: RequestHandlers) -> Result<Arc<Self>> {
         let board = BoardState { control: options.control.clone(), ..BoardState::default() };
         let hub = Arc::new(Self {
             folder: Folder::new(options.folder.clone()),
             options,
-            handler: handler.into(),
+            handlers: Arc::new(handlers),
             live: Mutex::default(),
             readout: Mutex::default(),
             board: Mutex::new(board),
@@ -132,7 +126,7 @@ impl Hub {
         *lock(&self.live) = Some(Arc::new(LiveSource::new(handle, noise_floor)?));
         *lock(&self.readout) = readout;
         self.clients.send(Broadcast::Hello);
-        self.clients.send_json(&self.zeroed_message());
+        self.clients.send_message(&self.zeroed_message());
         Ok(())
     }
 
@@ -151,10 +145,10 @@ impl Hub {
     /// Makes a request of the program that started the panel, in a thread where it may block.
     pub(super) async fn ask<T: Send + 'static>(
         &self,
-        request: impl FnOnce(&dyn RequestHandler) -> Reply<T> + Send + 'static,
+        request: impl FnOnce(&RequestHandlers) -> Reply<T> + Send + 'static,
     ) -> Reply<T> {
-        let handler = Arc::clone(&self.handler);
-        let answer = tokio::task::spawn_blocking(move || request(&*handler)).await;
+        let handlers = Arc::clone(&self.handlers);
+        let answer = tokio::task::spawn_blocking(move || request(&handlers)).await;
         answer.unwrap_or_else(|_| Err("failed within taxel; please report it".to_owned()))
     }
 
@@ -178,10 +172,10 @@ impl Hub {
                 self.forget_registers();
             }
             for detection in &received.detections {
-                self.clients.send_json(&messages::detection(detection));
+                self.clients.send_message(&Message::detection(detection));
             }
             if received.zeroed {
-                self.clients.send_json(&self.zeroed_message());
+                self.clients.send_message(&self.zeroed_message());
             }
             if received.picture {
                 self.clients.new_picture();
@@ -206,23 +200,23 @@ impl Hub {
 
     fn send_counters(&self, live: &LiveSource, now: &Counters, before: Option<&Counters>, seconds: f64) {
         let frame_us = self.registers_certain().then(|| self.board().registers.frame_us());
-        let message = messages::counters(live, now, before, seconds, frame_us, self.clients.count());
-        self.clients.send(Broadcast::Counters(Arc::new(message)));
+        let message = live.counters(now, before, seconds, frame_us, self.clients.count());
+        self.clients.send(Broadcast::Counters(Box::new(message)));
     }
 
     /// After a reset the board holds other registers than were read.
     fn forget_registers(&self) {
         if std::mem::take(&mut self.board().known) {
-            self.clients.send_json(&self.registers_message());
+            self.clients.send_message(&self.registers_message());
         }
         self.registers_unknown.notify_one();
     }
 
     /// Sends the new lines of the board's serial line to the clients.
     async fn read_board_lines(&self) {
-        if let Ok(new) = self.ask(|handler| handler.board_lines()).await {
+        if let Ok(new) = self.ask(|handlers| handlers.board.board_lines()).await {
             for line in new.lines {
-                self.clients.send_json(&json!({ "type": "board_line", "at_ns": now_ns(), "text": line }));
+                self.clients.send_message(&Message::BoardLine { at_ns: now_ns(), text: line });
             }
             // With version 1 of the wire only the serial line reports a reset.
             if self.resets.swap(new.resets, Ordering::Relaxed) != new.resets && new.resets > 0 {
@@ -233,39 +227,39 @@ impl Hub {
 
     // ------------------------------------------------------------------------------------------ messages
 
-    pub(super) fn hello_message(&self) -> Value {
+    pub(super) fn hello_message(&self) -> Message {
         let live = self.live();
-        json!({
-            "type": "hello",
-            "protocol": 1,
-            "taxel": env!("CARGO_PKG_VERSION"),
-            "live": live.is_some(),
-            "array": live.as_ref().map(|live| messages::array(live.array())),
-            "udp": live.as_ref().and_then(|live| match live.handle.place() {
+        let live = live.as_ref();
+        Message::Hello {
+            protocol: 1,
+            taxel: env!("CARGO_PKG_VERSION"),
+            live: live.is_some(),
+            array: live.map(|live| ArrayInfo::from(live.array())),
+            udp: live.and_then(|live| match live.handle.place() {
                 Origin::Udp(address) => Some(address.to_string()),
                 Origin::Bridge(_) => None,
             }),
-            "delta_intensity": live.as_ref().map(|live| live.handle.options().differences),
-            "control": self.board().control,
-            "folder": self.options.folder,
-            "open": self.options.open,
-            "readout": *lock(&self.readout),
-            "encoders": encode::NAMES,
-            "column_us": COLUMN_US,
-            "columns_us": COLUMNS_US,
-            "time_columns": SPAN,
-            "most_message_bytes": MOST_BYTES,
-            "most_credits": MOST_CREDITS,
-        })
+            delta_intensity: live.map(|live| live.handle.options().differences),
+            control: self.board().control.clone(),
+            folder: self.options.folder.display().to_string(),
+            open: self.options.open.clone(),
+            readout: lock(&self.readout).clone(),
+            encoders: encode::NAMES,
+            column_us: COLUMN_US,
+            columns_us: COLUMNS_US,
+            time_columns: SPAN,
+            most_message_bytes: MOST_BYTES,
+            most_credits: MOST_CREDITS,
+        }
     }
 
     /// The taxels of the live source that were zeroed.
-    pub(super) fn zeroed_message(&self) -> Value {
+    pub(super) fn zeroed_message(&self) -> Message {
         let zeroed = self.live().map(|live| live.handle.zeroed().0).unwrap_or_default();
-        json!({ "type": "zeroed", "taxels": zeroed.iter().map(messages::zeroing).collect::<Vec<_>>() })
+        Message::zeroed(&zeroed)
     }
 
-    pub(super) fn registers_message(&self) -> Value {
+    pub(super) fn registers_message(&self) -> Message {
         let live = self.live();
         let (registers, known) = {
             let board = self.board();
@@ -273,41 +267,43 @@ impl Hub {
         };
         let held = Registers { record: false, ..registers };
         let own = || presets::equal_to(&held, &self.presets().presets);
-        json!({
-            "type": "registers",
-            "known": known,
-            "stated": self.options.registers_stated,
-            "values": registers,
-            "preset": presets::built_in_equal_to(&held, live.as_ref().map(|live| live.array())).or_else(own),
-            "frame_us": registers.frame_us(),
-            "warnings": registers.warnings(),
-        })
+        Message::Registers {
+            known,
+            stated: self.options.registers_stated,
+            values: registers,
+            preset: presets::built_in_equal_to(&held, live.as_ref().map(|live| live.array())).or_else(own),
+            frame_us: registers.frame_us(),
+            warnings: registers.warnings(),
+        }
     }
 
-    pub(super) fn presets_message(&self) -> Value {
+    pub(super) fn presets_message(&self) -> Message {
         let live = self.live();
         let held = self.board().registers;
-        let built_in: Vec<_> = presets::fitting(&held, live.as_ref().map(|live| live.array()));
-        let built_in: Vec<_> = built_in.into_iter().map(|preset| preset.name).collect();
+        let built_in = presets::fitting(&held, live.as_ref().map(|live| live.array()));
         let UserPresets { path, presets } = self.presets().clone();
-        let own: BTreeMap<_, _> = presets.into_iter().map(|(name, preset)| (name, presets::to_json(&preset))).collect();
-        json!({ "type": "presets", "built_in": built_in, "own": own, "path": path })
+        Message::Presets {
+            built_in: built_in.into_iter().map(|preset| preset.name).collect(),
+            own: presets,
+            path: path.display().to_string(),
+        }
     }
 
     /// The recordings of the folder.
-    pub(super) async fn recordings_message(&self) -> Value {
+    pub(super) async fn recordings_message(&self) -> Message {
         let folder = self.folder.path().to_owned();
-        let names = self.ask(move |handler| handler.recordings(&folder)).await.unwrap_or_else(|reason| {
-            self.clients.send_json(&messages::warning(reason));
+        let names = self.ask(move |handlers| handlers.files.recordings(&folder)).await.unwrap_or_else(|reason| {
+            self.clients.send_message(&Message::warning(reason));
             vec![]
         });
-        let files = self.folder.list(names).into_iter().map(|file| {
-            let labels = self.labels.count(&file.name);
-            json!({ "name": file.name, "bytes": file.bytes, "modified_ns": file.modified_ns, "labels": labels })
+        let files = self.folder.list(names).into_iter().map(|Listed { name, bytes, modified_ns }| {
+            let labels = self.labels.count(&name);
+            FileInfo { name, bytes, modified_ns, labels }
         });
-        json!({
-            "type": "recordings", "folder": self.folder.path(), "files": files.collect::<Vec<_>>(),
-            "readouts": self.folder.readouts(),
-        })
+        Message::Recordings {
+            folder: self.folder.path().display().to_string(),
+            files: files.collect(),
+            readouts: self.folder.readouts(),
+        }
     }
 }

@@ -3,16 +3,18 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use serde_json::{Value, json};
-
+use super::array_state::RestSource;
 use super::keyframe_index::KeyframeIndex;
-use super::keyframe_index::pictures::PictureIndex;
+use super::keyframe_index::pictures::{PictureIndex, PicturePlace};
 use super::keyframe_index::recording::RecordingIndex;
-use super::messages;
+use super::messages::{FoundDetection, Marker, Message, PictureSource, Pictures, RecordedNote};
 use super::time_columns::{COLUMN_US, TimeColumns};
 
 /// A label may lie so long before the first event or after the last one, us.
 const LATE_LABEL_US: i64 = 1_000_000;
+
+/// Maximum number of detections of a recording in a message.
+const MOST_DETECTIONS: usize = 10_000;
 
 /// An indexed recording.
 #[derive(Debug, Clone)]
@@ -76,114 +78,103 @@ impl Indexed {
     }
 
     /// The `overview` message.
-    pub(super) fn overview(&self, name: &str) -> Value {
-        let (start, step, bins, events) = match self {
+    pub(super) fn overview(&self, name: &str) -> Message {
+        let (start_us, step_us, bins, events) = match self {
             Self::Events(index) => {
                 let (start, step, events) = &index.event_rate;
-                (*start, *step, events.len(), &events[..])
+                (*start, *step, events.len(), events.clone())
             }
             Self::Pictures(index) => {
                 let (start, step, bins) = index.bins();
-                (start, step, bins, &[][..])
+                (start, step, bins, vec![])
             }
         };
         let index = self.index();
-        let force = index.time_columns().map(|columns| columns.greatest_sums(start, step, bins, COLUMN_US));
-        json!({
-            "type": "overview", "source": name, "start_us": start, "step_us": step, "events": events,
-            "force": force.unwrap_or_default(),
-        })
+        let force = index.time_columns().map(|columns| columns.greatest_sums(start_us, step_us, bins, COLUMN_US));
+        Message::Overview { source: Some(name.to_owned()), start_us, step_us, events, force: force.unwrap_or_default() }
     }
 
     /// The `opened` message; `bytes` is the size of the file, `train` the command that trains on its labels.
-    pub(super) fn opened(&self, name: &str, bytes: u64, train: &str, begun: Instant) -> Value {
+    pub(super) fn opened(&self, name: &str, bytes: u64, train: String, begun: Instant) -> Message {
         let index = self.index();
         let range = index.range();
         // The end of the column, which has all of its force.
         let touch = index.time_columns().and_then(TimeColumns::first_touch);
         let touch_us =
             touch.zip(range).map(|(column, (first, last))| ((column + 1) * COLUMN_US - 1).clamp(first, last));
-        let touch_us = match self {
-            Self::Events(_) => touch_us,
-            Self::Pictures(index) => touch_us.map(|t| index.picture_until(t).unwrap_or(t)),
+        let (events, pictures) = match self {
+            Self::Events(index) => (Some(index), None),
+            Self::Pictures(index) => (None, Some(index)),
         };
-        let mut message = json!({
-            "type": "opened",
-            "name": name,
-            "array": messages::array(index.array()),
-            "start_us": range.map(|(first, _)| first),
-            "stop_us": range.map(|(_, last)| last),
-            "touch_us": touch_us,
-            "bytes": bytes,
-            "train": train,
-            "index_ms": begun.elapsed().as_secs_f64() * 1e3,
-        });
-        let (remarks, more) = match self {
-            Self::Events(index) => {
-                let header = index.header();
-                let more = json!({
-                    "events": index.events,
-                    "verdict": index.verdict,
-                    "unfinished": index.unfinished,
-                    "registers": header.registers,
-                    "frame_us": header.registers.map(|registers| registers.frame_us()),
-                    "pace": index.pace,
-                    "on": index.on,
-                    "pictures": null,
-                });
-                (&index.remarks, more)
-            }
-            Self::Pictures(index) => {
-                let file = &index.file;
-                let places = index.places().map(|(place, rest, falls, on)| {
-                    json!({
-                        "name": place.name, "left": place.left, "rows": place.rows, "columns": place.columns,
-                        "rest": rest.name(), "falls": falls, "on": on,
-                    })
-                });
-                let more = json!({
-                    "events": 0,
-                    "verdict": file.verdict,
-                    "unfinished": false,
-                    "registers": null,
-                    "frame_us": null,
-                    "pace": null,
-                    "on": "",
-                    "pictures": {
-                        "count": index.pictures, "unit": file.unit, "step": index.step, "zero": index.zero, "floor": index.floor,
-                        "newtons": index.newtons, "picture_us": file.picture_us, "sources": places.collect::<Vec<_>>(),
-                        "flickering": index.flickering().collect::<Vec<_>>(),
-                        "trial": file.trial, "trials": file.trials, "left_s": file.left_s,
-                    },
-                });
-                (&file.remarks, more)
-            }
+        let registers = events.and_then(|index| index.header().registers);
+        let (remarks, note_sources) = match self {
+            Self::Events(index) => (&index.remarks, &[][..]),
+            Self::Pictures(index) => (&index.file.remarks, &index.file.note_sources[..]),
         };
         let us = self.us();
-        let note_sources = match self {
-            Self::Events(_) => &[],
-            Self::Pictures(index) => &index.file.note_sources[..],
-        };
         let note_sources = note_sources.iter().map(String::as_str).chain(std::iter::repeat(""));
-        let notes = remarks.notes.iter().zip(note_sources);
-        let notes =
-            notes.map(|(n, source)| json!({ "t_us": n.t_us.map(|t| t * us), "text": n.text, "source": source }));
-        let detections = remarks.detections.iter().take(messages::MOST_DETECTIONS);
-        let more_of_all = json!({
-            "notes": notes.collect::<Vec<_>>(),
-            "markers": remarks.markers.iter().map(|m| json!({ "t_us": m.t * us, "start": m.start })).collect::<Vec<_>>(),
-            "zeroed": remarks.zeroings.iter().map(|(_, one)| messages::zeroing(one)).collect::<Vec<_>>(),
-            "detections": detections
-                .map(|(_, d)| json!({ "label": d.label, "t_us": d.t * us, "known_us": d.known * us }))
-                .collect::<Vec<_>>(),
+        let notes = remarks.notes.iter().zip(note_sources).map(|(note, source)| RecordedNote {
+            t_us: note.t_us.map(|t| t * us),
+            text: note.text.clone(),
+            source: source.to_owned(),
         });
-        if let Value::Object(message) = &mut message {
-            for part in [more, more_of_all] {
-                if let Value::Object(part) = part {
-                    message.extend(part);
-                }
-            }
+        let detections = remarks.detections.iter().take(MOST_DETECTIONS).map(|(_, found)| FoundDetection {
+            label: found.label.clone(),
+            t_us: found.t * us,
+            known_us: found.known * us,
+        });
+        Message::Opened {
+            name: name.to_owned(),
+            array: index.array().into(),
+            start_us: range.map(|(first, _)| first),
+            stop_us: range.map(|(_, last)| last),
+            touch_us: touch_us.map(|t| pictures.and_then(|index| index.picture_until(t)).unwrap_or(t)),
+            events: events.map_or(0, |index| index.events),
+            bytes,
+            train,
+            pictures: pictures.map(|index| about_pictures(index)),
+            verdict: match self {
+                Self::Events(index) => index.verdict.clone(),
+                Self::Pictures(index) => index.file.verdict.clone(),
+            },
+            unfinished: events.is_some_and(|index| index.unfinished),
+            on: events.map_or_else(String::new, |index| index.on.clone()),
+            pace: events.and_then(|index| index.pace.clone()),
+            registers,
+            frame_us: registers.map(|registers| registers.frame_us()),
+            markers: remarks.markers.iter().map(|marker| Marker { t_us: marker.t * us, start: marker.start }).collect(),
+            notes: notes.collect(),
+            zeroed: remarks.zeroings.iter().map(|(_, zeroing)| zeroing.into()).collect(),
+            detections: detections.collect(),
+            index_ms: begun.elapsed().as_secs_f64() * 1e3,
         }
-        message
+    }
+}
+
+/// What `opened` says of pictures.
+fn about_pictures(index: &PictureIndex) -> Pictures {
+    let file = &index.file;
+    let source = |(place, rest, falls, on): (&PicturePlace, RestSource, bool, &str)| PictureSource {
+        name: place.name.clone(),
+        left: place.left,
+        rows: place.rows,
+        columns: place.columns,
+        rest: rest.name(),
+        falls,
+        on: on.to_owned(),
+    };
+    Pictures {
+        count: index.pictures,
+        unit: file.unit.clone(),
+        step: index.step,
+        zero: index.zero,
+        floor: index.floor,
+        newtons: index.newtons,
+        picture_us: file.picture_us,
+        sources: index.places().map(source).collect(),
+        flickering: index.flickering().collect(),
+        trial: file.trial.clone(),
+        trials: file.trials.clone(),
+        left_s: file.left_s,
     }
 }

@@ -4,7 +4,6 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::Value;
 use tokio::sync::oneshot;
 
 use super::clients::Broadcast;
@@ -12,17 +11,14 @@ use super::handler::{EditOutcome, LabelRow, LabelTable};
 use super::hub::Hub;
 use super::indexed::Shown;
 use super::labels::{LabelChange, NumberedEdit, WaitingChanges, file_of};
+use super::limited::{OneOrMore, Text};
 use super::limits::MOST_MARKS;
-use super::messages::warning;
-use super::request::{Answer, Refusal, Request};
+use super::messages::Message;
+use super::refusal::{Answer, Refusal};
+use super::request::{Keep, MarkedTimes};
 
 /// How often the tables that were opened are checked for changes of other programs.
 const FOLLOW_EVERY: Duration = Duration::from_millis(300);
-
-/// Whether a request changes labels.
-pub(super) fn is_label_request(what: &str) -> bool {
-    matches!(what, "mark" | "marks" | "rename" | "move" | "delete" | "settle")
-}
 
 // ---------------------------------------------------------------------------------------------- reading
 
@@ -41,7 +37,7 @@ pub(super) async fn read(hub: &Hub, recording: &str, us: i64) -> Answer {
 /// What changes with the table; the reason where that cannot be determined.
 async fn stamp(hub: &Hub, recording: &str) -> String {
     match hub.folder.file(&file_of(recording)) {
-        Ok(table) => hub.ask(move |handler| handler.label_stamp(&table)).await.unwrap_or_else(|reason| reason),
+        Ok(table) => hub.ask(move |handlers| handlers.labels.stamp(&table)).await.unwrap_or_else(|reason| reason),
         Err(error) => error.to_string(),
     }
 }
@@ -53,7 +49,7 @@ async fn reread(hub: &Hub, recording: &str, stamp: String, us: i64) -> Answer<bo
     hub.labels.opens(recording, stamp, us);
     let table = hub.folder.file(&file_of(recording))?;
     let name = recording.to_owned();
-    let (read, exists) = hub.ask(move |handler| Ok((handler.read_labels(&table, &name)?, table.exists()))).await?;
+    let (read, exists) = hub.ask(move |handlers| Ok((handlers.labels.read(&table, &name)?, table.exists()))).await?;
     let there = exists || !read.conflict.is_empty();
     Ok(hub.labels.replace(recording, there.then(|| read.in_view(us))))
 }
@@ -70,7 +66,7 @@ pub(super) async fn follow(hub: Arc<Hub>) {
             match reread(&hub, &recording, stamp, us).await {
                 Ok(true) => hub.clients.send(Broadcast::Labels(recording)),
                 Ok(false) => {}
-                Err(refusal) => hub.clients.send_json(&warning(refusal.reason)),
+                Err(refusal) => hub.clients.send_message(&Message::warning(refusal.reason)),
             }
         }
     }
@@ -78,47 +74,28 @@ pub(super) async fn follow(hub: Arc<Hub>) {
 
 // ---------------------------------------------------------------------------------------------- changing
 
-/// The changes that a request asks for.
-pub(super) fn changes(what: &str, shown: Option<&Shown>, request: &Request<'_>) -> Answer<Vec<LabelChange>> {
-    let id = || request.whole("label_id", 1, i64::MAX).map(i64::unsigned_abs);
-    match what {
-        "mark" => {
-            let replaces_us = request.has("replaces_us").then(|| request.time("replaces_us")).transpose()?;
-            Ok(vec![LabelChange::Mark(row(shown, request, request.time("t_us")?, replaces_us)?)])
-        }
-        "marks" => marks(shown, request),
-        "rename" => Ok(vec![LabelChange::Rename { id: id()?, label: request.text("label", 200)?.to_owned() }]),
-        "move" => Ok(vec![LabelChange::Move { id: id()?, t_us: request.time("t_us")? }]),
-        _ => Ok(vec![LabelChange::Delete { id: id()? }]),
-    }
-}
-
-fn row(shown: Option<&Shown>, request: &Request<'_>, t_us: i64, replaces_us: Option<i64>) -> Answer<LabelRow> {
-    let source = request.optional_text("source", 64)?.unwrap_or_default().to_owned();
+/// A label of the trial that is shown.
+pub(super) fn row(shown: Option<&Shown>, label: Text<200>, t_us: i64, source: Option<Text<64>>) -> LabelRow {
+    let source = source.map(|source| source.0).unwrap_or_default();
     let trial = shown.and_then(|shown| shown.indexed.trial()).unwrap_or_default().to_owned();
-    Ok(LabelRow { label: request.text("label", 200)?.to_owned(), t_us, source, trial, replaces_us, host_ns: None })
+    LabelRow { label: label.0, t_us, source, trial, replaces_us: None, host_ns: None }
 }
 
-/// Several labels, each at one time or more.
-fn marks(shown: Option<&Shown>, request: &Request<'_>) -> Answer<Vec<LabelChange>> {
-    let groups = request.get("labels").and_then(Value::as_array).filter(|groups| !groups.is_empty());
-    let groups = groups.ok_or_else(|| Refusal::of("labels", "must be one label or more, each an object"))?;
+/// The changes of `marks`: several labels, each at one time or more.
+pub(super) fn marks(shown: Option<&Shown>, labels: Vec<MarkedTimes>) -> Answer<Vec<LabelChange>> {
     let mut changes = vec![];
-    for group in groups {
-        let group = group.as_object().ok_or_else(|| Refusal::of("labels", "each must be an object"))?;
-        let group = Request(group);
-        let times = group.times("t_us")?;
-        let replaced = if group.has("replaces_us") { Some(group.times("replaces_us")?) } else { None };
-        if replaced.as_ref().is_some_and(|replaced| replaced.len() != times.len()) {
+    for MarkedTimes { label, t_us: OneOrMore(times), source, replaces_us } in labels {
+        if replaces_us.as_ref().is_some_and(|replaced| replaced.0.len() != times.len()) {
             return Err(Refusal::of("replaces_us", "must have one time for each of t_us"));
         }
         if changes.len() + times.len() > MOST_MARKS {
             return Err(Refusal::of("labels", format!("must be at most {MOST_MARKS} labels at a time")));
         }
-        for (k, &t_us) in times.iter().enumerate() {
-            let replaces_us = replaced.as_ref().map(|replaced| replaced[k]);
-            changes.push(LabelChange::Mark(row(shown, &group, t_us, replaces_us)?));
-        }
+        let row = row(shown, label, 0, source);
+        changes.extend(times.iter().enumerate().map(|(k, t_us)| {
+            let replaces_us = replaces_us.as_ref().map(|replaced| replaced.0[k].0);
+            LabelChange::Mark(LabelRow { t_us: t_us.0, replaces_us, ..row.clone() })
+        }));
     }
     Ok(changes)
 }
@@ -171,7 +148,7 @@ async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdi
     let requests: Vec<Vec<_>> = edits.iter().flatten().map(in_file).collect();
     let recording = name.to_owned();
     let (outcomes, read): (Vec<EditOutcome>, LabelTable) =
-        hub.ask(move |handler| handler.change_labels(&table, &recording, &requests)).await?;
+        hub.ask(move |handlers| handlers.labels.change(&table, &recording, &requests)).await?;
     let mut outcomes = outcomes.into_iter();
     let mut answers = vec![];
     for request in edits {
@@ -192,22 +169,17 @@ async fn write(hub: &Hub, name: &str, us: i64, edits: Vec<Result<Vec<NumberedEdi
     Ok(answers)
 }
 
-/// Ends a conflict as the client chose.
-pub(super) async fn settle(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> Answer {
+/// Ends the conflict of this number as the client chose.
+pub(super) async fn settle(hub: &Hub, shown: Option<&Shown>, id: u64, keep: Keep) -> Answer {
     let (name, us) = recording_of(hub, shown)?;
-    let restore = match request.get("keep").and_then(Value::as_str) {
-        Some("acknowledged") => true,
-        Some("file") => false,
-        _ => return Err(Refusal::of("keep", "must be acknowledged or file")),
-    };
-    let id = request.whole("conflict_id", 1, i64::MAX)?.unsigned_abs();
+    let restore = keep == Keep::Acknowledged;
     let table = hub.folder.file(&file_of(&name))?;
     let _turn = hub.labels.turn(&name).await;
     let conflict = hub.labels.conflict(&name, id).ok_or_else(|| {
         Refusal::of("conflict_id", "this conflict is settled, or the file has changed since: look at it again")
     })?;
     let (recording, conflict) = (name.clone(), conflict.in_file(us));
-    let read = hub.ask(move |handler| handler.settle_labels(&table, &recording, &conflict, restore)).await?;
+    let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, &conflict, restore)).await?;
     hub.labels.replace(&name, Some(read.in_view(us)));
     hub.clients.send(Broadcast::Labels(name));
     Ok(())

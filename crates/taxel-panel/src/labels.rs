@@ -3,19 +3,12 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use serde_json::{Value, json};
 use taxel_live::locked::lock;
 use tokio::sync::{OwnedMutexGuard, oneshot};
 
 use super::handler::{LabelConflict, LabelEdit, LabelRow, LabelTable};
-use super::request::Answer;
-
-/// A label of a recording.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Label {
-    pub(super) id: u64,
-    pub(super) row: LabelRow,
-}
+use super::messages::{Conflict, Label, Message};
+use super::refusal::Answer;
 
 /// A change of the labels of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,14 +33,6 @@ impl LabelRow {
     /// With its times as in the file.
     fn in_file(self, us: i64) -> Self {
         Self { t_us: self.t_us / us, replaces_us: self.replaces_us.map(|t| t / us), ..self }
-    }
-
-    /// As the messages of the protocol have it.
-    fn json(&self) -> Value {
-        json!({
-            "label": self.label, "t_us": self.t_us, "source": self.source, "trial": self.trial,
-            "replaces_us": self.replaces_us,
-        })
     }
 }
 
@@ -120,7 +105,7 @@ impl LabelChange {
 pub(super) type NumberedEdit = (Option<u64>, LabelEdit);
 
 fn place_of(labels: &[Label], id: u64) -> Result<usize, String> {
-    labels.iter().position(|label| label.id == id && !label.row.is_removal()).ok_or_else(|| {
+    labels.iter().position(|label| label.label_id == id && !label.row.is_removal()).ok_or_else(|| {
         format!("label_id: there is no label {id}; it was deleted or changed, perhaps by another client or program")
     })
 }
@@ -128,8 +113,8 @@ fn place_of(labels: &[Label], id: u64) -> Result<usize, String> {
 /// Gives a label another row, or removes it.
 fn set(labels: &mut Vec<Label>, id: u64, row: Option<LabelRow>) {
     match row {
-        Some(row) => labels.iter_mut().filter(|label| label.id == id).for_each(|label| label.row = row.clone()),
-        None => labels.retain(|label| label.id != id),
+        Some(row) => labels.iter_mut().filter(|label| label.label_id == id).for_each(|label| label.row = row.clone()),
+        None => labels.retain(|label| label.label_id != id),
     }
 }
 
@@ -157,7 +142,7 @@ struct KnownTable {
     labels: Option<Vec<Label>>,
     conflict: LabelConflict,
     conflict_id: u64,
-    /// What [`RequestHandler::label_stamp`](super::RequestHandler::label_stamp) returned, or its reason, before it was read.
+    /// What [`LabelRequests::stamp`](super::LabelRequests::stamp) returned, or its reason, before it was read.
     stamp: String,
     /// One us of the file in the view.
     us: i64,
@@ -249,11 +234,11 @@ impl LabelTables {
         let mut before = table.labels.clone().unwrap_or_default();
         let mut number = |row: LabelRow| {
             let same = before.iter().position(|label| label.row == row);
-            let id = same.map(|place| before.remove(place).id).unwrap_or_else(|| {
+            let id = same.map(|place| before.remove(place).label_id).unwrap_or_else(|| {
                 *last_id += 1;
                 *last_id
             });
-            Label { id, row }
+            Label { label_id: id, row }
         };
         let labels: Option<Vec<Label>> = rows.map(|rows| rows.into_iter().map(&mut number).collect());
         let same = table.labels == labels && table.conflict == conflict;
@@ -274,26 +259,17 @@ impl LabelTables {
     }
 
     /// The `labels` message.
-    pub(super) fn message(&self, recording: &str) -> Value {
+    pub(super) fn message(&self, recording: &str) -> Message {
         self.with(recording, |table| {
             let shown = table.labels.iter().flatten().filter(|label| !label.row.is_removal());
-            let labels: Vec<_> = shown
-                .map(|label| {
-                    let mut one = label.row.json();
-                    one["label_id"] = json!(label.id);
-                    one
-                })
-                .collect();
-            let all = |rows: &[LabelRow]| rows.iter().map(LabelRow::json).collect::<Vec<_>>();
-            let LabelConflict { missing, returned, new } = &table.conflict;
-            let conflict = (!table.conflict.is_empty()).then(|| {
-                json!({
-                    "conflict_id": table.conflict_id, "missing": all(missing), "returned": all(returned), "new": all(new),
-                })
-            });
-            json!({
-                "type": "labels", "name": recording, "path": file_of(recording), "labels": labels, "conflict": conflict,
-            })
+            let LabelConflict { missing, returned, new } = table.conflict.clone();
+            let conflict_id = table.conflict_id;
+            Message::Labels {
+                name: recording.to_owned(),
+                path: file_of(recording),
+                labels: shown.cloned().collect(),
+                conflict: (!table.conflict.is_empty()).then_some(Conflict { conflict_id, missing, returned, new }),
+            }
         })
     }
 }

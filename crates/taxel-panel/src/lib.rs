@@ -3,7 +3,7 @@
 //! One thread serves all clients. It works on copies of the events ([`taxel_live::pipeline::ViewerEvents`]) and sends a picture
 //! only when a client has asked for one, so that a client that reads slowly, or never, delays nothing but its own
 //! pictures. What takes long or belongs to other parts of the program (the board's serial line, cutting, label tables) is
-//! left to the program that started the panel, through [`RequestHandler`].
+//! left to the program that started the panel, through [`RequestHandlers`].
 
 mod array_state;
 pub mod assets;
@@ -18,6 +18,7 @@ mod indexed;
 mod keyframe_index;
 mod label_requests;
 mod labels;
+mod limited;
 mod limits;
 mod live_source;
 mod load;
@@ -29,6 +30,7 @@ mod player;
 mod presets;
 mod recorder;
 mod recording_session;
+mod refusal;
 mod registers;
 mod request;
 mod requests;
@@ -38,10 +40,21 @@ mod taxel_history;
 mod time_columns;
 mod weights;
 
+/// The JSON schemas of the requests (`requests`) and of the messages that are text (`messages`), for `tools/messages.py`.
+#[cfg(feature = "development")]
+#[must_use]
+pub fn message_schemas() -> String {
+    let settings = schemars::generate::SchemaSettings::draft2020_12;
+    let requests = settings().into_generator().into_root_schema_for::<request::Request>();
+    let messages = settings().for_serialize().into_generator().into_root_schema_for::<messages::Message>();
+    serde_json::json!({ "requests": requests, "messages": messages }).to_string()
+}
+
 pub use array_state::RestSource;
 pub use handler::{
-    BoardLines, Cut, Detected, EditOutcome, LabelConflict, LabelEdit, LabelRow, LabelTable, Opening, PicturesRead,
-    PresetValue, ReadFile, Reply, RequestHandler, UnhealthyTaxels, UserPreset, UserPresets,
+    BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, LabelConflict, LabelEdit, LabelRequests,
+    LabelRow, LabelTable, Opening, PicturesRead, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
+    TrainingRequests, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
 pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource};

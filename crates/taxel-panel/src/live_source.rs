@@ -9,13 +9,14 @@ use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
 use taxel_live::clock::Offset;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Handle, OutputDetection, ViewerEvents};
+use taxel_live::pipeline::{Counters, Handle, OutputDetection, ViewerEvents};
 use taxel_live::recording::now_ns;
 
 use super::array_state::{ArrayState, Keyframe};
 use super::clients::MOST_WAITING;
 use super::keyframe_index::live::{LiveIndex, REACH_US};
 use super::keyframe_index::{Activity, KeyframeIndex};
+use super::messages::{Latency, Lost, Message};
 use super::time_columns::{COLUMN_US, TimeColumns};
 
 /// The time shown follows the host's clock this far behind it while no events arrive, ns: events arrive within that.
@@ -89,6 +90,54 @@ impl LiveSource {
 
     pub(super) fn array(&self) -> &Array {
         self.index.array()
+    }
+
+    /// The message of its counters; rates are those of the last `seconds`, since the counters `before`.
+    #[allow(clippy::cast_precision_loss)]
+    pub(super) fn counters(
+        &self,
+        now: &Counters,
+        before: Option<&Counters>,
+        seconds: f64,
+        frame_us: Option<f64>,
+        viewers: usize,
+    ) -> Message {
+        let rate = |count: fn(&Counters) -> u64| {
+            before.map(|before| count(now).saturating_sub(count(before)) as f64 / seconds)
+        };
+        let v2 = now.decoding.wire_v2;
+        Message::Counters {
+            at_ns: now_ns(),
+            seconds: now.seconds,
+            board_us: now.board.board_us,
+            events: now.decoding.events,
+            events_per_s: rate(|counters| counters.decoding.events),
+            bytes_per_s: rate(|counters| counters.capture.bytes),
+            datagrams_per_s: rate(|counters| counters.capture.datagrams),
+            frames_per_s: frame_us.map(|frame_us| 1e6 / frame_us),
+            arrival: now.arrival(now_ns()),
+            pace: now.board.pace.clone(),
+            lost: Lost {
+                kernel: now.capture.dropped_by_kernel,
+                queue: now.capture.dropped_by_queue,
+                wire: v2.missing,
+                damaged: now.decoding.wire.skipped + v2.checksum + v2.short + v2.foreign,
+                outside: now.decoding.wire.outside + v2.outside,
+                readout: now.readout.events_dropped,
+                panel: self.missing(),
+            },
+            queue: now.capture.waiting,
+            latency: Latency { decode: now.decode_latency, said: now.output_latency },
+            wire_version: now.decoding.wire_version,
+            marked_start: now.board.marked_start,
+            taring: now.readout.taring,
+            detections: now.readout.detections,
+            reach_us: self.index.range(),
+            reach_bytes: self.index.bytes(),
+            viewers,
+            pictures_per_s: 0.0,
+            ended: self.handle.is_over(),
+        }
     }
 
     /// Events that only the panel lacks.

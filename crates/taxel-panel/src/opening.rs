@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use serde_json::json;
 use taxel_core::problem;
 use taxel_live::Result;
 use taxel_live::recording::Reader;
@@ -15,7 +14,7 @@ use super::handler::{Opening, PicturesRead, ReadFile, Reply};
 use super::hub::Hub;
 use super::indexed::Indexed;
 use super::keyframe_index::recording::RecordingIndex;
-use super::messages;
+use super::messages::Message;
 
 /// How often the progress of reading a file is sent.
 const PROGRESS_EVERY: Duration = Duration::from_secs(1);
@@ -67,7 +66,7 @@ fn of_a_board(path: &Path) -> Result<Option<Arc<RecordingIndex>>> {
 /// Reads a file by the program that started the panel; also returns how long the rest of the file takes, s.
 async fn read(hub: &Hub, path: &Path, trial: Option<&str>, opening: Opening) -> Result<(Indexed, Option<f64>)> {
     let (file, trial) = (path.to_owned(), trial.map(str::to_owned));
-    let answer: Reply<ReadFile> = hub.ask(move |handler| handler.read(&file, trial.as_deref(), opening)).await;
+    let answer: Reply<ReadFile> = hub.ask(move |handlers| handlers.files.read(&file, trial.as_deref(), opening)).await;
     match answer.map_err(|reason| problem!("{reason}"))? {
         ReadFile::Events(mcap) => {
             let index = tokio::task::spawn_blocking(move || RecordingIndex::open(&mcap)).await;
@@ -91,19 +90,19 @@ async fn read_whole(hub: Arc<Hub>, name: String, key: (PathBuf, Option<String>),
             outcome = &mut reading => break outcome,
             () = tokio::time::sleep(PROGRESS_EVERY) => {
                 let share = (begun.elapsed().as_secs_f64() / left_s.max(1.0)).min(0.99);
-                hub.clients.send_json(&json!({ "type": "loading", "name": name, "share": share }));
+                hub.clients.send_message(&Message::Loading { name: name.clone(), share });
             }
         }
     };
     match outcome {
         Ok((indexed, _)) => {
             hub.folder.remember(key.clone(), bytes, &indexed);
-            hub.clients.send_json(&json!({ "type": "loading", "name": name, "share": 1.0 }));
+            hub.clients.send_message(&Message::Loading { name: name.clone(), share: 1.0 });
             hub.clients.send(Broadcast::Whole(name));
         }
         Err(error) => {
             hub.folder.forget(&key);
-            hub.clients.send_json(&messages::warning(format!("{error}; only its beginning is shown")));
+            hub.clients.send_message(&Message::warning(format!("{error}; only its beginning is shown")));
         }
     }
 }

@@ -28,16 +28,7 @@ pub(super) fn built_in_equal_to(held: &Registers, array: Option<&Array>) -> Opti
 /// Name of the user's preset that equals these registers.
 pub(super) fn equal_to(held: &Registers, presets: &BTreeMap<String, UserPreset>) -> Option<String> {
     let values = json!(held);
-    presets.iter().find(|(_, preset)| to_json(preset) == values).map(|(name, _)| name.clone())
-}
-
-pub(super) fn to_json(preset: &UserPreset) -> Value {
-    let value = |value: &PresetValue| match value {
-        PresetValue::Flag(flag) => json!(flag),
-        PresetValue::Number(number) => json!(number),
-        PresetValue::Other(text) => json!(text),
-    };
-    Value::Object(preset.iter().map(|(name, held)| (name.clone(), value(held))).collect())
+    presets.iter().find(|(_, preset)| json!(preset) == values).map(|(name, _)| name.clone())
 }
 
 /// The registers of a user's preset.
@@ -46,7 +37,7 @@ pub(super) fn to_json(preset: &UserPreset) -> Value {
 ///
 /// Why the preset, which may have been edited by hand, holds no registers.
 pub(super) fn to_registers(preset: &UserPreset) -> Result<Registers, String> {
-    serde_json::from_value(to_json(preset)).map_err(|error| error.to_string())
+    serde_json::from_value(json!(preset)).map_err(|error| error.to_string())
 }
 
 /// A preset of these registers.

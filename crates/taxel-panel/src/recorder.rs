@@ -3,10 +3,12 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
 use taxel_live::locked::lock;
 use taxel_live::recording::numbered;
 use tokio::sync::Notify;
+
+use super::messages::{LastRecording, Message, RecorderPhase};
+use super::request::RecordingFormat;
 
 /// What is to be recorded.
 #[derive(Debug, Clone)]
@@ -20,14 +22,6 @@ pub(super) struct RecordingPlan {
     /// Whether the next recording begins by itself.
     pub(super) advance: bool,
     pub(super) label: Option<String>,
-}
-
-/// The kind of file that is recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum RecordingFormat {
-    Mcap,
-    /// Raw bytes alone.
-    Lsa,
 }
 
 impl RecordingFormat {
@@ -93,33 +87,38 @@ impl Recorder {
     }
 
     /// The `recorder` message.
-    pub(super) fn message(&self) -> Value {
+    pub(super) fn message(&self) -> Message {
         let state = lock(&self.state);
         let plan = state.plan.as_ref();
         let length = plan.and_then(|plan| plan.length);
-        let (name, left, seconds) = match state.phase {
-            Phase::Idle => ("idle", None, None),
-            Phase::Countdown(until) => ("countdown", Some(until.saturating_duration_since(Instant::now())), None),
+        let (phase, left, seconds) = match state.phase {
+            Phase::Idle => (RecorderPhase::Idle, None, None),
+            Phase::Countdown(until) => {
+                (RecorderPhase::Countdown, Some(until.saturating_duration_since(Instant::now())), None)
+            }
             Phase::Recording(since) => {
                 let passed = since.elapsed();
-                ("recording", length.map(|length| length.saturating_sub(passed)), Some(passed.as_secs_f64()))
+                (
+                    RecorderPhase::Recording,
+                    length.map(|length| length.saturating_sub(passed)),
+                    Some(passed.as_secs_f64()),
+                )
             }
-            Phase::Finishing => ("finishing", None, None),
+            Phase::Finishing => (RecorderPhase::Finishing, None, None),
         };
-        json!({
-            "type": "recorder",
-            "state": name,
-            "name": plan.map(|plan| &plan.name),
-            "index": plan.and_then(|plan| plan.index),
-            "file": plan.filter(|_| state.phase != Phase::Idle).map(RecordingPlan::file),
-            "label": plan.and_then(|plan| plan.label.as_ref()),
-            "advance": plan.is_some_and(|plan| plan.advance),
-            "left_s": left.map(|left| left.as_secs_f64()),
-            "seconds": seconds,
-            "length_s": length.map(|length| length.as_secs_f64()),
-            "last": state.last.as_ref().map(|(file, verdict)| json!({ "file": file, "verdict": verdict })),
-            "error": state.error,
-        })
+        Message::Recorder {
+            state: phase,
+            name: plan.map(|plan| plan.name.clone()),
+            index: plan.and_then(|plan| plan.index),
+            file: plan.filter(|_| state.phase != Phase::Idle).map(RecordingPlan::file),
+            label: plan.and_then(|plan| plan.label.clone()),
+            advance: plan.is_some_and(|plan| plan.advance),
+            left_s: left.map(|left| left.as_secs_f64()),
+            seconds,
+            length_s: length.map(|length| length.as_secs_f64()),
+            last: state.last.clone().map(|(file, verdict)| LastRecording { file, verdict }),
+            error: state.error.clone(),
+        }
     }
 
     /// Begins the countdown of a recording.

@@ -9,8 +9,9 @@ use taxel_live::pipeline::{Record, Summary};
 use taxel_live::recording::Compression;
 
 use super::hub::Hub;
-use super::messages::warning;
-use super::recorder::{Phase, RecorderState, RecordingFormat, RecordingPlan};
+use super::messages::Message;
+use super::recorder::{Phase, RecorderState, RecordingPlan};
+use super::request::RecordingFormat;
 
 /// How often progress is sent to the clients.
 const PROGRESS_EVERY: Duration = Duration::from_secs(1);
@@ -39,7 +40,7 @@ pub(super) fn start(hub: &Arc<Hub>, plan: RecordingPlan) -> Result<(), String> {
 
 fn set(hub: &Hub, change: impl FnOnce(&mut RecorderState)) {
     change(&mut lock(&hub.recorder.state));
-    hub.clients.send_json(&hub.recorder.message());
+    hub.clients.send_message(&hub.recorder.message());
 }
 
 /// Waits until a time, or without limit, and reports progress; true where it was stopped or `broken` before.
@@ -56,7 +57,7 @@ async fn wait(hub: &Hub, until: Option<Instant>, broken: impl Fn() -> bool) -> b
         }
         if reported.elapsed() >= PROGRESS_EVERY {
             reported = Instant::now();
-            hub.clients.send_json(&hub.recorder.message());
+            hub.clients.send_message(&hub.recorder.message());
         }
     }
 }
@@ -67,12 +68,12 @@ async fn write_record_register(hub: &Hub, record: bool) {
         return;
     }
     let command = Command { register: 7, value: if record { RECORD } else { 0 } };
-    match hub.ask(move |handler| handler.command(command)).await {
+    match hub.ask(move |handlers| handlers.board.command(command)).await {
         Ok(_) => {
             hub.board().registers.record = record;
-            hub.clients.send_json(&hub.registers_message());
+            hub.clients.send_message(&hub.registers_message());
         }
-        Err(reason) => hub.clients.send_json(&warning(format!("register record: {reason}"))),
+        Err(reason) => hub.clients.send_message(&Message::warning(format!("register record: {reason}"))),
     }
 }
 
@@ -84,13 +85,13 @@ async fn run(hub: Arc<Hub>) {
             let (Phase::Countdown(until), Some(plan)) = (state.phase, state.plan.clone()) else { return };
             (until, plan)
         };
-        hub.clients.send_json(&recorder.message());
+        hub.clients.send_message(&recorder.message());
         if wait(&hub, Some(until), || false).await {
             set(&hub, |state| state.phase = Phase::Idle);
             return;
         }
         let outcome = record(&hub, &plan).await;
-        hub.clients.send_json(&hub.recordings_message().await);
+        hub.clients.send_message(&hub.recordings_message().await);
         let mut next = false;
         set(&hub, |state| {
             state.phase = Phase::Idle;
@@ -132,7 +133,7 @@ async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> 
     let noted =
         plan.label.as_ref().filter(|_| plan.format == RecordingFormat::Mcap).map(|label| live.handle.entitle(label));
     if let Some(Err(error)) = noted {
-        hub.clients.send_json(&warning(format!("label: {error}")));
+        hub.clients.send_message(&Message::warning(format!("label: {error}")));
     }
     let until = plan.length.map(|length| since + length);
     wait(hub, until, || !live.handle.records() || live.handle.is_over()).await;

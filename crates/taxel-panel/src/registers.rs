@@ -1,6 +1,6 @@
 //! Reading and writing the board's registers.
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 use taxel_core::wire::registers::PRESETS;
 use taxel_core::wire::{Command, Registers};
 use taxel_live::locked::lock;
@@ -9,7 +9,7 @@ use tokio::sync::OwnedMutexGuard;
 use super::handler::UserPresets;
 use super::hub::Hub;
 use super::presets;
-use super::request::{Answer, Refusal, Request};
+use super::refusal::{Answer, Refusal};
 
 const NOT_CONNECTED: &str = "the board's serial line is not connected: give --control, or connect it here";
 
@@ -26,16 +26,16 @@ pub(super) async fn read(hub: &Hub) -> Answer {
     }
     let before = hub.board().registers.channels;
     // The number of channels is no register: it is in the board's greeting. A board without one has as many as it had.
-    let channels = hub.ask(|handler| handler.channels()).await.unwrap_or(before);
+    let channels = hub.ask(|handlers| handlers.board.channels()).await.unwrap_or(before);
     let mut words = [0; 8];
     for register in READABLE {
         let command = Command { register: 6, value: register.into() };
-        words[usize::from(register)] = hub.ask(move |handler| handler.command(command)).await?;
+        words[usize::from(register)] = hub.ask(move |handlers| handlers.board.command(command)).await?;
     }
     hold(hub, Registers::of_words(&words, channels));
     if channels != before {
         // Other presets fit it.
-        hub.clients.send_json(&hub.presets_message());
+        hub.clients.send_message(&hub.presets_message());
     }
     Ok(())
 }
@@ -59,7 +59,7 @@ fn hold(hub: &Hub, registers: Registers) {
         live.handle.wrote(registers);
         lock(&live.state).set_noise_floor(registers.noise_floor.into());
     }
-    hub.clients.send_json(&hub.registers_message());
+    hub.clients.send_message(&hub.registers_message());
 }
 
 /// Writes the registers that differ from those that the board holds, or `all` of them.
@@ -77,7 +77,7 @@ async fn write(hub: &Hub, target: Registers, all: bool) -> Answer {
         commands.extend(others.map(|register| Command { register, value: target.word(register) }));
     }
     for command in commands {
-        if let Err(reason) = hub.ask(move |handler| handler.command(command)).await {
+        if let Err(reason) = hub.ask(move |handlers| handlers.board.command(command)).await {
             // What the board holds now is not certain, so its registers are read; the refusal is that of the write.
             let _ = read(hub).await;
             return Err(reason.into());
@@ -88,8 +88,7 @@ async fn write(hub: &Hub, target: Registers, all: bool) -> Answer {
 }
 
 /// `set`: writes single registers.
-pub(super) async fn set(hub: &Hub, request: &Request<'_>) -> Answer {
-    let values = request.object("values")?;
+pub(super) async fn set(hub: &Hub, values: &Map<String, Value>) -> Answer {
     let names: Vec<String> = values.keys().cloned().collect();
     let mut wanted = vec![];
     for (name, value) in values {
@@ -134,7 +133,7 @@ async fn reread_presets(hub: &Hub) -> Answer {
 }
 
 async fn read_presets(hub: &Hub) -> Answer {
-    let read = hub.ask(|handler| handler.read_presets()).await?;
+    let read = hub.ask(|handlers| handlers.presets.read()).await?;
     *hub.presets() = read;
     Ok(())
 }
@@ -142,11 +141,11 @@ async fn read_presets(hub: &Hub) -> Answer {
 async fn write_presets(hub: &Hub, turn: OwnedMutexGuard<()>) -> Answer {
     let UserPresets { presets, .. } = hub.presets().clone();
     // The lock is held until the file is written, also if the client disconnects.
-    let (written, turn) = hub.ask(move |handler| Ok((handler.write_presets(&presets), turn))).await?;
+    let (written, turn) = hub.ask(move |handlers| Ok((handlers.presets.write(&presets), turn))).await?;
     written?;
     drop(turn);
-    hub.clients.send_json(&hub.presets_message());
-    hub.clients.send_json(&hub.registers_message());
+    hub.clients.send_message(&hub.presets_message());
+    hub.clients.send_message(&hub.registers_message());
     Ok(())
 }
 

@@ -14,7 +14,7 @@ use tokio::sync::watch;
 
 use super::assets::asset;
 use super::connections::LimitedListener;
-use super::handler::RequestHandler;
+use super::handler::RequestHandlers;
 use super::hub::Hub;
 use super::label_requests;
 use super::limits::MOST_BYTES;
@@ -60,14 +60,14 @@ impl Panel {
     /// # Errors
     ///
     /// `Socket` where the port is taken, `File` where the folder does not exist, or the system gives no random numbers.
-    pub fn start(options: PanelOptions, live: Option<Handle>, handler: Box<dyn RequestHandler>) -> Result<Self> {
+    pub fn start(options: PanelOptions, live: Option<Handle>, handlers: RequestHandlers) -> Result<Self> {
         let folder = options.folder.canonicalize().map_err(Error::file(&options.folder))?;
         let place = format!("panel {}", options.address);
         let listener = std::net::TcpListener::bind(options.address).map_err(Error::socket(&place))?;
         listener.set_nonblocking(true).map_err(Error::socket(&place))?;
         let address = listener.local_addr().map_err(Error::socket(&place))?;
         let token = token()?;
-        let hub = Hub::new(PanelOptions { folder, address, ..options }, live, handler)?;
+        let hub = Hub::new(PanelOptions { folder, address, ..options }, live, handlers)?;
         let (end, ended) = watch::channel(false);
         let gate = Arc::new(Gate { hub: Arc::clone(&hub), token: token.clone(), hosts: hosts(address), end: ended });
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -247,7 +247,10 @@ async fn answer(gate: &Arc<Gate>, request: Request) -> Response {
     }
     let name = if path == "/" { "index.html" } else { path.strip_prefix('/').unwrap_or_default() };
     match asset(name) {
-        Some(asset) => ([(header::CONTENT_TYPE, asset.media)], asset.bytes).into_response(),
+        Some(asset) => match asset.read() {
+            Ok(bytes) => ([(header::CONTENT_TYPE, asset.media)], bytes).into_response(),
+            Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, format!("{name}: {error}")).into_response(),
+        },
         None => StatusCode::NOT_FOUND.into_response(),
     }
 }

@@ -13,17 +13,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::WebSocket;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 use tokio::sync::{broadcast, mpsc, watch};
 
 use super::clients::{Broadcast, ClientSlot};
 use super::hub::Hub;
-use super::label_requests::is_label_request;
-use super::limits::{MOST_BYTES, MOST_CREDITS};
-use super::messages::warning;
+use super::limits::MOST_BYTES;
+use super::messages::Message;
 use super::picture::RECORDS;
+use super::refusal::{Answer, Refusal};
 use super::registers::prepare;
-use super::request::{Answer, Refusal, Request};
+use super::request::Request;
 use connection::{Closing, Connection, GOING_AWAY, Incoming, POLICY, TOO_BIG};
 use flow::{FRAME, FlowControl};
 use pending::PendingRequests;
@@ -68,7 +68,7 @@ pub(super) async fn run(socket: WebSocket, hub: Arc<Hub>, end: watch::Receiver<b
 }
 
 impl Session {
-    async fn serve(mut self, end: watch::Receiver<bool>, answers: mpsc::Receiver<Value>) {
+    async fn serve(mut self, end: watch::Receiver<bool>, answers: mpsc::Receiver<Message>) {
         if let Err(closing) = self.run(end, answers).await {
             if matches!(closing, Closing::Silently) {
                 self.begin_arrived().await;
@@ -84,21 +84,26 @@ impl Session {
             && let Ok(Ok(incoming)) = tokio::time::timeout(ARRIVED_WITHIN, self.connection.receive()).await
         {
             let Incoming::Text(text) = incoming else { continue };
-            let message: Map<String, Value> = serde_json::from_str(&text).unwrap_or_default();
-            let what = message.get("type").and_then(Value::as_str).unwrap_or_default().to_owned();
+            let keys: Map<String, Value> = serde_json::from_str(&text).unwrap_or_default();
+            let what = keys.get("type").and_then(Value::as_str).unwrap_or_default().to_owned();
+            let Ok(request) = Request::read(&what, keys) else { continue };
             while !self.pending.has_room() {
                 tokio::time::sleep(FRAME).await;
             }
-            if matches!(&*what, "open" | "live") {
+            if request.changes_labels() {
+                self.pending.begin(&self.hub, Value::Null, what, request, text.len(), self.viewport.shown());
+            } else if matches!(request, Request::Open { .. } | Request::Live {}) {
                 // The labels after it are of what it shows.
-                let _ = self.handle_own(&what, &Request(&message)).await;
-            } else if is_label_request(&what) {
-                self.pending.begin(&self.hub, Value::Null, what, message, text.len(), self.viewport.shown());
+                let _ = self.handle_own(request).await;
             }
         }
     }
 
-    async fn run(&mut self, mut end: watch::Receiver<bool>, mut answers: mpsc::Receiver<Value>) -> Result<(), Closing> {
+    async fn run(
+        &mut self,
+        mut end: watch::Receiver<bool>,
+        mut answers: mpsc::Receiver<Message>,
+    ) -> Result<(), Closing> {
         let (mut messages, mut pictures) = self.hub.clients.subscribe();
         let hub = Arc::clone(&self.hub);
         prepare(&hub).await;
@@ -110,7 +115,7 @@ impl Session {
             hub.recordings_message().await,
             hub.zeroed_message(),
         ] {
-            self.connection.send_json(&message).await?;
+            self.connection.send_message(&message).await?;
         }
         loop {
             // A picture that became due less than a frame after the last one is sent with the next frame.
@@ -136,7 +141,7 @@ impl Session {
                         return Err(Closing::With(GOING_AWAY, "the server ends"));
                     }
                 },
-                Some(answer) = answers.recv() => self.connection.send_json(&answer).await?,
+                Some(answer) = answers.recv() => self.connection.send_message(&answer).await?,
                 _ = pictures.changed() => self.viewport.mark_dirty(),
                 () = tick => {}
             }
@@ -144,7 +149,7 @@ impl Session {
             self.send_picture().await?;
             self.send_spikes().await?;
             for text in self.viewport.take_warnings() {
-                self.connection.send_json(&warning(text)).await?;
+                self.connection.send_message(&Message::warning(text)).await?;
             }
         }
     }
@@ -153,31 +158,32 @@ impl Session {
     async fn forward(&mut self, message: Broadcast) -> Result<(), Closing> {
         match message {
             Broadcast::Text(text) => self.connection.send_text(&text).await,
-            Broadcast::Counters(counters) => {
-                let mut message = Map::clone(&counters);
-                message.insert("pictures_per_s".to_owned(), json!(self.flow.pictures_per_s()));
-                self.connection.send_json(&Value::Object(message)).await
+            Broadcast::Counters(mut counters) => {
+                if let Message::Counters { pictures_per_s, .. } = &mut *counters {
+                    *pictures_per_s = self.flow.pictures_per_s();
+                }
+                self.connection.send_message(&counters).await
             }
             Broadcast::Labels(name) => {
                 let shows = match self.viewport.recording_name() {
                     Some(shown) => *shown == *name,
                     None => self.hub.recorder.file().as_ref() == Some(&name),
                 };
-                if shows { self.connection.send_json(&self.hub.labels.message(&name)).await } else { Ok(()) }
+                if shows { self.connection.send_message(&self.hub.labels.message(&name)).await } else { Ok(()) }
             }
             Broadcast::Whole(name) => {
                 let hub = Arc::clone(&self.hub);
                 if let Some(messages) = self.viewport.reopen_whole(&hub, &name).await {
                     for message in messages {
-                        self.connection.send_json(&message).await?;
+                        self.connection.send_message(&message).await?;
                     }
                 }
                 Ok(())
             }
             Broadcast::Hello => {
                 self.viewport.set_live(self.hub.live());
-                self.connection.send_json(&self.hub.hello_message()).await?;
-                self.connection.send_json(&self.hub.registers_message()).await
+                self.connection.send_message(&self.hub.hello_message()).await?;
+                self.connection.send_message(&self.hub.registers_message()).await
             }
         }
     }
@@ -188,7 +194,7 @@ impl Session {
             return Ok(());
         }
         if self.viewport.play_on().await {
-            self.connection.send_json(&self.viewport.transport_message()).await?;
+            self.connection.send_message(&self.viewport.transport_message()).await?;
         }
         if !self.viewport.take_dirty() {
             return Ok(());
@@ -207,7 +213,7 @@ impl Session {
         }
         self.spikes_sent = Instant::now();
         match self.viewport.spikes_message() {
-            Some(message) => self.connection.send_json(&message).await,
+            Some(message) => self.connection.send_message(&message).await,
             None => Ok(()),
         }
     }
@@ -215,11 +221,10 @@ impl Session {
     // ------------------------------------------------------------------------------------------ requests
 
     async fn handle(&mut self, text: &str) -> Result<(), Closing> {
-        let message: Option<Map<String, Value>> = serde_json::from_str(text).ok();
-        let Some(message) = message else {
-            return self.refuse(&Value::Null, "", "no JSON object".into()).await;
+        let Ok(keys) = serde_json::from_str::<Map<String, Value>>(text) else {
+            return self.refuse(Value::Null, String::new(), "no JSON object".into()).await;
         };
-        let id = message.get("id").cloned().unwrap_or(Value::Null);
+        let id = keys.get("id").cloned().unwrap_or(Value::Null);
         let is_id = match &id {
             Value::Null => true,
             Value::Number(number) => number.is_i64() || number.is_u64(),
@@ -228,66 +233,75 @@ impl Session {
         };
         if !is_id {
             let refusal = Refusal::of("id", "must be a whole number or a text of 64 characters");
-            return self.refuse(&Value::Null, "", refusal).await;
+            return self.refuse(Value::Null, String::new(), refusal).await;
         }
-        let Some(what) = message.get("type").and_then(Value::as_str).map(str::to_owned) else {
-            return self.refuse(&id, "", Refusal::of("type", "is missing")).await;
+        let Some(what) = keys.get("type").and_then(Value::as_str).map(str::to_owned) else {
+            return self.refuse(id, String::new(), Refusal::of("type", "is missing")).await;
         };
-        match self.handle_own(&what, &Request(&message)).await {
-            Some(Ok(messages)) => {
+        let request = match Request::read(&what, keys) {
+            Ok(request) => request,
+            Err(refusal) => return self.refuse(id, what, refusal).await,
+        };
+        match self.handle_own(request).await {
+            Ok(Ok(messages)) => {
                 for message in messages {
-                    self.connection.send_json(&message).await?;
+                    self.connection.send_message(&message).await?;
                 }
                 if id.is_null() {
                     return Ok(());
                 }
-                self.connection.send_json(&json!({ "type": "done", "id": id })).await
+                self.connection.send_message(&Message::Done { id }).await
             }
-            Some(Err(refusal)) => self.refuse(&id, &what, refusal).await,
-            None => {
+            Ok(Err(refusal)) => self.refuse(id, what, refusal).await,
+            Err(request) => {
                 let shown = self.viewport.shown();
-                if let Some(busy) = self.pending.begin(&self.hub, id, what, message, text.len(), shown) {
+                if let Some(busy) = self.pending.begin(&self.hub, id, what, request, text.len(), shown) {
                     self.count_refusal();
-                    self.connection.send_json(&busy).await?;
+                    self.connection.send_message(&busy).await?;
                 }
                 self.check_refusals()
             }
         }
     }
 
-    /// Carries out a request that concerns this client's flow or view alone; `None` for others. Returns the messages before `done`.
-    async fn handle_own(&mut self, what: &str, request: &Request<'_>) -> Option<Answer<Vec<Value>>> {
-        let done = match what {
-            "credit" => self.grant(request),
-            "watch" => self.viewport.watch(request).await,
-            "encode" => self.viewport.encode(request).await,
-            "zoom" => self.viewport.zoom(request).await,
-            "open" => return Some(self.viewport.open(&Arc::clone(&self.hub), request).await),
-            "overview" => return Some(self.viewport.overview_message().map(|message| vec![message])),
-            "seek" | "play" | "pause" | "step" | "live" => {
-                let moved = match what {
-                    "seek" => self.viewport.seek_request(request).await,
-                    "play" => self.viewport.play(request).await,
-                    "pause" => self.viewport.pause().await,
-                    "step" => self.viewport.step(request).await,
-                    _ => self.viewport.follow_request(),
-                };
-                return Some(moved.map(|()| vec![self.viewport.transport_message()]));
+    /// Carries out a request that concerns this client's flow or view alone, and returns the messages before `done`; another
+    /// request is returned.
+    async fn handle_own(&mut self, request: Request) -> Result<Answer<Vec<Message>>, Request> {
+        let view = &mut self.viewport;
+        let done = match request {
+            Request::Credit { n } => {
+                self.flow.grant(u32::try_from(n.0).unwrap_or(0));
+                Ok(())
             }
-            _ => return None,
+            Request::Watch { taxel } => view.watch(taxel).await,
+            Request::Encode { encoder } => view.encode(encoder).await,
+            Request::Zoom { column_us, end_us } => view.zoom(column_us, end_us.map(|end| end.0)).await,
+            Request::Open { name, trial } => {
+                return Ok(view.open(&self.hub, name.0, trial.map(|trial| trial.0)).await);
+            }
+            Request::Overview {} => return Ok(view.overview_message().map(|message| vec![message])),
+            Request::Seek { .. }
+            | Request::Play { .. }
+            | Request::Pause {}
+            | Request::Step { .. }
+            | Request::Live {} => {
+                let moved = match request {
+                    Request::Seek { t_us } => view.seek_request(t_us.0).await,
+                    Request::Play { speed } => view.play(speed.map(|speed| speed.0)).await,
+                    Request::Step { frames } => view.step(frames.0).await,
+                    Request::Live {} => view.follow_request(),
+                    _ => view.pause().await,
+                };
+                return Ok(moved.map(|()| vec![view.transport_message()]));
+            }
+            other => return Err(other),
         };
-        Some(done.map(|()| vec![]))
+        Ok(done.map(|()| vec![]))
     }
 
-    fn grant(&mut self, request: &Request<'_>) -> Answer {
-        let credits = request.whole("n", 1, MOST_CREDITS.into())?;
-        self.flow.grant(u32::try_from(credits).unwrap_or(0));
-        Ok(())
-    }
-
-    async fn refuse(&mut self, id: &Value, what: &str, refusal: Refusal) -> Result<(), Closing> {
+    async fn refuse(&mut self, id: Value, what: String, refusal: Refusal) -> Result<(), Closing> {
         self.count_refusal();
-        self.connection.send_json(&refusal.message(id, what)).await?;
+        self.connection.send_message(&Message::refused(id, what, refusal)).await?;
         self.check_refusals()
     }
 

@@ -7,10 +7,10 @@ import { RefusedError } from "./server.js";
 import { whole } from "./words.js";
 
 /** @typedef {import("./registers.js").Field} Field */
-/** @typedef {import("./protocol.js").RegistersMessage} RegistersMessage */
-/** @typedef {import("./protocol.js").Presets} PresetsMessage */
-/** @typedef {import("./protocol.js").Hello} Hello */
-/** @typedef {import("./protocol.js").Counters} Counters */
+/** @typedef {import("./messages.js").Registers} RegistersMessage */
+/** @typedef {import("./messages.js").Presets} PresetsMessage */
+/** @typedef {import("./messages.js").Hello} Hello */
+/** @typedef {import("./messages.js").Counters} Counters */
 /** @typedef {import("./server.js").Server} Server */
 
 /** Registers of the scan's timing, which are always shown, in the order of the scan. */
@@ -236,7 +236,7 @@ export class Board {
     this.connection = new Connection(server, settings, failed);
   }
 
-  /** @param {{ type: string } & Record<string, unknown>} message */
+  /** @param {import("./messages.js").Request} message */
   ask(message) {
     return this.server.request(message).catch(this.failed);
   }
@@ -354,7 +354,7 @@ export class Board {
     if (!this.check() || !this.writable) return;
     const waiting = [...this.controls.values()].filter(({ wanted }) => wanted !== null);
     if (!waiting.length) return;
-    const values = Object.fromEntries(waiting.map(({ field, wanted }) => [field.name, field.unit === "flag" ? Boolean(wanted) : wanted]));
+    const values = Object.fromEntries(waiting.map(({ field, wanted }) => [field.name, field.unit === "flag" ? Boolean(wanted) : Number(wanted)]));
     this.server.request({ type: "set", values }).catch((error) => {
       const field = error instanceof RefusedError ? error.field : null;
       (this.controls.get(field ?? "") ?? control).refuse(error.message);

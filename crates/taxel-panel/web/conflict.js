@@ -4,8 +4,8 @@ import { make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
 import { counted, listedTime, seconds, timeUnit } from "./words.js";
 
-/** @typedef {import("./protocol.js").ConflictRow} ConflictRow */
-/** @typedef {import("./protocol.js").Labels} LabelsMessage */
+/** @typedef {import("./messages.js").LabelRow} ConflictRow */
+/** @typedef {import("./messages.js").Labels} LabelsMessage */
 /** @typedef {import("./server.js").Server} Server */
 
 /** @param {number} t_us @returns {string} */
@@ -34,9 +34,9 @@ export class LabelConflict {
     this.buttons = [part("conflict-restore", HTMLButtonElement), part("conflict-accept", HTMLButtonElement)];
     this.buttons.forEach((button, i) => {
       button.onclick = () => {
+        if (this.id === null) return;
         for (const one of this.buttons) one.disabled = true;
-        const request = { type: "settle", conflict_id: this.id, keep: i ? "file" : "acknowledged" };
-        server.request(request).catch(failed).then(() => this.buttons.forEach((one) => (one.disabled = false)));
+        server.request({ type: "settle", conflict_id: this.id, keep: i ? "file" : "acknowledged" }).catch(failed).then(() => this.buttons.forEach((one) => (one.disabled = false)));
       };
     });
   }

@@ -2,9 +2,9 @@
 
 import { make, part, write } from "./dom.js";
 
-/** @typedef {import("./protocol.js").Hello} Hello */
-/** @typedef {import("./protocol.js").Places} Places */
-/** @typedef {import("./protocol.js").Port} Port */
+/** @typedef {import("./messages.js").Hello} Hello */
+/** @typedef {import("./messages.js").Places} Places */
+/** @typedef {import("./messages.js").Port} Port */
 /** @typedef {import("./server.js").Server} Server */
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {{ label: string, places: { place: string, text: string }[] }} Group */

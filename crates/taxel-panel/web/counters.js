@@ -3,8 +3,8 @@
 import { entitle, make, part, write } from "./dom.js";
 import { short, whole } from "./words.js";
 
-/** @typedef {import("./protocol.js").Counters} CountersMessage */
-/** @typedef {import("./protocol.js").Pace} Pace */
+/** @typedef {import("./messages.js").Counters} CountersMessage */
+/** @typedef {import("./messages.js").Pace} Pace */
 
 /** @type {Record<string, string>} where data can be lost */
 const LOSSES = {

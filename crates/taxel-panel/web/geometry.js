@@ -3,8 +3,8 @@
 import { fitted } from "./dom.js";
 import { counted, rounded } from "./words.js";
 
-/** @typedef {import("./protocol.js").ArrayInfo} ArrayInfo */
-/** @typedef {import("./protocol.js").PictureSource} PictureSource */
+/** @typedef {import("./messages.js").ArrayInfo} ArrayInfo */
+/** @typedef {import("./messages.js").PictureSource} PictureSource */
 /** @typedef {[number, number]} Taxel column and row */
 /** @typedef {{ x: boolean, y: boolean }} Flips */
 /** @typedef {{ words: Uint32Array, levels: Float32Array, ground: string, edge: string }} Colours by taxel a pixel, and its height from 0 to 1;
@@ -160,7 +160,7 @@ class Placed extends Sensor {
   kind = /** @type {const} */ ("places");
   axes = /** @type {[string, string]} */ (["x", "y"]);
 
-  /** @param {ArrayInfo} array @param {PictureSource[]} sources @param {import("./protocol.js").TaxelPlaces} places */
+  /** @param {ArrayInfo} array @param {PictureSource[]} sources @param {import("./messages.js").TaxelPlaces} places */
   constructor(array, sources, places) {
     super(array, sources);
     this.places = places;

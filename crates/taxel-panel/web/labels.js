@@ -5,8 +5,8 @@ import { entitle, make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
 import { counted, listedTime, readTime, seconds, timeUnit } from "./words.js";
 
-/** @typedef {import("./protocol.js").Label} Label */
-/** @typedef {import("./protocol.js").Labels} LabelsMessage */
+/** @typedef {import("./messages.js").Label} Label */
+/** @typedef {import("./messages.js").Labels} LabelsMessage */
 /** @typedef {import("./server.js").Server} Server */
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
@@ -157,7 +157,7 @@ export class Labels {
     if (t_us !== null) this.add({ label, t_us });
   }
 
-  /** Asks for a change of labels; the tab says so until there is an answer. @param {{ type: string } & Record<string, unknown>} message */
+  /** Asks for a change of labels; the tab says so until there is an answer. @param {import("./messages.js").Request} message */
   save(message) {
     const answer = this.server.request(message).finally(() => this.showPlace());
     this.showPlace();
@@ -264,7 +264,7 @@ export class Labels {
     return row;
   }
 
-  /** Asks for what was typed. @param {HTMLInputElement} input @param {{ type: string, label_id: number } & Record<string, unknown>} message @param {() => string} held */
+  /** Asks for what was typed. @param {HTMLInputElement} input @param {import("./messages.js").MoveRequest | import("./messages.js").RenameRequest} message @param {() => string} held */
   async change(input, message, held) {
     try {
       await this.save(message);

@@ -29,11 +29,11 @@ import { View } from "./view.js";
 import { TimeWindow } from "./window.js";
 import { beginning, begun, counted, numbering, rounded, short } from "./words.js";
 
-/** @typedef {import("./protocol.js").Message} Message */
-/** @typedef {import("./protocol.js").Hello} Hello */
-/** @typedef {import("./protocol.js").Counters} Counters */
-/** @typedef {import("./protocol.js").Opened} Opened */
-/** @typedef {import("./protocol.js").ArrayInfo} ArrayInfo */
+/** @typedef {import("./messages.js").Message} Message */
+/** @typedef {import("./messages.js").Hello} Hello */
+/** @typedef {import("./messages.js").Counters} Counters */
+/** @typedef {import("./messages.js").Opened} Opened */
+/** @typedef {import("./messages.js").ArrayInfo} ArrayInfo */
 
 /** How often text is written, and lanes are drawn, ms. */
 const TEXT_MS = 125;
@@ -81,9 +81,9 @@ let hello = null;
 let opened = null;
 /** @type {Counters | null} */
 let counters = null;
-/** @type {import("./protocol.js").RegistersMessage | null} */
+/** @type {import("./messages.js").Registers | null} */
 let registers = null;
-/** Taxels of the board that the user has zeroed. @type {import("./protocol.js").Zeroing[]} */
+/** Taxels of the board that the user has zeroed. @type {import("./messages.js").Zeroing[]} */
 let zeroed = [];
 /** The recording that is being opened. @type {string | null} */
 let opening = null;
@@ -91,7 +91,7 @@ let opening = null;
 let refused = "";
 /** Whether the server is connected, and why not. */
 let connection = { connected: false, why: "" };
-/** @type {import("./protocol.js").Recordings | null} */
+/** @type {import("./messages.js").Recordings | null} */
 let recordings = null;
 /** What is to be drawn again: the maps, the lanes, the marks over the lanes. */
 let mapsDue = false;
@@ -202,7 +202,7 @@ function resize(array) {
 
 /**
  * Names the sources that stand one above the other; else the channels, or only the first and the last without names or of many.
- * @param {{ array: import("./protocol.js").ArrayInfo, there: number[], sources: import("./protocol.js").PictureSource[] }} sensor
+ * @param {{ array: import("./messages.js").ArrayInfo, there: number[], sources: import("./messages.js").PictureSource[] }} sensor
  */
 function showChannels({ array, there, sources }) {
   part("channels-block", HTMLElement).style.setProperty("--count", String(there.length));
@@ -313,7 +313,7 @@ function showZeroed() {
   maps.mark();
 }
 
-/** @param {import("./protocol.js").Spikes} spikes @returns {string} */
+/** @param {import("./messages.js").Spikes} spikes @returns {string} */
 function spikesInfo({ encoder, latency_ms, left_out }) {
   return `${encoder.replaceAll("_", " ")}, latency ${latency_ms.toFixed(1)} ms${left_out ? `, ${counted(left_out, "spike")} not shown` : ""}`;
 }
@@ -429,7 +429,7 @@ function open(message) {
   writeState();
 }
 
-/** @param {import("./protocol.js").Transport} transport */
+/** @param {import("./messages.js").Transport} transport */
 function move(transport) {
   const changed = transport.source !== player.transport.source;
   player.take(transport);

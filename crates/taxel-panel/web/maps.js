@@ -8,9 +8,9 @@ import { counted, rounded } from "./words.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
 /** @typedef {import("./geometry.js").Geometry} Geometry */
-/** @typedef {import("./protocol.js").Health} Health */
-/** @typedef {import("./protocol.js").PictureSource} PictureSource */
-/** @typedef {import("./protocol.js").Zeroing} Zeroing */
+/** @typedef {import("./messages.js").Health} Health */
+/** @typedef {import("./messages.js").PictureSource} PictureSource */
+/** @typedef {import("./messages.js").Zeroing} Zeroing */
 /** @typedef {import("./settings.js").Settings} Settings */
 
 /** How long the largest value holds the scale, ms. */
@@ -143,7 +143,7 @@ export class Maps {
     this.point(null);
   }
 
-  /** @param {import("./protocol.js").ArrayInfo} array @param {PictureSource[]} sources that stand side by side in it */
+  /** @param {import("./messages.js").ArrayInfo} array @param {PictureSource[]} sources that stand side by side in it */
   size(array, sources) {
     const known = JSON.stringify([array, sources]);
     if (known === this.known) return;

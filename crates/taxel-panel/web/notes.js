@@ -6,7 +6,7 @@ import { seconds } from "./words.js";
 
 /** @typedef {import("./labels.js").Labels} Labels */
 /** @typedef {import("./player.js").Player} Player */
-/** @typedef {import("./protocol.js").RecordedNote} RecordedNote */
+/** @typedef {import("./messages.js").RecordedNote} RecordedNote */
 
 /** How many can become labels in one request. */
 const MOST_MARKS = 5000;

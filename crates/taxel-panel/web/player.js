@@ -3,7 +3,7 @@
 import { part, write } from "./dom.js";
 import { seconds, short } from "./words.js";
 
-/** @typedef {import("./protocol.js").Transport} Transport */
+/** @typedef {import("./messages.js").Transport} Transport */
 /** @typedef {import("./server.js").Server} Server */
 
 /** Transport's buttons and the requests behind them. One seek is under way at a time; of later ones the last counts. */
@@ -76,7 +76,7 @@ export class Player {
     write(part("clock-more", HTMLElement), text);
   }
 
-  /** @param {{ type: string } & Record<string, unknown>} message */
+  /** @param {import("./messages.js").Request} message */
   ask(message) {
     return this.server.request(message).catch(this.failed);
   }

@@ -4,8 +4,8 @@ import { make, part, write } from "./dom.js";
 import { counted, size } from "./words.js";
 import { Tones } from "./tones.js";
 
-/** @typedef {import("./protocol.js").Recorder} RecorderMessage */
-/** @typedef {import("./protocol.js").Recordings} Recordings */
+/** @typedef {import("./messages.js").Recorder} RecorderMessage */
+/** @typedef {import("./messages.js").Recordings} Recordings */
 /** @typedef {import("./server.js").Server} Server */
 
 /** @param {number | null} labels @returns {string[]} */
@@ -74,7 +74,8 @@ export class Recorder {
       if (Number.isNaN(this.number(id))) return this.refuse(`${what}: ${part(id, HTMLInputElement).value.trim()} is no number`);
     }
     const label = part("record-label", HTMLInputElement).value.trim();
-    const format = part("record-format", HTMLSelectElement).value;
+    const format = /** @type {"mcap" | "lsa"} */ (part("record-format", HTMLSelectElement).value);
+    /** @type {import("./messages.js").RecordRequest} */
     const message = {
       type: "record",
       name: part("record-name", HTMLInputElement).value.trim(),

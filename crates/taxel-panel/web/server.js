@@ -3,8 +3,9 @@
 import { VERSION } from "./protocol.js";
 import { size } from "./words.js";
 
-/** @typedef {import("./protocol.js").Message} Message */
-/** @typedef {import("./protocol.js").Refused} Refused */
+/** @typedef {import("./messages.js").Message} Message */
+/** @typedef {import("./messages.js").Refused} Refused */
+/** @typedef {import("./messages.js").Request} Request */
 
 /** Time until the next attempt to connect, ms. */
 const RECONNECT_MS = 2000;
@@ -78,7 +79,7 @@ export class Server {
   /** @param {Message} message */
   receive(message) {
     if (message.type === "hello") this.mostBytes = message.most_message_bytes;
-    const request = (message.type === "done" || message.type === "refused") && message.id !== undefined ? this.pending.get(message.id) : undefined;
+    const request = (message.type === "done" || message.type === "refused") && typeof message.id === "number" ? this.pending.get(message.id) : undefined;
     if (!request) return this.onMessage(message);
     const { id } = /** @type {{ id: number }} */ (message);
     this.pending.delete(id);
@@ -88,7 +89,7 @@ export class Server {
 
   /**
    * Sends a message that needs no answer.
-   * @param {{ type: string } & Record<string, unknown>} message
+   * @param {Request} message
    */
   send(message) {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
@@ -96,7 +97,7 @@ export class Server {
 
   /**
    * Makes a request: fulfilled when it is done, rejected with the reason when it is refused.
-   * @param {{ type: string } & Record<string, unknown>} message
+   * @param {Request} message
    * @returns {Promise<void>}
    */
   request(message) {

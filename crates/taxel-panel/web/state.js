@@ -3,11 +3,11 @@
 import { entitle, part, write } from "./dom.js";
 import { counted, seconds, short } from "./words.js";
 
-/** @typedef {import("./protocol.js").Counters} Counters */
-/** @typedef {import("./protocol.js").Hello} Hello */
-/** @typedef {import("./protocol.js").Opened} Opened */
-/** @typedef {import("./protocol.js").Recorder} Recorder */
-/** @typedef {import("./protocol.js").Transport} Transport */
+/** @typedef {import("./messages.js").Counters} Counters */
+/** @typedef {import("./messages.js").Hello} Hello */
+/** @typedef {import("./messages.js").Opened} Opened */
+/** @typedef {import("./messages.js").Recorder} Recorder */
+/** @typedef {import("./messages.js").Transport} Transport */
 
 /** How long a board may take to send its first datagram, s. */
 const FIRST_WITHIN_S = 1;

@@ -3,7 +3,7 @@
 import { fitted, ground, part, themed } from "./dom.js";
 import { seconds, writtenTime } from "./words.js";
 
-/** @typedef {import("./protocol.js").Overview} Overview */
+/** @typedef {import("./messages.js").Overview} Overview */
 /** @typedef {import("./player.js").Player} Player */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 /** @typedef {{ labels: { t_us: number }[], detections: { t_us: number }[], notes: { t_us: number }[], cut: [number | null, number | null] }} Marks */

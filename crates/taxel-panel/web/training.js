@@ -3,8 +3,8 @@
 import { make, part, write } from "./dom.js";
 import { failed, notify } from "./notice.js";
 
-/** @typedef {import("./protocol.js").Recordings} Recordings */
-/** @typedef {import("./protocol.js").Trained} Trained */
+/** @typedef {import("./messages.js").Recordings} Recordings */
+/** @typedef {import("./messages.js").Trained} Trained */
 /** @typedef {import("./server.js").Server} Server */
 
 /** How often a training that runs is asked how far it is, ms. */
@@ -81,9 +81,10 @@ export class Training {
     const { t_us } = this.player;
     this.readout.value = readout;
     if (readout) notify(`${readout} reads ${source ?? "the board: leave it at rest for the tare"}`);
-    const without = source === null ? { type: "live" } : { type: "open", name: source };
+    /** @type {import("./messages.js").Request} */
+    const request = readout ? { type: "read_out", readout } : source === null ? { type: "live" } : { type: "open", name: source };
     try {
-      await this.server.request(readout ? { type: "read_out", readout } : without);
+      await this.server.request(request);
       if (source !== this.source) return;
       this.reads = readout;
       // What is opened again begins at its beginning.

@@ -4,8 +4,8 @@ import { MAPS } from "./colours.js";
 import { make, part, write } from "./dom.js";
 import { counted, seconds } from "./words.js";
 
-/** @typedef {import("./protocol.js").Health} Health */
-/** @typedef {import("./protocol.js").Hello} Hello */
+/** @typedef {import("./messages.js").Health} Health */
+/** @typedef {import("./messages.js").Hello} Hello */
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {import("./settings.js").Values} Values */
 /** @typedef {import("./server.js").Server} Server */

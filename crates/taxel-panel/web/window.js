@@ -146,9 +146,8 @@ export class TimeWindow {
         end_us = Math.round(to + ((SPAN - 1) * column_us - timeline.span_us) / 2);
       } else if (this.asked?.column_us === column_us && this.asked.end_us === null) break;
       this.asked = { column_us, end_us };
-      const message = { type: "zoom", column_us, ...(end_us === null ? {} : { end_us }) };
       try {
-        await this.server.request(message);
+        await this.server.request({ type: "zoom", column_us, end_us });
       } catch (error) {
         failed(error);
         this.asked = null;

@@ -1,4 +1,4 @@
-//! What only tests call: work that panics, waits for Ctrl-C or returns an error of each kind, to see what [`enter`] makes of it.
+//! What only tests and tools call: the schemas of the panel's messages, and work that panics, waits for Ctrl-C or returns an error of each kind, to see what [`enter`] makes of it.
 //! Built with the feature `test-hooks` alone.
 
 use std::time::Duration;
@@ -34,6 +34,13 @@ fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
     enter(py, |_| Err::<(), _>(error))
 }
 
+/// The JSON schemas of the panel's requests and messages.
+#[pyfunction]
+fn message_schemas() -> String {
+    taxel_panel::message_schemas()
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(message_schemas, module)?)?;
     module.add_function(wrap_pyfunction!(test_hook, module)?)
 }

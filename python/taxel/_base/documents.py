@@ -156,7 +156,7 @@ def memory_of_json(text: str) -> int:
     return characters + _PLACE * values + _NUMBER * numbers + parts
 
 
-def of_json(place: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED, with_nan: bool = False) -> Any:
+def of_json(place: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED) -> Any:
     """Return the value of a text in JSON.
 
     Parameters
@@ -167,8 +167,6 @@ def of_json(place: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED,
     most : int, characters
     room : int, bytes
         How much the text and its values may take in memory, where the caller of an opening gave no limit.
-    with_nan : bool
-        Whether NaN and Infinity, which are not JSON, are read, as earlier versions of taxel wrote them.
 
     Raises
     ------
@@ -189,7 +187,7 @@ def of_json(place: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED,
         raise FormatError(f"{place}: not JSON: {constant} is no number there")
 
     try:
-        value = json.loads(text, object_pairs_hook=once, parse_constant=None if with_nan else refuse)
+        value = json.loads(text, object_pairs_hook=once, parse_constant=refuse)
     except RecursionError:
         raise _too_deep(place) from None
     except ValueError as error:

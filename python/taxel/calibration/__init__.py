@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel import _core
 from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
-from taxel._base.documents import BY_TAXEL, object_of_json, read_text
-from taxel._base.files import beside, named, write_whole
+from taxel._base.documents import object_of_json
+from taxel._base.files import beside, named
 from taxel._base.messages import counted, escaped, first_line
+from taxel._base.saved import Saved
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration._curves import Curve, Law, Power, Table, Values, above_0, curve_of
@@ -30,11 +30,14 @@ from taxel.tare import Tare
 __all__ = ["Calibration", "Load"]
 
 
-class Calibration:
+class Calibration(Saved):
     """Turn readings into N on each taxel, or kPa at each: of one array, on one day.
 
     Made by `Calibration.law`, `Calibration.table`, `Calibration.fit`, `Calibration.load` or `Calibration.from_json`.
     A value is ``gain * curve(reading, rest)``, 0 where a taxel does not read more than `floor` above its rest.
+
+    Beside ``walk.mcap`` it is found by itself where it is saved as ``walk.calibration.json``, or, for all recordings of
+    the folder, as ``calibration.json``.
 
     Attributes
     ----------
@@ -67,6 +70,8 @@ class Calibration:
     >>> calibration.apply(Frames([[[40.0, 0.0]]], [0], array=array)).values
     array([[[4., 0.]]], dtype=float32)
     """
+
+    _WHAT = "calibration"
 
     array: Array
     unit: str
@@ -434,47 +439,6 @@ class Calibration:
         except (ValueError, TypeError, AttributeError, IndexError, OverflowError, ProblemError) as error:
             raise FormatError(f"{entry}: {first_line(error)}; must be as Calibration.save writes it") from None
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the calibration to a JSON file, whole or not at all.
-
-        Beside ``walk.mcap`` it is found by itself where it is called ``walk.calibration.json``, or, for all recordings
-        of the folder, ``calibration.json``.
-
-        Parameters
-        ----------
-        path : path
-        overwrite : bool
-            Whether an existing file may be replaced.
-
-        Returns
-        -------
-        Path
-
-        Raises
-        ------
-        FileExistsError : the file is there already and `overwrite` is false
-        """
-        return write_whole(path, lambda file: file.write(self.to_json().encode()), overwrite=overwrite)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Calibration:
-        """Read a calibration from the file that `save` wrote.
-
-        Parameters
-        ----------
-        path : path
-
-        Raises
-        ------
-        FormatError : no calibration (names the file)
-        """
-        place = Path(checked_path("path", path))
-        text = read_text(place, BY_TAXEL)
-        try:
-            return cls.from_json(text)
-        except _core.Error as error:
-            raise FormatError(f"{place}: {error}") from None
-
     @staticmethod
     def beside(recording: str | os.PathLike[str]) -> Path | None:
         """Return the file of the calibration that lies beside a recording; None where there is none.
@@ -507,13 +471,6 @@ class Calibration:
         parts += [f"fit to {counted(count, 'load')}"] * bool(count)
         parts += [] if self.residual is None else [f"residual {100 * self.residual:.1f} %"]
         return ", ".join([f"{self.of} to {self.unit}", *parts, self.date])
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Calibration):
-            return NotImplemented
-        return self.to_json() == other.to_json()
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         size = f"{self.array.name}: {self.array.rows} x {self.array.columns} taxels"

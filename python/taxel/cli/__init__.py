@@ -16,12 +16,21 @@ import typer
 
 from taxel._base.child_process import make_safe
 from taxel._core import DeviceError, Error
-from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App, app
+from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App
+from taxel.cli._commands import Commands
 from taxel.cli._recordings import SET_HELP, assignments
 from taxel.cli._say import say
 from taxel.cli._stopping import leave, stop_on_signals
 
 __all__ = ["SET_HELP", "App", "app", "assignments", "main", "program", "say"]
+
+app = App(
+    name="taxel",
+    cls=Commands,
+    help="Touch as events: from the bytes of a tactile array to detections with exact times.",
+    no_args_is_help=True,
+    epilog="Begin with: taxel demo. Pages by what you have are in docs/ of the repository, from docs/start.md on.",
+)
 
 #: typer's error for a command line that cannot be parsed; the class belongs to its own copy of click.
 _UsageError: Any = typer.BadParameter.__base__

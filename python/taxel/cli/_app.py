@@ -1,4 +1,4 @@
-"""The app that all commands register themselves with."""
+"""What every command is made of: its class, and options that several share."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from typer.core import TyperCommand
 
 from taxel._base.options import with_options
 from taxel._core import Error, ProblemError
-from taxel.cli._added import WithAdded
 
-__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app", "with_out", "with_typed"]
+__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "with_out", "with_typed"]
 
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
 _Typed = TypeVar("_Typed")
@@ -111,15 +110,6 @@ class App(typer.Typer):
     def command(self, *names: Any, **options: Any) -> Callable[[Any], Any]:
         """Register a command."""
         return super().command(*names, **{"cls": _Command, **options})
-
-
-app = App(
-    name="taxel",
-    cls=WithAdded,
-    help="Touch as events: from the bytes of a tactile array to detections with exact times.",
-    no_args_is_help=True,
-    epilog="Begin with: taxel demo. Pages by what you have are in docs/ of the repository, from docs/start.md on.",
-)
 
 
 def with_typed(options: type[_Typed]) -> Callable[[Callable[[_Typed], None]], Callable[..., None]]:

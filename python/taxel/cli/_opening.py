@@ -76,17 +76,17 @@ class FileOptions:
         ),
     ] = None
 
-    def open(self, path: Path) -> Recording | list[Recording]:
+    def open(self, path: Path) -> list[Recording]:
         """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
 
         Raises
         ------
         ProblemError : an ``--array`` that differs from the sensor that a file holds; a ``--rate-hz`` of one with times
         """
-        from taxel.recording import open_any  # noqa: PLC0415  the command line starts quickly
+        from taxel.recording import open_all  # noqa: PLC0415  the command line starts quickly
 
         arrays = [geometry(size, of_wire=False) for size in self.array or ()]
-        opened = open_any(
+        opened = open_all(
             path,
             array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
             layout=self.layout or self._instead_of_layout(path),
@@ -96,9 +96,7 @@ class FileOptions:
             ros=self.ros,
             limit=self.limit,
         )
-        if isinstance(opened, list):
-            return [self._timed(self._on_array(one)) for one in opened]
-        return self._timed(self._on_array(opened))
+        return [self._timed(self._on_array(one)) for one in opened]
 
     def words(self) -> list[str]:
         """Return the options as words of a command line."""
@@ -131,11 +129,10 @@ class FileOptions:
         if not self.array or recording.kind == "ros":
             return recording
         from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
-        from taxel.recording.layout import on_array  # noqa: PLC0415
 
         own, given = recording.array, geometry(self.array[0], of_wire=False)
         if _is_row_of(recording, given):
-            return type(recording)(on_array(recording._contents, given))
+            return _laid_on(recording, given)
         differs = given.pitch_mm is not None and (own.pitch_mm, own.places) != (given.pitch_mm, None)
         if own.shape != given.shape or differs:
             sizes = ", ".join(self.array)
@@ -145,14 +142,13 @@ class FileOptions:
             return recording
         # A size without a pitch says nothing of it, and events without one are of the board's wire.
         wire = geometry(self.array[0])
-        return type(recording)(on_array(recording._contents, Array(*own.shape, wire.pitch_mm, own.exists, wire.name)))
+        return _laid_on(recording, Array(*own.shape, wire.pitch_mm, own.exists, wire.name))
 
     def joined(self, path: Path) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
         from taxel.recording.opening import joined  # noqa: PLC0415  the command line starts quickly
 
-        opened = self.open(path)
-        return joined(opened if isinstance(opened, list) else [opened])
+        return joined(self.open(path))
 
     def all(self, paths: Sequence[Path]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
@@ -161,9 +157,7 @@ class FileOptions:
         """
         from taxel.recording.opening import sensors  # noqa: PLC0415  the command line starts quickly
 
-        opened = (self.open(path) for path in paths)
-        every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
-        return [one for each in every for one in sensors(each)]
+        return [one for path in paths for each in self.open(path) for one in sensors(each)]
 
     def _timed(self, recording: Recording) -> Recording:
         return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
@@ -180,6 +174,15 @@ class FileOptions:
             some = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
             raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")
         return every[0]
+
+
+def _laid_on(recording: Recording, array: Array) -> Recording:
+    """Return a recording on another description of its sensor."""
+    from taxel.recording.contents import Contents  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.layout import on_array  # noqa: PLC0415
+
+    own = recording._contents
+    return type(recording)(Contents(on_array(own.one, array), own.sources))
 
 
 def _is_row_of(recording: Recording, given: Array) -> bool:

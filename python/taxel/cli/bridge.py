@@ -16,7 +16,7 @@ from rich.text import Text
 
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.cli._app import SecondsOption, app
+from taxel.cli._app import App, SecondsOption
 from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
@@ -37,7 +37,9 @@ from taxel.live import Bridge, Live
 from taxel.live.bridge import PLACE
 from taxel.live.options import LiveOptions
 
-__all__ = ["bridge"]
+__all__ = ["app", "bridge"]
+
+app = App()
 
 
 @app.command()

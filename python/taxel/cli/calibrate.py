@@ -12,7 +12,7 @@ import typer
 
 from taxel._base.files import beside, named
 from taxel._core import FormatError, ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import TARE_HELP, assignments, progress, tare_of
 from taxel.cli._say import say
@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from taxel.frames import Frames
     from taxel.recording import Recording
 
-__all__ = ["calibrate"]
+__all__ = ["app", "calibrate"]
+
+app = App()
 
 
 @app.command()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from taxel._core import ProblemError
-from taxel.cli._app import app, with_out
+from taxel.cli._app import App, with_out
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import of_source, progress
@@ -19,7 +19,9 @@ from taxel.cli._say import say
 if TYPE_CHECKING:
     from taxel.recording import Recording
 
-__all__ = ["convert"]
+__all__ = ["app", "convert"]
+
+app = App()
 
 
 @app.command()

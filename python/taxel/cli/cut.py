@@ -12,7 +12,7 @@ import typer
 from taxel import _core
 from taxel._base.messages import plain
 from taxel._core import ProblemError
-from taxel.cli._app import app, with_out
+from taxel.cli._app import App, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP, of_source, span_us
 from taxel.cli._say import say
@@ -20,7 +20,9 @@ from taxel.cli._say import say
 if TYPE_CHECKING:
     from taxel.recording import Recording
 
-__all__ = ["cut"]
+__all__ = ["app", "cut"]
+
+app = App()
 
 
 @app.command()

@@ -9,12 +9,14 @@ from typing import Annotated
 import typer
 
 from taxel._base.files import try_whole
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED
 
-__all__ = ["demo"]
+__all__ = ["app", "demo"]
+
+app = App()
 
 
 @app.command()
@@ -39,13 +41,6 @@ def demo(
     train_to: Annotated[
         Path | None, typer.Option("--train", help="Train the demo's readout, write it to this file, and end.")
     ] = None,
-    drops_to: Annotated[
-        Path | None,
-        typer.Option(
-            "--drops",
-            help="Simulate the drops on which ball, height and slant are classified, write them to this file, and end.",
-        ),
-    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON, and nothing else.")] = False,
 ) -> None:
     """Play scenes on the emulated board, find contact and lift-off while they run, and leave a report.
@@ -58,19 +53,10 @@ def demo(
     Example: taxel demo --scenes 100 --no-clock --folder demo
     """
     console = Console(quiet=as_json)
-    for place in (train_to, drops_to):
-        if place is not None:
-            try_whole(place)
     if train_to is not None:
+        try_whole(train_to)
         _train(console, train_to)
         say(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
-        return
-    if drops_to is not None:
-        from taxel.demo.naming import write_drops  # noqa: PLC0415
-
-        with console.status("dropping balls") as status:
-            write_drops(drops_to, progress=status.update)
-        say(json.dumps({"drops": str(drops_to)}) if as_json else f"drops: {drops_to.resolve()}")
         return
     from taxel.demo.showing import show  # noqa: PLC0415  pictures load slowly
 

@@ -16,7 +16,7 @@ import typer
 from taxel._base.messages import counted, warn
 from taxel._base.times import begun
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import (
     READ_HELP,
@@ -36,7 +36,9 @@ if TYPE_CHECKING:
     from taxel.detect import Outcome, PlainRule, Readout, Score
     from taxel.recording import Recording, Verdict
 
-__all__ = ["detect"]
+__all__ = ["app", "detect"]
+
+app = App()
 
 #: No event.
 _NONE = np.empty(0, np.int64)

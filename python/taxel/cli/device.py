@@ -14,31 +14,28 @@ from rich.table import Table
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import ProblemError
-from taxel.cli._app import App, SecondsOption, app
+from taxel.cli._app import App, SecondsOption
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.device import Device, ports
 from taxel.wire import PRESETS, Registers, described
 from taxel.wire.registers import QUOTED_PRESETS
 
-__all__ = ["apply", "listed", "record", "set_registers", "show", "watch"]
+__all__ = ["app", "apply", "listed", "record", "set_registers", "show", "watch"]
 
-_device = App(
-    no_args_is_help=True, help="Find a board on its serial line, set it by name, and read back its registers."
-)
-app.add_typer(_device, name="device")
+app = App(no_args_is_help=True, help="Find a board on its serial line, set it by name, and read back its registers.")
 
 PlaceArgument = Annotated[str, typer.Argument(help="A serial device (/dev/ttyUSB0), or host:port.")]
 BaudOption = Annotated[int, typer.Option(help="Baud rate of the serial line.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
-@_device.callback()
+@app.callback()
 def _root() -> None:
     """Find a board on its serial line, set it by name, and read back its registers."""
 
 
-@_device.command("ports")
+@app.command("ports")
 def listed(as_json: JsonOption = False) -> None:
     """List the serial ports of this machine.
 
@@ -55,7 +52,7 @@ def listed(as_json: JsonOption = False) -> None:
         say("no serial port: is the cable plugged in, and are you allowed to open it?", err=True)
 
 
-@_device.command()
+@app.command()
 def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption = False) -> None:
     """Show a board's identity, and every register with its unit.
 
@@ -65,7 +62,7 @@ def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption =
         _print(device, device.registers, as_json)
 
 
-@_device.command("set", short_help="Set registers by name, and print what changed.")
+@app.command("set", short_help="Set registers by name, and print what changed.")
 def set_registers(
     place: PlaceArgument,
     fields: Annotated[
@@ -95,7 +92,7 @@ def set_registers(
             say(f"warning: {warning}", err=True)
 
 
-@_device.command(short_help="Set a board to a preset, and read it back.")
+@app.command(short_help="Set a board to a preset, and read it back.")
 def apply(
     place: PlaceArgument,
     preset: Annotated[str, typer.Argument(help=f"One of {QUOTED_PRESETS}.")],
@@ -112,7 +109,7 @@ def apply(
         _print(device, device.apply(preset), as_json)
 
 
-@_device.command(short_help="Make a board mark the start or stop of a recording.")
+@app.command(short_help="Make a board mark the start or stop of a recording.")
 def record(
     place: PlaceArgument,
     what: Annotated[str, typer.Argument(help="The mark: start or stop.")],
@@ -129,7 +126,7 @@ def record(
         _print(device, device.record(what == "start"), as_json)
 
 
-@_device.command(short_help="Print the faults that a board reports, as they come.")
+@app.command(short_help="Print the faults that a board reports, as they come.")
 def watch(
     place: PlaceArgument,
     seconds: SecondsOption = None,

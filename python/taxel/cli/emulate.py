@@ -21,13 +21,13 @@ from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
-from taxel.cli._app import app, with_typed
+from taxel.cli._app import App, with_typed
 from taxel.cli._recordings import progress
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.live.sending import PORT
-from taxel.recording.opening import open_any
+from taxel.recording.opening import open_one
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
 from taxel.simulate.board import fitting
@@ -35,7 +35,9 @@ from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.simulate.options import EmulateOptions
 from taxel.spikes import to_ms
 
-__all__ = ["emulate"]
+__all__ = ["app", "emulate"]
+
+app = App()
 
 
 def _option(name: str, *flags: str, of: type = EmulateOptions, metavar: str | None = None) -> Any:
@@ -202,7 +204,7 @@ def _played(typed: _Typed) -> _Played:
     flaws, faults = _flaws(typed.flaw or [], seed), _faults(typed.fault or [], seed)
     circuit = _circuit(typed.circuit or [], seed)
     if typed.replay is not None:
-        touch: Any = Replay(open_any(typed.replay, limit=typed.limit), 1.0 if typed.speed is None else typed.speed)
+        touch: Any = Replay(open_one(typed.replay, limit=typed.limit), 1.0 if typed.speed is None else typed.speed)
         text = f"replay of {typed.replay}"
     elif typed.pipe:
         touch, text = _piped(3 if typed.noise_floor is None else typed.noise_floor)

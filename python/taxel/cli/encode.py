@@ -12,12 +12,14 @@ import typer
 from taxel._base.files import try_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError, encoder_names
-from taxel.cli._app import app, with_out
+from taxel.cli._app import App, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, progress, tare_or_by_unit
 from taxel.cli._say import say
 
-__all__ = ["encode"]
+__all__ = ["app", "encode"]
+
+app = App()
 
 
 @app.command()

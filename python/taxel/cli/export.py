@@ -9,21 +9,20 @@ from typing import Annotated
 import typer
 
 from taxel._base.messages import installing
-from taxel.cli._app import App, app, with_out
+from taxel.cli._app import App, with_out
 from taxel.cli._say import say
 
-__all__ = ["nir"]
+__all__ = ["app", "nir"]
 
-_export = App(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
-app.add_typer(_export, name="export")
+app = App(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
 
 
-@_export.callback()
+@app.callback()
 def _root() -> None:
     """Write a readout for other simulators and for chips."""
 
 
-@_export.command()
+@app.command()
 @with_out("out")
 def nir(
     readout: Annotated[Path, typer.Argument(help="A readout, as taxel train writes it.")],

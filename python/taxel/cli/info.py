@@ -15,7 +15,7 @@ import typer
 from taxel._base.messages import counted
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import TARE_HELP, progress, tare_of
@@ -30,7 +30,9 @@ if TYPE_CHECKING:
     from taxel.recording.pressure import Series
     from taxel.recording.rest import Rest
 
-__all__ = ["info"]
+__all__ = ["app", "info"]
+
+app = App()
 
 _PICTURES = (".png", ".svg", ".pdf")
 
@@ -87,9 +89,7 @@ def info(
         if file.exists() and is_bag(file) and not files.names_topic(file):
             say(*listed(file, topics(file, files.types, files.ros), as_json))
             return
-        opened = files.open(file)
-        # A file of another maker may hold several recordings; many hold one.
-        every = opened if isinstance(opened, list) else [opened]
+        every = files.open(file)
         recording = every[0]
         if len(every) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:

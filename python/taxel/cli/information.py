@@ -12,7 +12,7 @@ from taxel._base.arguments import whole
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._bar import bar, duration
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import SET_HELP, progress
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, LabelledTrial, Point
     from taxel.recording import Recording
 
-__all__ = ["information"]
+__all__ = ["app", "information"]
+
+app = App()
 
 
 @app.command()

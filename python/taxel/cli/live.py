@@ -19,7 +19,7 @@ from taxel._base.files import try_whole
 from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli._app import SecondsOption, app, with_typed
+from taxel.cli._app import App, SecondsOption, with_typed
 from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
@@ -60,7 +60,9 @@ from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers
 
-__all__ = ["live"]
+__all__ = ["app", "live"]
+
+app = App()
 
 #: How long a board may take to send its first datagram, s.
 _FIRST_WITHIN_S = 1.0

@@ -8,12 +8,14 @@ from typing import Annotated
 
 import typer
 
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP
 from taxel.cli._say import say
 
-__all__ = ["merge"]
+__all__ = ["app", "merge"]
+
+app = App()
 
 
 @app.command()

@@ -16,7 +16,7 @@ from rich.live import Live as Display
 from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.cli._app import OUTSIDE, SecondsOption, app, with_out
+from taxel.cli._app import OUTSIDE, App, SecondsOption, with_out
 from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
@@ -45,7 +45,9 @@ from taxel.cli.console import Console
 from taxel.live import Live, Summary
 from taxel.live.options import LiveOptions
 
-__all__ = ["record"]
+__all__ = ["app", "record"]
+
+app = App()
 
 #: With --trials: the number of empty trials in a row that ends the command.
 _EMPTY = 3

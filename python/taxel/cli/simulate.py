@@ -11,12 +11,14 @@ from rich.progress import Progress
 
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._recordings import progress
 from taxel.cli._say import say
 from taxel.cli.console import Console
 
-__all__ = ["simulate"]
+__all__ = ["app", "simulate"]
+
+app = App()
 
 
 @app.command()

@@ -15,7 +15,7 @@ import typer
 
 from taxel._base.messages import warn
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import (
     READ_HELP,
@@ -38,7 +38,9 @@ if TYPE_CHECKING:
     from taxel.recording import Recording
     from taxel.tare import Tare
 
-__all__ = ["train"]
+__all__ = ["app", "train"]
+
+app = App()
 
 
 @app.command()

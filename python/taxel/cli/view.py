@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from taxel._core import ProblemError
-from taxel.cli._app import SecondsOption, app
+from taxel.cli._app import App, SecondsOption
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._paneling import PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
@@ -25,7 +25,9 @@ from taxel.recording import Recording
 from taxel.recording.opening import recordings_in
 from taxel.recording.sidecars import calibrated_by
 
-__all__ = ["view"]
+__all__ = ["app", "view"]
+
+app = App()
 
 #: How often the viewers' states are read, s.
 _CHECK_EVERY = 0.1

@@ -19,12 +19,9 @@ import taxel
 from taxel.demo import pictures
 from taxel.demo.evaluation import Evaluation
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
-from taxel.demo.naming import ANSWERED_MS, QUESTIONS, estimates
-from taxel.demo.script import script
 from taxel.live import delays
 from taxel.report.page import render
 from taxel.report.svg import STYLE, picture
-from taxel.simulate import Scene
 from taxel.spikes import to_ms, to_us
 from taxel.wire import FRAME_US
 
@@ -44,7 +41,7 @@ GUESSES = (
         "drift or stuck taxels, which are not simulated, would add errors",
     ),
     ("Force on a taxel to the power 0.7", "sets how readings grow with force; no curve of a manufacturer was found"),
-    ("Friction of 0.6 of the force", "makes the ball roll on a slant: the estimate of the slant depends on it"),
+    ("Friction of 0.6 of the force", "makes the ball roll on a slant"),
 )
 
 
@@ -84,7 +81,6 @@ def figures(material: Material) -> dict[str, Any]:
         for c in evaluation.contacts
         if c.kind == "first"
     ]
-    scenes = [act for act in script(material.seed, material.scenes) if isinstance(act, Scene)]
     return {
         "what": "taxel demo",
         "seed": material.seed,
@@ -97,7 +93,6 @@ def figures(material: Material) -> dict[str, Any]:
         "neuron": evaluation.judged.to_dict(),
         "plain_rule": evaluation.judged_plain.to_dict(),
         "delay_split_ms": _split(evaluation),
-        "which_drop": estimates(evaluation, scenes),
         "events": len(every),
         "events_per_s": len(every) / seconds,
         "events_per_s_in_first_impacts": _quantiles(impacts),
@@ -157,8 +152,6 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
             "plain": _table(evaluation.judged_plain),
             "footfalls": None if material.footfalls is None else _table(material.footfalls.judged),
         },
-        answered_ms=ANSWERED_MS,
-        which_drop=_which_drop(values["which_drop"]),
         dashpots=_dashpots({1.0: evaluation, **material.dashpots}),
         goals=GOALS,
         firsts={label: evaluation.judged.row("first", label).touches for label in LABELS},
@@ -263,27 +256,6 @@ def _line(row: Row) -> dict[str, str]:
         "p95": known[1],
         "missed": "missed" if row.found < row.touches else "",
     }
-
-
-def _which_drop(estimates: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a line a drop and question: the truth, and the most probable answer after each time."""
-    lines = []
-    for n, drop in enumerate(estimates["drops"]):
-        for name, question in QUESTIONS.items():
-            answers = [
-                {
-                    "says": question.answers[int(np.argmax(one["probable"]))],
-                    "sure": f"{100 * max(one['probable']):.0f} %",
-                    "right": one["right"],
-                }
-                for one in drop["said"].get(name, [])
-            ]
-            lines.append(
-                {"drop": n + 1, "of": name, "true": f"{drop['true'][name]:.0f} {question.unit}", "said": answers}
-            )
-    count = len(estimates["drops"])
-    right = {name: [f"{k} of {count}" for k in counts] for name, counts in estimates["right"].items()}
-    return {"lines": lines, "right": right, "chance": {name: _share(v) for name, v in estimates["chance"].items()}}
 
 
 def _dashpots(by_ms: Mapping[float, Evaluation]) -> list[dict[str, str]]:

@@ -124,7 +124,6 @@ def show(
         page = write(folder, material)
     values = figures(material)
     _print_table(console, evaluation, quiet)
-    _print_answers(console, values["which_drop"])
     console.print(f"{time.monotonic() - began:.0f} s in all", style="dim")
     return values, page
 
@@ -164,13 +163,3 @@ def _print_table(console: Console, evaluation: Evaluation, quiet: Evaluation) ->
     within = sum(evaluation.judged.false_within.values())
     off = f" ({within} within a press, more than 50 ms off)" if within else ""
     console.print(f"false detections: {false} in the scenes{off}, {len(quiet.detections)} in {noise_s:.0f} s of noise")
-
-
-def _print_answers(console: Console, estimates: dict[str, Any]) -> None:
-    """Print how often ball, height and slant were estimated correctly, by time."""
-    count = len(estimates["drops"])
-    for name, right in estimates["right"].items():
-        by_time = ", ".join(f"{k} after {ms} ms" for k, ms in zip(right, estimates["answered_ms"], strict=True))
-        console.print(
-            f"{name} estimated correctly, of {count} drops: {by_time} (by chance {estimates['chance'][name]:.0%})"
-        )

@@ -4,10 +4,9 @@ from taxel.detect.alignment import Alignment
 from taxel.detect.detector import ReadoutStream
 from taxel.detect.examples import Example, Outcome
 from taxel.detect.folds import Fold, Judged, Part, choose, judge
-from taxel.detect.loading import load
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.plain_score import PlainScore
-from taxel.detect.readout import Learner, Readout, run
+from taxel.detect.readout import Learner, Readout, load, run
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron

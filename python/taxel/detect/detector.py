@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
-from abc import ABC, abstractmethod
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from abc import abstractmethod
+from typing import Any, Self
 
 from taxel import _core
 from taxel._base.arguments import instance, number, parameters, shown, whole
-from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
-from taxel._base.documents import text_of_json
-from taxel._base.files import write_whole
-from taxel._core import FormatError, ProblemError
+from taxel._base.saved import Saved
+from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detections import Detections
 from taxel.events import Events
@@ -25,14 +20,12 @@ from taxel.recording.rest import FORCE_UNITS
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["ReadoutStream", "detector", "read", "tare_text"]
+__all__ = ["ReadoutStream", "detector", "tare_text"]
 
 
-class _Detector(ABC):
+class _Detector(Saved):
     """What a readout and a plain rule have in common: a file, and a stream."""
 
-    #: What it is, in errors.
-    _WHAT: ClassVar[str]
     _text: str
     _parts: dict[str, Any]
 
@@ -101,40 +94,6 @@ class _Detector(ABC):
             raise ProblemError(f"text is {shown(text)}: must be the text of a {cls._WHAT}")
         return cls._from_text(checked_text("text", text))
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write it to a JSON file, whole or not at all, and return its path.
-
-        Parameters
-        ----------
-        path : path
-        overwrite : bool
-            Whether an existing file may be replaced.
-
-        Returns
-        -------
-        Path
-
-        Raises
-        ------
-        FileExistsError : the file is there already and `overwrite` is false
-        """
-        return write_whole(path, lambda file: file.write(self._text.encode() + b"\n"), overwrite=overwrite)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read the file that `save` wrote: the same to the last bit.
-
-        Parameters
-        ----------
-        path : path
-
-        Raises
-        ------
-        FormatError : another kind of file, or another version (names the file)
-        FileNotFoundError : no such file
-        """
-        return read(path, cls._WHAT, cls._from_text)
-
     def stream(
         self,
         array: Array | None = None,
@@ -161,16 +120,6 @@ class _Detector(ABC):
         ProblemError : another array than it was trained on, or a tare that is missing
         """
         return ReadoutStream(self, array, frame_us=frame_us, tare=tare, wire_version=wire_version)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, type(self)):
-            return NotImplemented
-        return self._parts == other._parts
-
-    __hash__ = None  # type: ignore[assignment]
-
-
-_D = TypeVar("_D", bound=_Detector)
 
 
 class ReadoutStream:
@@ -303,19 +252,6 @@ def detector(name: str, value: object) -> _Detector:
     if not isinstance(value, _Detector):
         raise ProblemError(f"{name} is {shown(value)}: must be a taxel.Readout or taxel.detect.PlainRule")
     return value
-
-
-def read(path: str | os.PathLike[str], what: str, of_text: Callable[[str], _D]) -> _D:
-    """Read a detector's file; errors name it."""
-    place = Path(checked_path("path", path))
-    try:
-        text = text_of_json(place)
-    except FormatError as error:
-        raise FormatError(f"{error}; must be a {what} as taxel writes it") from None
-    try:
-        return of_text(text)
-    except FormatError as error:
-        raise FormatError(f"{path}: {error}") from None
 
 
 def tare_text(tare: Tare | None) -> str | None:

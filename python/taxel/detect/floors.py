@@ -26,7 +26,7 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
     Parameters
     ----------
     examples : sequence of Example
-        Those without a tare, or with one that has no noise of the taxels, say nothing.
+        Those without a tare say nothing.
     """
     floors = []
     for one in examples:

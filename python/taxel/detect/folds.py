@@ -29,7 +29,7 @@ from taxel.detect.training import Encoded, Fitting, Known, Trained, encoded, lea
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["Fold", "Judged", "Part", "choose", "judge"]
+__all__ = ["Fold", "Judged", "Part", "choose", "count_of_folds", "judge"]
 
 #: Into how many folds the training data of a fold are split for a search, where nothing else is stated.
 INNER = 3

@@ -72,8 +72,6 @@ class Loads:
         self._edges: dict[tuple[str, float, float, int], tuple[Found, Found]] = {}
         self._ages: dict[float, Found] = {}
         for quantity in quantities:
-            if quantity == "local_load" and lacks_noise(examples):
-                continue
             report(f"measuring the {quantity.replace('_', ' ')} for plain rules")
             self._curves[quantity] = [
                 _curve(quantity, noise_floor, one, *clock) for one, clock in zip(examples, clocks, strict=True)
@@ -81,7 +79,7 @@ class Loads:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The names of the quantities; without the local load where a tare has no noise of the taxels."""
+        """The names of the quantities."""
         return tuple(self._curves)
 
     def edges(self, quantity: str, threshold: float, release: float, frames: int) -> tuple[Found, Found]:
@@ -147,11 +145,6 @@ class Loads:
             return np.concatenate([one + by for one, by in zip(times, self._shift, strict=True)])
 
         return Found(shifted(t), shifted(known), np.concatenate(values))
-
-
-def lacks_noise(examples: Sequence[Example]) -> bool:
-    """Whether the tare of an example has no noise of the taxels, as the local load needs it."""
-    return any(one.tare is None or bool(np.isnan(one.tare.noise).all()) for one in examples)
 
 
 def lacks_neighbours(examples: Sequence[Example]) -> bool:

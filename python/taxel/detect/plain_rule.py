@@ -57,8 +57,7 @@ class PlainRule(_Detector):
     Raises
     ------
     ProblemError : parameters that are invalid or do not fit together (names the parameter); when it runs, channels, of
-        which no taxel is known to have neighbours, or the local load with a tare that has no noise of the taxels, as an
-        older taxel saved it
+        which no taxel is known to have neighbours
 
     Notes
     -----

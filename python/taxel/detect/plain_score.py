@@ -39,7 +39,7 @@ class PlainScore:
         Of the rules that were tuned on the training part of each fold; where a fold has no rule for a label, all its
         labels are missed. None where no quantity can be computed.
     lacks : str
-        What kept quantities from being tried, and why; empty where all were.
+        What kept rules from being tried; empty where they were.
     """
 
     rules: Mapping[str, PlainRule | None]
@@ -171,7 +171,6 @@ def plain_score(
     if lacks_neighbours(examples):
         return PlainScore(dict.fromkeys(labels), None, "plain rules need neighbours on a grid, and these are channels")
     loads = Loads(examples, clocks, noise_floor, report)
-    lacks = "" if "local_load" in loads.quantities else "no rule by local load: the tare has no noise of the taxels"
     report("tuning plain rules")
     rules = best_rules(loads, labels, loads.every, window_ms)
     detections: dict[int, list[Detections]] = {}
@@ -182,7 +181,7 @@ def plain_score(
         for part in test:
             detections.setdefault(part[0], []).append(_detected(loads, mine, part))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
-    return PlainScore(rules, score_together(joined, truths, window_ms), lacks)
+    return PlainScore(rules, score_together(joined, truths, window_ms))
 
 
 def _detected(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) -> Detections:

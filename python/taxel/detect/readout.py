@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import floats, instance, mapping, number, parameters, several, shown, text, whole
 from taxel._base.messages import escaped
+from taxel._base.saved import read
 from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
 from taxel.detect.detector import _Detector, detector, tare_text
 from taxel.detect.exchange import Parts, read_nir, write_nir
+from taxel.detect.plain_rule import PlainRule
 from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
 from taxel.encode import Composite, Encoder
@@ -32,7 +34,7 @@ from taxel.wire import FRAME_US
 #: Detection goes on for so long after the last event, ms.
 SILENCE_MS = 1000.0
 
-__all__ = ["Learner", "Readout", "run", "run_counting"]
+__all__ = ["Learner", "Readout", "load", "run", "run_counting"]
 
 
 class Learner(Protocol):
@@ -501,3 +503,26 @@ def _trained(
         number(f"{label}: delay_ms", delay, "ms"),
         tuple(text(f"{label}: inputs", name) for name in several(f"{label}: inputs", named)),
     )
+
+
+def load(path: str | os.PathLike[str]) -> Readout | PlainRule:
+    """Read the file of a readout or of a plain rule, whichever it is.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Readout or PlainRule
+
+    Raises
+    ------
+    FormatError : neither, or one of another version (names the file)
+    FileNotFoundError : no such file
+    """
+
+    def of_text(text: str) -> Readout | PlainRule:
+        return PlainRule.from_json(text) if _core.is_plain_rule(text) else Readout.from_json(text)
+
+    return read(path, "readout", of_text)

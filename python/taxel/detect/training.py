@@ -22,7 +22,7 @@ from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_pictures, later_u
 from taxel.detect.alignment import Alignment, align, aligned_to
 from taxel.detect.examples import Example, array_of, called, checked, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
-from taxel.detect.loads import clock_of, lacks_noise
+from taxel.detect.loads import clock_of
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import score_together
@@ -143,9 +143,9 @@ def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str
 def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
     """Return the recipe without the points to choose from that (checked) examples do not allow.
 
-    The local load requires a tare with the noise of the taxels, which an older taxel did not save.
+    The local load requires a tare.
     """
-    return recipe._without_choices(LocalLoad.name) if lacks_noise(examples) else recipe
+    return recipe._without_choices(LocalLoad.name) if any(one.tare is None for one in examples) else recipe
 
 
 class Encoded:

@@ -61,7 +61,7 @@ def tune(
     Nearest at the median of `known`, before the label as after it: what is known earlier responds to something else.
 
     Tried are all thresholds of the area (`AREAS`), of the total (`QUANTILES` of its values above 0) and of the local
-    load (`LOCAL_LOADS`; not where a tare has no noise of the taxels), with all numbers of frames (`FRAMES`) and
+    load (`LOCAL_LOADS`), with all numbers of frames (`FRAMES`) and
     releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
     where exactly two are nearer to onsets than to ends, or where there are only two: then thresholds of the area at
     each of `AGES_MS` are tried too, on a logarithmic scale, and hold for both where they are better for both together.

@@ -76,7 +76,7 @@ class LocalLoad(Tared):
 
     Raises
     ------
-    ProblemError : an invalid parameter; encoding without a tare, with another array's, or with one that has no noise
+    ProblemError : an invalid parameter; encoding without a tare, or with another array's
 
     Examples
     --------

@@ -130,7 +130,7 @@ class Layout:
         The foot or hand that the sensor is of. For a recording of the other foot the places are mirrored.
     heel : {"top", "bottom"}, optional
         At which rows, or at which end of the places, the heel lies.
-    falls : bool or float
+    falls : bool or float, optional
         Whether readings fall with pressure, and are turned: to their negative, or, of a number, to that number less the
         reading.
     unit : str, optional
@@ -154,7 +154,7 @@ class Layout:
     places: Places | None = None
     side: str = ""
     heel: str = ""
-    falls: bool | float = False
+    falls: bool | float | None = None
     unit: str | None = None
     rate_hz: float | None = None
     table: Table | None = None
@@ -168,7 +168,7 @@ class Layout:
             text("side", self.side, ("left", "right"))
         if self.heel:
             text("heel", self.heel, ("top", "bottom"))
-        if not isinstance(self.falls, bool):
+        if self.falls is not None and not isinstance(self.falls, bool):
             # Pictures have 32 bits.
             object.__setattr__(self, "falls", finite("falls", self.falls, least=-VALUE, most=VALUE))
         if self.unit is not None and not text("unit", self.unit):
@@ -216,6 +216,11 @@ class Layout:
             if candidate.is_file():
                 return candidate
         return None
+
+    @property
+    def turned(self) -> float | None:
+        """The number that readings are subtracted from, as they fall with pressure; None if they do not."""
+        return 0.0 if self.falls is True else None if self.falls is False or self.falls is None else self.falls
 
     def grid(self) -> Array | None:
         """Return a sensor of its rows and columns; None if it does not say them."""

@@ -1,17 +1,17 @@
-"""The base of learners of spike times that are fitted to all examples at once: fit, predict."""
+"""The base of learners of spike times that are fitted to all examples at once: fit."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, several
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner
 from taxel.spikes import SpikeTrains
@@ -54,30 +54,9 @@ class BatchLearner(SpikeLearner):
             setattr(self, f"{name}_", value)
         return self
 
-    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
-        """Return the learner's output spikes, one array a pattern, ms.
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-            The same trains as in `fit`.
-
-        Returns
-        -------
-        list of float64, shape (spikes,), ms
-
-        Raises
-        ------
-        ProblemError : invalid patterns
-        NotFittedError : before `fit`
-        """
-        return self._fired(patterns, {})
-
-    def _fired(self, patterns: Sequence[SpikeTrains], instead: dict[str, Any]) -> list[NDArray[np.float64]]:
-        """Return the output spikes; `instead` replaces learnt attributes by name."""
-        weights = self._fitted()
-        learnt = json.dumps(self._said | instead)
-        trains = [
-            instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))
-        ]
-        return [_core.run_batch(self._kind, self._json(), weights, learnt, parts) for parts in trains]
+    def _fired(
+        self, patterns: list[SpikeTrains], instead: Mapping[str, Any] = MappingProxyType({})
+    ) -> list[NDArray[np.float64]]:
+        """Return the output spikes in each pattern; `instead` replaces learnt attributes by name."""
+        weights, learnt = self._fitted(), json.dumps(self._said | dict(instead))
+        return [_core.run_batch(self._kind, self._json(), weights, learnt, one._parts()) for one in patterns]

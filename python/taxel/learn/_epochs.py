@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, floats, instance, several
+from taxel._base.arguments import callback, floats, instance
 from taxel._base.parameters import defaults
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner, Status
@@ -100,26 +100,9 @@ class EpochLearner(SpikeLearner):
         keep(self, _core.fit_rival(self._json(), trains, times, first, progress))
         return self
 
-    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
-        """Return the output spikes of the trained neuron, one array a pattern, ms.
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-            The same trains as in `fit`.
-
-        Returns
-        -------
-        list of float64, shape (spikes,), ms
-
-        Raises
-        ------
-        ProblemError : invalid patterns
-        NotFittedError : before `fit`
-        """
+    def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
         rule, weights = self._json(), self._fitted()
-        numbered = enumerate(several("patterns", patterns))
-        return [_core.run_rival(rule, weights, instance(f"pattern {p}", s, SpikeTrains)._parts()) for p, s in numbered]
+        return [_core.run_rival(rule, weights, one._parts()) for one in patterns]
 
     def change(
         self, weights: ArrayLike, pattern: SpikeTrains, targets: ArrayLike

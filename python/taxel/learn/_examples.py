@@ -12,7 +12,7 @@ from taxel._base.arguments import floats, instance, numbers, several, shown
 from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 
-__all__ = ["examples", "windows", "with_kind"]
+__all__ = ["examples", "windows"]
 
 
 def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[float64]]]:
@@ -41,11 +41,3 @@ def windows(name: str, given: object) -> NDArray[float64] | None:
     if ends.size and (ends.ndim != 2 or ends.shape[1] != 2):
         raise ProblemError(f"{name} has shape {ends.shape}: must hold windows, a start and a stop each")
     return ends.reshape(-1)
-
-
-def with_kind(pattern: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return a pickled pattern as the compiled part reads it: those before graded trains have no kind."""
-    if len(pattern) == 6:
-        return pattern
-    times, offsets, values, start, stop = pattern
-    return times, offsets, values, "unsigned" if values is None else "signed", start, stop

@@ -16,7 +16,7 @@ from taxel.learn._examples import examples
 from taxel.metrics import f1
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Learner", "SpikeLearner", "Status", "predicted"]
+__all__ = ["Learner", "SpikeLearner", "Status", "fired_by_neuron", "patterns_of"]
 
 #: How a fit ended, of all learners; the page on errors has the table.
 Status = Literal["solved", "feasible", "infeasible", "right", "epochs", "stopped", "assigned"]
@@ -60,9 +60,28 @@ class Learner(Parameters):
 class SpikeLearner(Learner, ABC):
     """Learn spike times."""
 
-    @abstractmethod
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
-        """Return the output spikes of the trained neuron, one array a pattern, ms."""
+        """Return the output spikes of the trained neuron, one array a pattern, ms.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains as in `fit`.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
+
+        Raises
+        ------
+        ProblemError : an invalid pattern (names it)
+        NotFittedError : before `fit`
+        """
+        return self._fired(patterns_of(patterns))
+
+    @abstractmethod
+    def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[float64]]:
+        """Return the output spikes in each pattern."""
 
     def score(
         self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike], window_ms: float = _DEFAULT.window_ms
@@ -91,12 +110,16 @@ class SpikeLearner(Learner, ABC):
         return f1(self.predict(patterns), target_times, window_ms=window_ms)
 
 
-def predicted(learner: Any, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
+def patterns_of(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:
+    """Return patterns as a list, each of which was checked; an error names the pattern."""
+    return [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
+
+
+def fired_by_neuron(learner: Any, patterns: list[SpikeTrains]) -> list[NDArray[float64]]:
     """Return the output spikes of a learner's `neuron_` with its weights."""
     weights = learner._fitted()
     if getattr(learner, "status_", None) == "infeasible":
         raise ProblemError(
             "the fit is infeasible: no weights meet its targets (status_, certificate_), so none can be run"
         )
-    numbered = enumerate(several("patterns", patterns))
-    return [learner.neuron_.run(weights, instance(f"pattern {p}", one, SpikeTrains)) for p, one in numbered]
+    return [learner.neuron_.run(weights, one) for one in patterns]

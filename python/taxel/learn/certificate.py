@@ -212,10 +212,9 @@ def check_gap(
 
 def _multipliers(cone: ConeX | ConeR, trains: int) -> tuple[dict[tuple[str, int, float], float], NDArray[np.float64]]:
     """Return the multipliers of a fit by the names of their rows, and that of the l2 term."""
-    proof = getattr(cone, "multipliers_", None)
+    proof = cone.multipliers_
     if proof is None:
-        why = f"its fit is {cone.status_}" if hasattr(cone, "multipliers_") else "an earlier version fitted it"
-        raise NotFittedError(f"cone: has no multipliers_, as {why}; fit it again")
+        raise NotFittedError(f"cone: has no multipliers_, as its fit is {cone.status_}; fit it again")
     values, pull = floats("multipliers_.values", proof.values), floats("multipliers_.pull", proof.pull)
     if len(values) != len(proof.rows) or len(pull) != trains:
         raise ProblemError(

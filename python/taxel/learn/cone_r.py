@@ -16,7 +16,7 @@ from taxel._base.messages import warn
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError, ProblemError
 from taxel.learn._examples import examples, windows
-from taxel.learn._learner import SpikeLearner, Status, predicted
+from taxel.learn._learner import SpikeLearner, Status, fired_by_neuron
 from taxel.learn.cone_x import Multipliers, _multipliers
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
@@ -237,24 +237,8 @@ class ConeR(SpikeLearner):
         """
         return ConeRProblem(self, patterns, targets, silence)
 
-    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
-        """Return the output spikes of the trained neuron, one array a pattern, ms.
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-            The same trains as in `fit`.
-
-        Returns
-        -------
-        list of float64, shape (spikes,), ms
-
-        Raises
-        ------
-        ProblemError : invalid patterns
-        NotFittedError : before `fit`
-        """
-        return predicted(self, patterns)
+    def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
+        return fired_by_neuron(self, patterns)
 
     def _on_grid(self) -> Neuron:
         """Return the neuron that is trained: the given one, on the grid of its step."""

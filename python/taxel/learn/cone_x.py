@@ -16,8 +16,8 @@ from taxel._base.arguments import callback, flag, floats, instance, number, seve
 from taxel._base.messages import counted
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError, ProblemError
-from taxel.learn._examples import examples, with_kind
-from taxel.learn._learner import SpikeLearner, Status, predicted
+from taxel.learn._examples import examples
+from taxel.learn._learner import SpikeLearner, Status, fired_by_neuron
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
@@ -389,24 +389,8 @@ class ConeX(SpikeLearner):
             raise signal
         return self
 
-    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
-        """Return the output spikes of the trained neuron, one array a pattern, ms.
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-            The same trains as in `fit`.
-
-        Returns
-        -------
-        list of float64, shape (spikes,), ms
-
-        Raises
-        ------
-        ProblemError : invalid patterns
-        NotFittedError : before `fit`
-        """
-        return predicted(self, patterns)
+    def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
+        return fired_by_neuron(self, patterns)
 
 
 class ConeXProblem:
@@ -467,8 +451,6 @@ class ConeXProblem:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        json, parts = self._stated
-        self._stated = json, [with_kind(one) for one in parts]
         self._lay_out()
         self._with_margin(state["margin"])
 

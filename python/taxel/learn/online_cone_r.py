@@ -14,7 +14,7 @@ from taxel import _core
 from taxel._base.arguments import callback, floats, instance, several
 from taxel._base.parameters import defaults
 from taxel._core import ProblemError
-from taxel.learn._examples import windows, with_kind
+from taxel.learn._examples import windows
 from taxel.learn.cone_r import ConeR, _keep, _warn, _weighed
 from taxel.spikes import SpikeTrains
 
@@ -198,11 +198,6 @@ class OnlineConeR(ConeR):
         vars(self).update(state)
         if "_begun" in state:
             self._stream = _core.OnlineConeR(self._begun)
-            # Examples of earlier versions have no windows of silence.
-            self._held = deque(
-                ((with_kind(pattern), targets, *(asked or [None])) for pattern, targets, *asked in self._held),
-                maxlen=self.window,
-            )
             for example in self._held:
                 self._stream.add(*example)
 

@@ -13,6 +13,7 @@ from taxel import _core
 from taxel._base.arguments import instance, number
 from taxel._base.parameters import defaults
 from taxel.learn._batch import BatchLearner
+from taxel.learn._learner import patterns_of
 from taxel.spikes import SpikeTrains
 
 __all__ = ["SKIM"]
@@ -200,4 +201,5 @@ class SKIM(BatchLearner):
         ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
-        return self._fired(patterns, {} if threshold is None else {"threshold": number("threshold", threshold)})
+        instead = {} if threshold is None else {"threshold": number("threshold", threshold)}
+        return self._fired(patterns_of(patterns), instead)

@@ -157,27 +157,10 @@ class STDP(SpikeLearner):
                 self._neuron.set_weights(self._fitted())
         return self._learn(piece)
 
-    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
-        """Return the output spikes with the present weights, one array a pattern, each from the resting state; ms.
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-            The same trains as in `fit`.
-
-        Returns
-        -------
-        list of float64, shape (spikes,), ms
-
-        Raises
-        ------
-        ProblemError : an invalid pattern (names it)
-        NotFittedError : before `fit` and `partial_fit`
-        """
-        weights = self._fitted()
-        trains = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
-        fired = []
-        for one in trains:
+    def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
+        # With the present weights, each pattern from the resting state.
+        weights, fired = self._fitted(), []
+        for one in patterns:
             neuron = _core.STDP(self._json(), len(weights))
             neuron.set_weights(weights)
             fired.append(neuron.push(one._parts(), False))

@@ -14,7 +14,7 @@ from taxel._base.arguments import callback, flag, floats, instance, several
 from taxel._base.parameters import defaults
 from taxel._core import ProblemError
 from taxel.learn._epochs import keep
-from taxel.learn._learner import Learner, Status
+from taxel.learn._learner import Learner, Status, patterns_of
 from taxel.spikes import SpikeTrains
 
 __all__ = ["Tempotron"]
@@ -129,8 +129,7 @@ class Tempotron(Learner):
         ProblemError : invalid patterns, labels or first weights
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
-        numbered = enumerate(several("patterns", patterns))
-        trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in numbered]
+        trains = [one._parts() for one in patterns_of(patterns)]
         truth = _labels(labels)
         first = None if start is None else floats("start", start)
         if progress is not None:

@@ -125,7 +125,7 @@ class ShownFiles:
         return every[0 if trial is None else names.index(trial)], names
 
     def read(self, path: Path, trial: str | None, *, whole: bool) -> tuple[Path | None, ReadPictures | None]:
-        """Return events as a .mcap, or pictures; arguments are those of `RequestHandler.read`."""
+        """Return events as a .mcap, or pictures; arguments are those of `FileRequests.read`."""
         beginning = None if whole else self._beginning(path)
         if beginning is not None:
             recording, names, left_s = beginning

@@ -21,6 +21,7 @@ from taxel._core import ProblemError
 from taxel.detections import Detection
 from taxel.encode import Encoder
 from taxel.labels import Note
+from taxel.live import _messages
 from taxel.spikes import to_us
 
 if TYPE_CHECKING:
@@ -195,9 +196,9 @@ class PanelClient:
         self._plays = self._ends = False
         self._warning: str | None = None
         if opens is not None:
-            self._send(type="open", name=opens)
+            self._send({"type": "open", "name": opens})
         if spikes is not None:
-            self._send(type="encode", encoder=json.loads(spikes))
+            self._send({"type": "encode", "encoder": json.loads(spikes)})
 
     @property
     def warning(self) -> str | None:
@@ -212,7 +213,7 @@ class PanelClient:
         speed : float, 0.001 to 100
             Board time over real time.
         """
-        self._send(type="play", speed=number("speed", speed))
+        self._send({"type": "play", "speed": number("speed", speed)})
 
     def close(self) -> None:
         """Disconnect; an iteration that runs ends."""
@@ -230,13 +231,13 @@ class PanelClient:
         """Yield what is shown as it arrives, until the recording or the server ends."""
         from websockets.exceptions import ConnectionClosed  # noqa: PLC0415  an extra
 
-        self._send(type="credit", n=1)
+        self._send({"type": "credit", "n": 1})
         due: float | None = None
         while True:
             try:
                 message = self._socket.recv(None if due is None else max(0.0, due - time.monotonic()))
             except TimeoutError:
-                self._send(type="credit", n=1)
+                self._send({"type": "credit", "n": 1})
                 due = None
                 continue
             except ConnectionClosed:
@@ -254,47 +255,47 @@ class PanelClient:
         while self._ends and self._later and self._subject is not None:
             yield self._subject, self._later.popleft()
 
-    def _send(self, **message: Any) -> None:
+    def _send(self, request: _messages.Request) -> None:
         from websockets.exceptions import ConnectionClosed  # noqa: PLC0415  an extra
 
         try:
-            self._socket.send(json.dumps(message))
+            self._socket.send(json.dumps(request))
         except ConnectionClosed:
             # The next `recv` reports it too.
             return
 
-    def _message(self, message: dict[str, Any]) -> Iterator[tuple[Subject, Item]]:
-        kind = message["type"]
-        if kind == "hello" and self._live and message["array"] is not None:
-            self._begin(message["array"], message["array"]["name"] or "board")
-        elif kind == "opened":
+    def _message(self, message: _messages.Message) -> Iterator[tuple[Subject, Item]]:
+        if message["type"] == "hello":
+            if self._live and message["array"] is not None:
+                self._begin(message["array"], message["array"]["name"] or "board")
+        elif message["type"] == "opened":
             self._begin(message["array"], message["name"])
             self._noise_floor = (message["registers"] or {}).get("noise_floor", self._noise_floor)
             items: list[Detection | Note] = [
-                Detection(one["label"], one["t_us"], one["known_us"]) for one in message["detections"]
+                Detection(found["label"], found["t_us"], found["known_us"]) for found in message["detections"]
             ]
-            items += [Note(one["text"], one["t_us"]) for one in message["notes"] if one["t_us"] is not None]
+            items += [Note(note["text"], note["t_us"]) for note in message["notes"] if note["t_us"] is not None]
             self._yield_later(items)
-        elif kind == "labels":
-            self._yield_later([Note(one["label"], one["t_us"]) for one in message["labels"]])
-        elif kind == "registers":
+        elif message["type"] == "labels":
+            self._yield_later([Note(label["label"], label["t_us"]) for label in message["labels"]])
+        elif message["type"] == "registers":
             self._noise_floor = message["values"]["noise_floor"]
-        elif kind == "detection" and self._subject is not None:
+        elif message["type"] == "detection" and self._subject is not None:
             slope = math.nan if message["slope_mv_per_ms"] is None else message["slope_mv_per_ms"]
             times = message["t_us"], message["known_us"], slope, message["said_us"]
             yield self._subject, Detection(message["label"], *times)
-        elif kind == "spikes" and self._subject is not None:
+        elif message["type"] == "spikes" and self._subject is not None:
             yield self._subject, _spikes(message)
-        elif kind == "transport":
+        elif message["type"] == "transport":
             # A recording is paused before it is played as well.
             self._ends = self._plays and message["state"] == "paused"
             self._plays = message["state"] == "playing"
-        elif kind == "warning":
+        elif message["type"] == "warning":
             self._warning = message["text"]
-        elif kind == "refused":
+        elif message["type"] == "refused":
             self._warning = message["reason"]
 
-    def _begin(self, array: dict[str, Any], name: str) -> None:
+    def _begin(self, array: _messages.ArrayInfo, name: str) -> None:
         shape = array["rows"], array["columns"]
         if self._subject is None or (name, *shape) != (self._subject.name, self._subject.rows, self._subject.columns):
             self._subject = Subject(name, *shape)
@@ -357,7 +358,7 @@ class PanelClient:
 
         for n in range(2):
             time.sleep(_SPIKES_WITHIN_S)
-            self._send(type="overview", id=n)
+            self._send({"type": "overview", "id": n})
             try:
                 for message in self._socket:
                     if isinstance(message, bytes):
@@ -426,7 +427,7 @@ def _section(message: bytes, number: int, dtype: np.dtype[Any]) -> NDArray[Any]:
     return np.frombuffer(message, dtype, size // dtype.itemsize, start)
 
 
-def _spikes(message: dict[str, Any]) -> Spikes:
+def _spikes(message: _messages.SpikesMessage) -> Spikes:
     times = np.round(to_us(np.array(message["t_ms"], np.float64))).astype(np.int64)
     trains, values = np.array(message["train"], np.int64), np.array(message["value"], np.float64)
     return Spikes(message["encoder"], times, trains, values, message["left_out"])

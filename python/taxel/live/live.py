@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from types import TracebackType
@@ -15,21 +15,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, number, numbers, parameters, shown, text, whole
+from taxel._base.arguments import finite, flag, instance, number, numbers, parameters, several, shown, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped
 from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detections import Detection
+from taxel.detections import Detection, Detections
 from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.options import LiveOptions
 from taxel.live.summary import Summary, summary_of
-from taxel.recording.notes import Zeroing
+from taxel.recording.changes import Zeroing
 from taxel.tare import Tare
 
-__all__ = ["Live"]
+__all__ = ["Live", "heard"]
 
 #: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"
@@ -487,3 +487,36 @@ def _stretch_us(seconds: float) -> int:
     if not 1e-6 <= stretch <= 3600:
         raise ProblemError(f"tare is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
     return round(stretch * 1e6)
+
+
+def heard(said: Sequence[Detection]) -> Detections:
+    """Return detections of a `Live` as columns.
+
+    Parameters
+    ----------
+    said : sequence of Detection
+
+    Returns
+    -------
+    Detections
+
+    Raises
+    ------
+    ProblemError : something that is no detection
+
+    Examples
+    --------
+    >>> heard([Detection("contact", 1000, 1344)])
+    Detections(1: contact 1; 1000 to 1000 us)
+    """
+    detections = [instance("said", one, Detection) for one in several("said", said)]
+    times = [one.said for one in detections]
+    reported: Any = None if None in times else times
+    return Detections._of(
+        [one.label for one in detections],
+        [one.t for one in detections],
+        [one.known for one in detections],
+        [one.slope for one in detections],
+        reported,
+        [one.repaired for one in detections],
+    )

@@ -17,7 +17,8 @@ from taxel.detect import load
 from taxel.device import Cable
 from taxel.formats.ros import is_bag
 from taxel.frames import Frames
-from taxel.live._requests import RequestHandler
+from taxel.live._requests import Requests
+from taxel.live._requests.board import BoardRequests
 from taxel.live._shown_files import Opening
 from taxel.live.live import Live
 from taxel.recording import Recording
@@ -105,7 +106,8 @@ class Panel:
             period_us("rate_hz", rate_hz)
         opening = Opening() if opens is None else Opening(callback("opens", opens), shown, given, rate_hz, layout)
         cable = None if control is None else Cable(text("control", control))
-        self._requests = RequestHandler(self.listen, self.delta_intensity, self.read_out, cable, opening)
+        board = BoardRequests(self.listen, self.delta_intensity, self.read_out, cable)
+        self._requests = Requests(opening, board)
         readout = None if self._live is None else self._live._labels
         stated = self._live is not None and self._live._registers_stated
         try:
@@ -238,7 +240,7 @@ class Panel:
 
     def _connect(self, control: str) -> None:
         """Connect the board's serial line, which something else has used until now."""
-        self._requests.connect(control)
+        self._requests.board.connect(control)
         self._core.connected(control)
 
     def _restartable(self, what: str) -> Live:
@@ -256,7 +258,7 @@ class Panel:
         """End the server, and the `Live` that `listen` or `delta_intensity` began; clients are notified."""
         if not self._stopped:
             self._stopped = True
-            self._requests.end_work()
+            self._requests.training.close()
             self._core.stop()
             self._requests.close()
             if self._live is not None and self._live is not self._first:

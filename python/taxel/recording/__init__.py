@@ -1,13 +1,14 @@
 """Recordings: functions that open, cut, merge and convert them, and convert their times to another clock."""
 
 from taxel.clock import Clock
+from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.health import Health, health
 from taxel.recording.kinds import ENDINGS, kind_of_file
 from taxel.recording.merge import merge
-from taxel.recording.notes import BoardChange, Datagrams, Zeroing
-from taxel.recording.opening import open_any, open_recording
+from taxel.recording.opening import open_all, open_one, open_recording
+from taxel.recording.raw import Datagrams
 from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
 
@@ -25,6 +26,7 @@ __all__ = [
     "health",
     "kind_of_file",
     "merge",
-    "open_any",
+    "open_all",
+    "open_one",
     "open_recording",
 ]

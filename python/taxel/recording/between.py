@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from functools import partial
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,13 @@ from taxel import _core
 from taxel._base.files import open_file
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.recording.contents import UNKNOWN, Contents, once, together
-from taxel.recording.fates import after
+from taxel.recording import parts
+from taxel.recording.contents import Board, Contents, S, Source, applied, together
 from taxel.recording.kinds import verdict_of
+from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.verdict import Verdict
 
-__all__ = ["Apart", "between"]
+__all__ = ["Slices", "between", "inside"]
 
 #: So many bytes at either end of a file name a recording.
 _END = 1 << 16
@@ -32,39 +34,67 @@ def between(of: Contents, start: float, stop: float) -> Contents:
 
     The held values at its beginning follow from the events before it. Taxels that were zeroed before it stay zeroed.
     """
-    return after(
-        "between",
-        of,
-        lambda: _without_a_time(of),
-        events=once(lambda: None if of.events is None else of.events.between(start, stop)) if of.has_events else None,
-        frames=None if of.has_events else once(lambda: None if of.frames is None else of.frames.between(start, stop)),
-        stretch=once(lambda: _stretch(of, start, stop)),
-        held=once(lambda: _held_at(of, start)),
-        notes=once(lambda: tuple(n for n in of.notes if n.t is not None and start <= n.t < stop)),
-        detections=once(lambda: of.detections.between(start, stop)),
-        zeroings=once(lambda: tuple(z for z in of.zeroings if z.t < stop)),
-        samples=once(
-            lambda: None if of.samples is None else of.samples.between(start, stop), lambda: of.holds("samples")
-        ),
-        verdict=once(lambda: _verdict(of)),
-        sources=once(lambda: _sources(of, start, stop)),
-    )
+    every, whole = of.sources, _between(of.one, of.sources, start, stop)
+    if len(every) == 1:
+        return Contents.of(whole)
+    every_part = {name: _between(one, every, start, stop) for name, one in inside(every).items()}
+    apart = Once(lambda: len(every) > 1 and of.one.timing.clock_of is None and not together(every))
+    return Contents(whole, Slices(every_part, of.one.origin, apart))
 
 
-def _verdict(of: Contents) -> Verdict | None:
-    """Return the verdict of a recording as that of one of its stretches, which names the whole.
+def _between(of: S, sources: Mapping[str, Source], start: float, stop: float) -> S:
+    """Return a part of a source by time."""
+    marks = of.marks
+
+    def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
+        match part:
+            case parts.Origin() | parts.Sensor() | parts.Wire():
+                return part
+            case parts.Changes():
+                return parts.Changes(Once(lambda: part.events().between(start, stop)))
+            case parts.Readings():
+                return replace(part, frames=Once(lambda: part.frames().between(start, stop)))
+            case parts.Lines():
+                return parts.Lines(
+                    part.columns, part.samples.to(lambda samples: samples and samples.between(start, stop))
+                )
+            case parts.Settings():
+                return parts.Settings(Once(lambda: _held_at(of, start)), part.registers, part.register_changes)
+            case parts.Timing():
+                return parts.Timing(part.clock, part.clock_of, Once(lambda: _stretch(of, start, stop)))
+            case parts.Losses():
+                return replace(part, verdict=Once(lambda: _verdict(of, sources)))
+            case parts.Marks():
+                return parts.Marks(
+                    board_changes=part.board_changes,
+                    notes=Once(lambda: tuple(n for n in part.notes() if n.t is not None and start <= n.t < stop)),
+                    detections=Once(lambda: part.detections().between(start, stop)),
+                    zeroings=Once(lambda: tuple(z for z in part.zeroings() if z.t < stop)),
+                )
+            case _:
+                assert_never(part)
+
+    def untimed() -> list[str]:
+        count = sum(note.t is None for note in marks.notes())
+        return [f"{counted(count, 'note')} without a time"] * bool(count)
+
+    return applied(of, rule, untimed)
+
+
+def _verdict(of: Source, sources: Mapping[str, Source]) -> Verdict | None:
+    """Return the verdict of a source as that of one of its stretches, which names the whole.
 
     The name follows from the file's ends, or else from what there is, so that stretches that were cut at different
     times or of a copy have one; no datagram is read for it.
     """
-    if of.verdict is None:
+    if of.losses.verdict() is None:
         return None
     said = verdict_of(of)
     if said.stretch_of is not None:
         return said
-    verdicts = [verdict_of(one).to_dict() for one in (of.sources or {of.label: of}).values()]
+    verdicts = [verdict_of(one).to_dict() for one in sources.values()]
     try:
-        about = _ends(of.path)
+        about = _ends(of.origin.path)
     except OSError:
         about = json.dumps([len(of.table), of.table.t[:1].tolist(), of.table.t[-1:].tolist()]).encode()
     return said._as_stretch_of(hashlib.sha256(json.dumps(verdicts).encode() + about).hexdigest()[:16])
@@ -80,46 +110,47 @@ def _ends(path: Path) -> bytes:
         return b"%d " % size + file.read(_END) + last
 
 
-def _without_a_time(of: Contents) -> list[str]:
-    count = sum(note.t is None for note in of.notes)
-    return [f"{counted(count, 'note')} without a time"] * bool(count)
+class Slices(Mapping[str, Source]):
+    """Hold the same part of all sources of a file; refuse access to those whose clock is not that of the interval."""
 
+    def __init__(self, every_part: Mapping[str, Source], one: parts.Origin, apart: Once[bool]) -> None:
+        self._parts, self._one, self._apart = every_part, one, apart
 
-class Apart(Mapping[str, Contents]):
-    """Hold the names of sources with clocks of their own; refuse access, as the interval is by another clock."""
-
-    def __init__(self, path: Path, names: Iterable[str]) -> None:
-        self._path, self._names = path, tuple(names)
-
-    def __getitem__(self, name: str) -> Contents:
-        raise ProblemError(
-            f"{self._path}: a slice by one clock, and its sources ({', '.join(self._names)}) have each its own; say "
-            "on_clock(name) before between"
-        )
+    def __getitem__(self, name: str) -> Source:
+        part = self._parts[name]
+        if self._apart():
+            raise ProblemError(
+                f"{self._one.path}: a slice by one clock, and its sources ({', '.join(self)}) have each its own; say "
+                "on_clock(name) before between"
+            )
+        return part
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
+        return iter(self._parts)
 
     def __len__(self) -> int:
-        return len(self._names)
+        return len(self._parts)
+
+    def but(self, label: str, part: Source) -> Slices:
+        """Return the same with another part in the place of one."""
+        return Slices({**self._parts, label: part}, self._one, self._apart)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what there is access to, and the names of the others, so that a pickle reads no other source."""
+        return vars(self) | {"_parts": dict.fromkeys(self._parts) if self._apart() else self._parts}
 
 
-def _sources(of: Contents, start: float, stop: float) -> Mapping[str, Contents]:
-    """Return the same part of all sources of a file if they are on one clock; else refuse access to them."""
-    sources = of.sources
-    if len(sources) > 1 and of.clock_of is None and not together(sources):
-        return Apart(of.path, sources)
-    parts: dict[str, Contents] = {}
-    for name, one in sources.items():
-        alone = one.but(sources={}, verdict=once(partial(_verdict, one)))
-        parts[name] = between(alone, start, stop).but(sources=parts)
-    return parts
+def inside(sources: Mapping[str, Source]) -> Mapping[str, Source]:
+    """Return all sources, also those of slices by another clock."""
+    return sources._parts if isinstance(sources, Slices) else sources
 
 
-def _stretch(of: Contents, start: float, stop: float) -> tuple[int, int]:
+def _stretch(of: Source, start: float, stop: float) -> tuple[int, int]:
     """Return the first time and the end of a part, limited to those of the whole."""
     t = of.table.t
-    whole = of.stretch or ((int(t.min()), int(t.max()) + 1) if len(t) else (0, 1))
+    whole = (int(t.min()), int(t.max()) + 1) if len(t) else (0, 1)
+    if of.timing.stretch is not None:
+        whole = of.timing.stretch()
     first, last = max(whole[0], _whole(start)), min(whole[1], _whole(stop))
     return first, max(first, last)
 
@@ -129,14 +160,14 @@ def _whole(value: float) -> int:
     return int(np.ceil(np.clip(value, -(2.0**62), 2.0**62)))
 
 
-def _held_at(of: Contents, start: float) -> NDArray[np.uint16] | None:
+def _held_at(of: Source, start: float) -> NDArray[np.uint16] | None:
     """Return the values that the taxels held at a time, as far as they are known."""
-    events = of.events if of.has_events else None
+    held, events = of.settings.held(), of.table if isinstance(of, Board) else None
     if events is None or events.intensity is None or events.present is None:
-        return of.held
+        return held
     before = events.between(-np.inf, start)
     if before.present is None or not before.present.any():
-        return of.held
-    begins = np.full(of.array.shape, UNKNOWN, np.uint16) if of.held is None else of.held
+        return held
+    begins = np.full(of.sensor.array.shape, UNKNOWN, np.uint16) if held is None else held
     values = _core.HeldValues(before._parts(), None, begins.astype(np.float32).reshape(-1))
-    return values.at(np.array([before.t.max()])).astype(np.uint16).reshape(of.array.shape)
+    return values.at(np.array([before.t.max()])).astype(np.uint16).reshape(of.sensor.array.shape)

@@ -1,280 +1,271 @@
-"""The contents of a recording from any kind of file: one dataclass, each field read at its first access."""
+"""What a recording holds: of each source a header in common, and a board's events, frames, or a stream of numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence, Sized
-from dataclasses import dataclass, field, fields
-from pathlib import Path
-from typing import Any, Generic, Self, TypeVar, cast
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, NoReturn, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from taxel import _core
 from taxel._core import ProblemError
-from taxel.array import Array
-from taxel.calibration import Calibration
-from taxel.clock import Clock
-from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.labels import Note
-from taxel.recording.notes import BoardChange, Datagrams, Samples, Zeroing
+from taxel.recording import parts
+from taxel.recording.once import Once, known
 from taxel.recording.verdict import Verdict
-from taxel.wire import Registers
 
-__all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "named", "once", "several", "together"]
+__all__ = [
+    "Board", "Contents", "Drawn", "Pictures", "S", "Several", "Source", "Stream", "alone", "applied", "named",
+    "parts_of", "saying", "several", "source_from", "together",
+]  # fmt: skip
 
-T = TypeVar("T")
-
-#: The held value, in files, of a taxel without any event so far.
-UNKNOWN = _core.UNKNOWN
-
-
-class Once(Generic[T]):
-    """Function that reads a value at its first call and caches it.
-
-    Parameters
-    ----------
-    read : function without arguments
-        Called once; after an error the next call tries again.
-    holds : function without arguments, optional
-        Whether the value holds anything, if that can be computed faster than the value itself.
-    """
-
-    def __init__(self, read: Callable[[], T], holds: Callable[[], bool] | None = None) -> None:
-        self._read: Callable[[], T] | None = read
-        self._holds = holds
-
-    def __call__(self) -> T:
-        """Return the value."""
-        if self._read is not None:
-            self._value = self._read()
-            # Drop the function, so that what it refers to (another recording's contents) can be freed.
-            self._read = self._holds = None
-        return self._value
-
-    def holds(self) -> bool:
-        """Return whether the value holds anything."""
-        return anything(self()) if self._holds is None else self._holds()
+P = TypeVar("P", parts.Wire, parts.Lines)
+S = TypeVar("S", bound="Source")
 
 
-def once(read: Callable[[], T], holds: Callable[[], bool] | None = None) -> T:
-    """Return the value of a field of `Contents` as a function that reads it once."""
-    return cast(T, Once(read, holds))
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Hold what all sources have: the header of a board, of frames, and of a stream of numbers."""
 
-
-def anything(value: object) -> bool:
-    """Return whether the value of a field holds any information."""
-    match value:
-        case Clock():
-            return len(value.board_us) > 0
-        case np.ndarray():
-            return bool((value != UNKNOWN).any())
-        case Events() | Frames() | Registers() | Calibration() | Array():
-            return True
-        case dict():
-            return any(map(anything, value.values()))
-        case Sized():
-            return len(value) > 0
-    return bool(value)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Contents:
-    """Hold the contents of a recording.
-
-    Each field is a value, or a function that reads it once (`once`); the attribute is the value in both cases. A field
-    that a file cannot hold has its default. The table in `taxel.recording.fates` states what each function does to each
-    field.
-
-    Parameters
-    ----------
-    path : Path
-    name, kind, label : str
-        The file's name (for a trial in a file of another format the name in that file); the kind of file; the name of
-        the source within its file, "" for a file of several boards as a whole.
-    array : Array
-        The sensor.
-    source : str
-        The origin of the bytes, such as an address or a port.
-    side : {"left", "right", ""}
-        The foot or hand that the sensor is of.
-    heel : {"top", "bottom", ""}
-        Where on the sensor the heel lies.
-    events, frames : Events, Frames
-        One of the two; for a recording of events `frames` is None, never a function.
-    stretch : (int, int), us
-        The first time and the end of a part by time.
-    held : uint16, shape (rows, columns), ticks
-        The values that the taxels held at the beginning; `UNKNOWN` for one without any event before.
-    registers : Registers
-        The board's registers at the beginning, with the array that they drive: the whole sensor, even if the recording
-        is a part of it.
-    register_changes : tuple of (int ns since 1970, Registers)
-    board_changes : tuple of BoardChange
-    notes : tuple of Note
-    detections : Detections
-    zeroings : tuple of Zeroing
-    calibration : Calibration
-    clock : Clock
-        Arrival times against the source's time.
-    clock_of : str
-        The name of the clock of all times, if it is not the source's own.
-    counts : mapping
-        What was received and lost, by cause.
-    verdict : Verdict, or a line
-        What was lost; None if that is not known.
-    remarks : tuple of str
-        What else there is to know: by whose times it is, what was left out, what it was converted from.
-    datagrams : Datagrams
-        The datagrams as received; those of the whole file, even if the recording is a part by time.
-    payload : uint8, shape (bytes,)
-        The board's bytes, for a file that does not record where datagrams begin.
-    version_2 : bool
-        Whether the datagrams are of version 2 of the wire.
-    differences : bool
-        Whether intensities in the datagrams are differences.
-    origin_us : int, us
-        Offset that is added to times in the datagrams.
-    unmarked : tuple of int
-        The numbers of repaired events that the datagrams do not mark as repaired.
-    samples : Samples
-        The lines of a stream of numbers, as received.
-    columns : tuple of str
-        The names of the columns of a stream of numbers; None for a sensor.
-    untimed : bool
-        Whether the pictures have no times: they are numbered, one a us.
-    truncated : bool
-    rebuilt : mapping
-        Counts of damage that the reader skipped or repaired.
-    sources : mapping from str to Contents
-        All sources of the file, including this one; empty if there is only one.
-    lost : tuple of str
-        A line for each kind of information that was lost.
-    """
-
-    path: Path
-    name: str
-    kind: str
-    array: Array
-    label: str = "board"
-    source: str = ""
-    side: str = ""
-    heel: str = ""
-    events: Events | None = None
-    frames: Frames | None = None
-    stretch: tuple[int, int] | None = None
-    held: NDArray[np.uint16] | None = None
-    registers: Registers | None = None
-    register_changes: tuple[tuple[int, Registers], ...] = ()
-    board_changes: tuple[BoardChange, ...] = ()
-    notes: tuple[Note, ...] = ()
-    detections: Detections = field(default_factory=lambda: Detections([], [], []))
-    zeroings: tuple[Zeroing, ...] = ()
-    calibration: Calibration | None = None
-    clock: Clock | None = None
-    clock_of: str | None = None
-    counts: Mapping[str, Any] = field(default_factory=dict)
-    verdict: str | None = None
-    remarks: tuple[str, ...] = ()
-    datagrams: Datagrams | None = None
-    payload: NDArray[np.uint8] | None = None
-    version_2: bool = False
-    differences: bool = False
-    origin_us: int = 0
-    unmarked: tuple[int, ...] = ()
-    samples: Samples | None = None
-    columns: tuple[str, ...] | None = None
-    untimed: bool = False
-    truncated: bool = False
-    rebuilt: Mapping[str, int] = field(default_factory=dict)
-    sources: Mapping[str, Contents] = field(default_factory=dict)
-    lost: tuple[str, ...] = ()
-
-    def __getattribute__(self, name: str) -> Any:
-        value = object.__getattribute__(self, name)
-        return value() if isinstance(value, Once) else value
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Read and return all fields, so that a pickle does not need the file."""
-        return {name: getattr(self, name) for name in FIELDS}
-
-    def holds(self, name: str) -> bool:
-        """Return whether a field holds anything; read no more than necessary."""
-        value = vars(self)[name]
-        return value.holds() if isinstance(value, Once) else anything(value)
-
-    def but(self, **changed: Any) -> Self:
-        """Return the same contents with other values of some fields; read nothing."""
-        return type(self)(**{**vars(self), **changed})
+    origin: parts.Origin
+    sensor: parts.Sensor
+    settings: parts.Settings = field(default_factory=parts.Settings, kw_only=True)
+    marks: parts.Marks = field(default_factory=parts.Marks, kw_only=True)
+    timing: parts.Timing = field(default_factory=parts.Timing, kw_only=True)
+    losses: parts.Losses = field(default_factory=parts.Losses, kw_only=True)
 
     @property
     def has_events(self) -> bool:
-        """Whether it holds events (else pictures); neither is read."""
-        return vars(self)["frames"] is None
+        """Whether it holds events (else frames)."""
+        return isinstance(self, Board)
 
     @property
-    def is_slice(self) -> bool:
-        """Whether it is a part by time; nothing is read."""
-        return vars(self)["stretch"] is not None
+    def table(self) -> Events | Frames:
+        """The events or the frames."""
+        raise NotImplementedError
+
+    def part(self, kind: type[P]) -> P:
+        """Return its part of a type, of which there need not be one; else an empty one."""
+        return next((part for part in parts_of(self).values() if isinstance(part, kind)), None) or kind()
+
+    @property
+    def columns(self) -> tuple[str, ...] | None:
+        """The names of the columns of a stream of numbers; None for a sensor."""
+        return self.lines.columns if isinstance(self, Stream) else None
+
+    @property
+    def untimed(self) -> bool:
+        """Whether its frames are numbered."""
+        return isinstance(self, Pictures) and self.readings.untimed
+
+
+@dataclass(frozen=True, eq=False)
+class Board(Source):
+    """Hold what a board sent."""
+
+    changes: parts.Changes
+    wire: parts.Wire = field(default_factory=parts.Wire)
+
+    @property
+    def table(self) -> Events:
+        """The events."""
+        return self.changes.events()
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures(Source):
+    """Hold frames."""
+
+    readings: parts.Readings
+
+    @property
+    def table(self) -> Frames:
+        """The frames."""
+        return self.readings.frames()
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn(Pictures):
+    """Hold frames that were drawn of a board's events, whose bytes are still there."""
+
+    wire: parts.Wire = field(default_factory=parts.Wire)
+
+
+@dataclass(frozen=True, eq=False)
+class Stream(Pictures):
+    """Hold a stream of numbers, whose lines are frames of one row."""
+
+    lines: parts.Lines
+
+
+@dataclass(frozen=True, eq=False)
+class Several(Source):
+    """Hold what a file of several sensors says as a whole; all that is of a single one refuses to be read."""
+
+    refuse: Callable[[], NoReturn] = field(metadata={"is_part": False})
+    first: Source = field(metadata={"is_part": False})
+    are_frames: bool = field(metadata={"is_part": False})
+
+    @property
+    def has_events(self) -> bool:
+        """Whether its sources are not all of frames by one clock."""
+        return not self.are_frames
+
+    @property
+    def untimed(self) -> bool:
+        """Whether its frames are numbered."""
+        return self.first.untimed
+
+    @property
+    def table(self) -> NoReturn:
+        """Refuse to return a table."""
+        self.refuse()
+
+
+def parts_of(of: Source) -> dict[str, parts.Part]:
+    """Return the parts of a source by the names of its fields."""
+    return {one.name: getattr(of, one.name) for one in fields(of) if one.metadata.get("is_part", True)}
+
+
+def applied(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Callable[[], Iterable[str]] = tuple) -> S:
+    """Return a source with a rule applied to each of its parts.
+
+    Parameters
+    ----------
+    of : Source
+    rule : function
+        Returns the part's successor, of the same type, or None if it is lost, which `Losses.lost` then says.
+    lines : function that returns lines, optional
+        What else is lost.
+    """
+    before = parts_of(of)
+    after = {name: rule(part) for name, part in before.items()}
+    gone = [before[name] for name, part in after.items() if part is None]
+    # Only a part whose fields have defaults may be lost.
+    none: Callable[[str], Any] = lambda name: type(before[name])()  # type: ignore[call-arg]  # noqa: E731
+    kept: dict[str, Any] = {name: none(name) if part is None else part for name, part in after.items()}
+    return saying(replace(of, **kept), lambda: [*(line for part in gone for line in part.lines()), *lines()])
+
+
+def saying(of: S, lines: Callable[[], Iterable[str]]) -> S:
+    """Return a source with further lines of what is lost, without duplicates."""
+    lost = Once(lambda: tuple(dict.fromkeys((*of.losses.lost(), *lines()))))
+    return replace(of, losses=replace(of.losses, lost=lost))
+
+
+def source_from(
+    table: Events | Frames,
+    origin: parts.Origin | None = None,
+    *,
+    untimed: bool = False,
+    turned: float | None = None,
+    columns: Sequence[str] = (),
+    **header: Any,
+) -> Board | Pictures:
+    """Return a source of a table.
+
+    Parameters
+    ----------
+    table : Events or Frames
+    origin : Origin, optional
+    untimed, turned : bool, float
+        As of `Readings`.
+    columns : sequence of str
+        Of a stream of numbers, as of `Lines`.
+    **header
+        Its other parts; default: a sensor of the table's array alone.
+    """
+    origin = parts.Origin() if origin is None else origin
+    sensor = header.pop("sensor", None) or parts.Sensor(table.array)
+    if isinstance(table, Events):
+        return Board(origin, sensor, parts.Changes(known(table)), **header)
+    readings = parts.Readings(known(table), untimed, turned)
+    if columns:
+        return Stream(origin, sensor, readings, parts.Lines(tuple(columns)), **header)
+    return Pictures(origin, sensor, readings, **header)
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """Hold what an opened recording holds.
+
+    Parameters
+    ----------
+    one : Source
+        Its only source, the chosen one, the only board beside streams of numbers, or `Several`.
+    sources : mapping from str to Source
+        All sources of the file by their names.
+    """
+
+    one: Source
+    sources: Mapping[str, Source]
+
+    @classmethod
+    def of(cls, source: Source) -> Contents:
+        """Return a recording of one source."""
+        return cls(source, {source.origin.label: source})
+
+    def others(self) -> list[str]:
+        """Return what is lost without the other sources."""
+        return [f"the source {name}" for name in self.sources if name != self.one.origin.label]
 
     @property
     def is_several(self) -> bool:
         """Whether these are the contents of a file of several boards as a whole."""
-        return not self.label
-
-    @property
-    def table(self) -> Events | Frames:
-        """The events or the pictures."""
-        table = self.events if self.has_events else self.frames
-        assert table is not None  # each reader sets one of the two
-        return table
+        return isinstance(self.one, Several)
 
 
-#: The names of the fields, in their order.
-FIELDS = tuple(one.name for one in fields(Contents))
+def alone(sources: Mapping[str, Source]) -> Contents:
+    """Return the contents of a file: those of its only source or its only sensor; else those of `several`.
+
+    The verdict is that of all sources.
+    """
+    boards = [one for one in sources.values() if not isinstance(one, Stream)]
+    if len(sources) == 1:
+        return Contents(next(iter(sources.values())), sources)
+    if len(boards) != 1:
+        return Contents(several(sources), sources)
+    losses = replace(boards[0].losses, verdict=Once(lambda: _verdict(sources)))
+    return Contents(replace(boards[0], losses=losses), sources)
 
 
-def several(sources: Mapping[str, Contents]) -> Contents:
-    """Return the contents of a file of several sensors; fields of a single one raise an error."""
+def several(sources: Mapping[str, Source]) -> Several:
+    """Return the contents of a file of several sensors as a whole; parts of a single one raise an error."""
     first = next(iter(sources.values()))
-    pictures = together(sources)
-    names = ", ".join(sources)
+    path, names = first.origin.path, ", ".join(sources)
 
-    def refuse() -> Any:
+    def refuse() -> NoReturn:
         raise ProblemError(
-            f"{first.path}: holds {len(sources)} sources ({names}); say which, as "
-            f"recording.sources[{next(iter(sources))!r}]; taxel convert --source NAME writes one to a file of its own"
+            f"{path}: holds {len(sources)} sources ({names}); say which, as recording.sources["
+            f"{next(iter(sources))!r}]; taxel convert --source NAME writes one to a file of its own"
         )
 
-    of_one_board = [
-        *("events", "held", "registers", "register_changes", "board_changes", "zeroings", "clock", "calibration"),
-        *("datagrams", "payload", "samples", "version_2", *(["frames"] if pictures else [])),
-    ]
-    return Contents(
-        **{name: once(refuse) for name in of_one_board},
-        **{name: getattr(first, name) for name in ("path", "kind", "array", "source")},
+    no: Once[Any] = Once(refuse)
+    every = [one.losses for one in sources.values()]
+    return Several(
         # A source is named after its file and itself.
-        name=first.name.removesuffix(f" {first.label}"),
-        label="",
-        untimed=first.untimed,
-        notes=once(lambda: first.notes),
-        detections=once(lambda: first.detections),
-        counts=once(lambda: {name: one.counts for name, one in sources.items()}),
-        verdict=once(lambda: _verdict(sources)),
-        remarks=once(lambda: named([(name, one.remarks) for name, one in sources.items()])),
-        truncated=once(lambda: any(one.truncated for one in sources.values())),
-        lost=once(lambda: tuple(dict.fromkeys(line for one in sources.values() for line in one.lost))),
-        clock_of=first.clock_of,
-        sources=sources,
+        replace(first.origin, name=first.origin.name.removesuffix(f" {first.origin.label}"), label=""),
+        parts.Sensor(first.sensor.array, calibration=no),
+        refuse,
+        first,
+        are_frames=together(sources),
+        settings=parts.Settings(held=no, registers=no, register_changes=no),
+        marks=replace(first.marks, board_changes=no, zeroings=no),
+        timing=parts.Timing(no, first.timing.clock_of),
+        losses=parts.Losses(
+            counts=Once(lambda: {name: one.losses.counts() for name, one in sources.items()}),
+            verdict=Once(lambda: _verdict(sources)),
+            remarks=named([(name, one.losses.remarks) for name, one in sources.items()]),
+            truncated=any(one.truncated for one in every),
+            lost=Once(lambda: tuple(dict.fromkeys(line for one in every for line in one.lost()))),
+        ),
     )
 
 
-def _verdict(sources: Mapping[str, Contents]) -> Verdict | None:
+def _verdict(sources: Mapping[str, Source]) -> Verdict | None:
     """Return what several sources lost, as far as they say it."""
-    said = [(name, one.verdict) for name, one in sources.items() if one.verdict is not None]
-    return Verdict._of_sources(said) if said else None
+    said = [(name, one.losses.verdict()) for name, one in sources.items()]
+    each = [(name, verdict) for name, verdict in said if verdict is not None]
+    return Verdict._of_sources(each) if each else None
 
 
 def named(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:
@@ -284,17 +275,11 @@ def named(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(f"{name}: {line}" for name, lines in remarks for line in lines))
 
 
-def together(sources: Mapping[str, Contents]) -> bool:
-    """Return whether sources share one clock: pictures without arrival times, as those of two feet."""
-    return all(not one.has_events and one.samples is None and not one.holds("clock") for one in sources.values())
-
-
-def alone(sources: Mapping[str, Contents]) -> Contents:
-    """Return the contents of a file: those of its only source or its only sensor; else those of `several`.
-
-    The verdict is that of all sources.
-    """
-    boards = [one for one in sources.values() if vars(one)["columns"] is None]
-    if len(sources) == 1:
-        return next(iter(sources.values()))
-    return boards[0].but(verdict=once(lambda: _verdict(sources))) if len(boards) == 1 else several(sources)
+def together(sources: Mapping[str, Source]) -> bool:
+    """Return whether sources share one clock: frames without arrival times, as those of two feet."""
+    return all(
+        not one.has_events
+        and not (isinstance(one, Stream) and one.lines.samples.holds())
+        and not one.timing.clock.holds()
+        for one in sources.values()
+    )

@@ -19,16 +19,17 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
-from taxel.recording.csv import write_csv
-from taxel.recording.h5 import write_h5
+from taxel.recording.contents import Board, Contents, Source, Stream, source_from
 from taxel.recording.kinds import ENDINGS
-from taxel.recording.npz import write_npz
 from taxel.recording.opening import open_recording
+from taxel.recording.parts import Wire
 from taxel.recording.pictures import period_us, pictures
 from taxel.recording.recording import Recording
 from taxel.recording.stored import is_made, stored
+from taxel.recording.write_csv import write_csv
+from taxel.recording.write_h5 import write_h5
 from taxel.recording.write_mcap import write_mcap
+from taxel.recording.write_npz import write_npz
 
 __all__ = ["KINDS", "convert"]
 
@@ -94,30 +95,28 @@ def convert(
     if frames_hz is not None:
         if isinstance(source, Frames):
             raise ProblemError("frames_hz: pictures keep their own times; open the file and ask it for frames(rate_hz)")
-        whole = pictures(whole, frames_hz, name="frames_hz")
+        whole = Contents(pictures(whole.one, frames_hz, name="frames_hz"), whole.sources)
     written = stored(whole, place)
-    lost = list(written.lost)
+    one, lost = written.one, list(written.one.losses.lost())
     match kind:
         case ".lsa":
-            assert written.payload is not None  # `stored` sets it
-            _write_lsa(place, written.payload.tobytes(), overwrite)
+            _write_lsa(place, one, overwrite)
         case ".npz":
-            write_whole(place, lambda file: write_npz(file, written), overwrite=overwrite)
+            write_whole(place, lambda file: write_npz(file, one), overwrite=overwrite)
         case ".csv":
-            write_whole(place, lambda file: write_csv(file, written), overwrite=overwrite)
+            write_whole(place, lambda file: write_csv(file, one.table), overwrite=overwrite)
         case ".h5":
-            write_h5(place, written, overwrite=overwrite)
+            write_h5(place, one, overwrite=overwrite)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                sources = {written.label: (whole, written)}
-                if written.is_several:
-                    sources = {name: (whole.sources[name], one) for name, one in written.sources.items()}
-                write_mcap(part, written, compression, {name: _counts(*both) for name, both in sources.items()})
-                lost += _read_otherwise(part, whole)
+                before = whole.sources if written.is_several else {one.origin.label: whole.one}
+                counts = {name: _counts(before[name], source) for name, source in written.sources.items()}
+                write_mcap(part, written, compression, counts)
+                lost += _read_otherwise(part, whole.one)
     return lost
 
 
-def _write_lsa(place: Path, payload: bytes, overwrite: bool) -> None:
+def _write_lsa(place: Path, of: Source, overwrite: bool) -> None:
     """Write a `.lsa` and its `.lss` whole; until then an older pair stays as it is."""
     done = place.with_suffix(".lss")
     if not overwrite and os.path.lexists(done):
@@ -127,7 +126,9 @@ def _write_lsa(place: Path, payload: bytes, overwrite: bool) -> None:
         tempfile.TemporaryDirectory(dir=place.parent, prefix=f".{place.name}.") as folder,
     ):
         made = Path(folder) / "made.lsa"
-        _core.write_lsa(made, payload)
+        payload = of.part(Wire).payload
+        assert payload is not None  # `stored` sets it
+        _core.write_lsa(made, payload.tobytes())
         os.replace(made, part)
     write_whole(done, lambda _: None, overwrite=True)
 
@@ -139,32 +140,32 @@ def _contents(source: object) -> Contents:
         return source._contents
     if not isinstance(source, Events | Frames):
         raise ProblemError(f"source is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
-    events, frames = (source, None) if isinstance(source, Events) else (None, source)
-    return Contents(Path(), "", "events", source.array, events=events, frames=frames)
+    return Contents.of(source_from(source))
 
 
-def _counts(of: Contents, written: Contents) -> dict[str, Any]:
+def _counts(of: Source, written: Source) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
-    if of.samples is not None:
-        return {"received": len(of.samples)}
-    if of.kind == "events":
+    samples = of.lines.samples() if isinstance(of, Stream) else None
+    if samples is not None:
+        return {"received": len(samples)}
+    received = len(written.wire.datagrams() or ()) if isinstance(written, Board) else len(written.table)
+    if of.origin.kind == "events":
         # Nothing is missing of what was made here.
-        return {"received": len((written.datagrams or ()) if written.has_events else written.table), "missing": 0}
-    if not written.has_events:
-        return {"received": len(written.table)}
-    counts = of.counts
+        return {"received": received, "missing": 0}
+    if not isinstance(written, Board):
+        return {"received": received}
+    counts = of.losses.counts()
     known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
     decoder = counts.get("decoder")
     damage = json.loads(_core.recording_damage(json.dumps(decoder))) if decoder else {}
     return {**known, "decoder": damage}
 
 
-def _read_otherwise(part: Path, of: Contents) -> list[str]:
+def _read_otherwise(part: Path, of: Source) -> list[str]:
     """Return a line if copied datagrams decode to other events than the recording's."""
-    if not of.has_events or is_made(of):
+    if not isinstance(of, Board) or is_made(of):
         return []
-    events = of.events
-    assert events is not None  # it has events
+    events = of.table
     again = Events._from_parts(
         _core.RecordingReader(part, limits.memory(None), False).decode("direct")[0], events.array
     )

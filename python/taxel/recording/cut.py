@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import assert_never
+
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
 from taxel.events import Events
-from taxel.recording.contents import Contents, once
-from taxel.recording.fates import after
-from taxel.recording.notes import Zeroing
+from taxel.recording import parts
+from taxel.recording.changes import Zeroing
+from taxel.recording.contents import Contents, applied
+from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 
 __all__ = ["cut", "region"]
@@ -69,15 +74,15 @@ def cut(
     whole = (start_us, stop_us) == (-np.inf, np.inf)
     stretch = recording if whole else recording.between(start_us, stop_us)
     if label is None:
-        parts = [stretch]
+        pieces = [stretch]
     else:
         text("label", label)
         times = [note.t for note in stretch.notes if note.text == label and note.t is not None]
-        parts = [stretch.between(t - around[0], t + around[1]) for t in times]
+        pieces = [stretch.between(t - around[0], t + around[1]) for t in times]
     if columns is None and rows is None:
-        return parts
+        return pieces
     across, down = (slice(None) if chosen is None else chosen for chosen in (columns, rows))
-    return [Recording(region(part._contents, across, down)) for part in parts]
+    return [Recording(region(part._contents, across, down)) for part in pieces]
 
 
 def _asked(chosen: slice) -> str:
@@ -91,7 +96,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
     ------
     ProblemError : an end beyond the array, no taxel in the rectangle, or the file holds several boards
     """
-    array = of.array
+    array = of.one.sensor.array
     (left, right), (top, bottom) = array.region(columns, rows)
     for name, chosen, count in (("columns", columns, array.columns), ("rows", rows, array.rows)):
         if any(not -count <= end <= count for end in (chosen.start, chosen.stop) if end is not None):
@@ -107,34 +112,46 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
         return of
     if of.is_several:
         # Reading the events raises the error that lists the sources.
-        _ = of.events
+        _ = of.one.table
     small = array._part(columns, rows)
 
-    def events() -> Events | None:
-        if of.events is None:
-            return None
-        inside = of.events.region(columns, rows)
+    def events(whole: Events) -> Events:
+        inside = whole.region(columns, rows)
         x, y = (inside.x - np.uint16(left)), (inside.y - np.uint16(top))
         ticks, present, repaired = inside.intensity, inside.present, inside.repaired
-        return Events._unchecked(inside.t, x, y, inside.p, small, ticks, present, repaired, of.events.markers)
+        return Events._unchecked(inside.t, x, y, inside.p, small, ticks, present, repaired, whole.markers)
 
-    return after(
-        "region",
-        of,
-        array=small,
-        events=once(events) if of.has_events else None,
-        frames=None if of.has_events else once(lambda: of.frames and of.frames.region(columns, rows)),
-        held=once(lambda: None if of.held is None else np.ascontiguousarray(of.held[top:bottom, left:right])),
-        zeroings=once(
-            lambda: tuple(
-                Zeroing(z.t, z.x - left, z.y - top, z.rest, z.before)
-                for z in of.zeroings
-                if left <= z.x < right and top <= z.y < bottom
-            )
-        ),
-        calibration=once(
-            lambda: None if of.calibration is None else of.calibration._region(columns, rows),
-            lambda: of.holds("calibration"),
-        ),
-        columns=None if of.columns is None else of.columns[left:right],
-    )
+    def zeroings(every: tuple[Zeroing, ...]) -> tuple[Zeroing, ...]:
+        inside = (z for z in every if left <= z.x < right and top <= z.y < bottom)
+        return tuple(Zeroing(z.t, z.x - left, z.y - top, z.rest, z.before) for z in inside)
+
+    def rule(part: parts.Part) -> parts.Part | None:  # noqa: PLR0911  one a type
+        match part:
+            case parts.Origin() | parts.Timing() | parts.Losses():
+                return part
+            case parts.Sensor():
+                calibration = part.calibration.to(lambda whole: None if whole is None else whole._region(columns, rows))
+                return parts.Sensor(small, part.side, part.heel, calibration)
+            case parts.Settings():
+                held = Once(lambda: _cropped(part.held(), top, bottom, left, right))
+                return parts.Settings(held, part.registers, part.register_changes)
+            case parts.Marks():
+                return replace(part, zeroings=Once(lambda: zeroings(part.zeroings())))
+            case parts.Changes():
+                return parts.Changes(Once(lambda: events(part.events())))
+            case parts.Readings():
+                return replace(part, frames=Once(lambda: part.frames().region(columns, rows)))
+            case parts.Lines():
+                return parts.Lines(part.columns[left:right])
+            case parts.Wire():
+                return None
+            case _:
+                assert_never(part)
+
+    return Contents.of(applied(of.one, rule, lambda: [*of.one.part(parts.Lines).received(), *of.others()]))
+
+
+def _cropped(
+    held: NDArray[np.uint16] | None, top: int, bottom: int, left: int, right: int
+) -> NDArray[np.uint16] | None:
+    return None if held is None else np.ascontiguousarray(held[top:bottom, left:right])

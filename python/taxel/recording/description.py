@@ -4,74 +4,83 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel._base import limits
-from taxel._base.arguments import flag, number, text, whole
+from taxel._base.arguments import finite, flag, number, text, whole
 from taxel._base.documents import memory_of_json, of_json
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.detections import Detections
-from taxel.formats.checks import sensor
+from taxel.events import Events
+from taxel.formats.checks import sensor as checked
+from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.contents import Contents
+from taxel.recording import parts
+from taxel.recording.changes import BoardChange, Zeroing
+from taxel.recording.contents import Pictures, Source, source_from
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import BoardChange, Zeroing
+from taxel.recording.once import known
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = [
-    "about_of", "array_of", "board_changes_of", "counts_of", "detections_of", "json_of", "notes_of", "zeroings_of",
+    "about_of", "array_of", "board_changes_of", "counts_of", "described_source", "detections_of", "json_of",
+    "notes_of", "turned_of", "zeroings_of",
 ]  # fmt: skip
 
 
-def json_of(contents: Contents) -> str:
+def json_of(of: Source) -> str:
     """Return all fields that are not columns of the table, as the JSON in files.
 
     Raises
     ------
     ProblemError : a description that would not be read again, as it takes too much memory
     """
-    registers = contents.registers
-    changes = contents.register_changes
-    driven = registers.array if registers is not None else changes[0][1].array if changes else contents.array
+    sensor, losses = of.sensor, of.losses
+    registers, changes = of.settings.registers(), of.settings.register_changes()
+    driven = registers.array if registers is not None else changes[0][1].array if changes else sensor.array
     document: dict[str, Any] = {
-        "array": contents.array._geometry(),
-        "source": contents.source,
-        "side": contents.side,
-        "heel": contents.heel,
+        "array": sensor.array._geometry(),
+        "source": of.origin.source,
+        "side": sensor.side,
+        "heel": sensor.heel,
         "registers": None if registers is None else json.loads(registers._json()),
-        "registers_array": None if driven == contents.array else driven._geometry(),
+        "registers_array": None if driven == sensor.array else driven._geometry(),
         "register_changes": [[at, json.loads(held._json())] for at, held in changes],
-        "board_changes": [[change.at_ns, change._described()] for change in contents.board_changes],
-        "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in contents.notes],
+        "board_changes": [[change.at_ns, change._described()] for change in of.marks.board_changes()],
+        "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in of.marks.notes()],
         "detections": [
-            [0, d.label, d.t, d.known, None if np.isnan(d.slope) else d.slope, d.repaired] for d in contents.detections
+            [0, d.label, d.t, d.known, None if np.isnan(d.slope) else d.slope, d.repaired]
+            for d in of.marks.detections()
         ],
-        "counts": dict(contents.counts),
-        "verdict": None if contents.verdict is None else verdict_of(contents).to_dict(),
-        "remarks": contents.remarks,
-        "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in contents.zeroings],
-        "columns": contents.columns,
-        "untimed": contents.untimed,
-        "truncated": contents.truncated,
-        "rebuilt": dict(contents.rebuilt),
-        "lost": contents.lost,
+        "counts": dict(losses.counts()),
+        "verdict": None if losses.verdict() is None else verdict_of(of).to_dict(),
+        "remarks": losses.remarks,
+        "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in of.marks.zeroings()],
+        "columns": of.columns,
+        "untimed": of.untimed,
+        "turned": of.readings.turned if isinstance(of, Pictures) else None,
+        "truncated": losses.truncated,
+        "rebuilt": dict(losses.rebuilt()),
+        "lost": losses.lost(),
     }
-    described = json.dumps({name: value for name, value in document.items() if value})
+    described = json.dumps({name: value for name, value in document.items() if value or isinstance(value, float)})
     if (size := memory_of_json(described)) > limits.ABOUT:
         raise ProblemError(
-            f"{contents.name}: its description (sensor, notes, registers, detections) takes {size} bytes of memory; a "
+            f"{of.origin.name}: its description (sensor, notes, registers, detections) takes {size} bytes of memory; a "
             f".npz and a .h5 hold at most {limits.ABOUT}"
         )
     return described
 
 
 def about_of(place: str, document: str) -> dict[str, Any]:
-    """Return the fields of `Contents` that a file's ``about`` holds, checked.
+    """Return what a file's ``about`` holds by its entries, checked.
 
     Raises
     ------
@@ -80,7 +89,7 @@ def about_of(place: str, document: str) -> dict[str, Any]:
     entry = "the whole"
     fields: dict[str, Any] = {}
     try:
-        about = of_json(place, document, limits.ABOUT, room=limits.ABOUT, with_nan=True)
+        about = of_json(place, document, limits.ABOUT, room=limits.ABOUT)
         if not isinstance(about, dict):
             raise ProblemError("no object")
         for entry, read in _ENTRIES.items():
@@ -97,6 +106,37 @@ def about_of(place: str, document: str) -> dict[str, Any]:
     return fields
 
 
+def described_source(
+    table: Events | Frames, held: NDArray[np.uint16] | None, origin: parts.Origin, about: Mapping[str, Any]
+) -> Source:
+    """Return a source of a table and of what `about_of` read; its sensor is that of the table."""
+    get = about.get
+    none = Detections([], [], [])
+    return source_from(
+        table,
+        replace(origin, source=get("source", "")),
+        untimed=get("untimed", False),
+        turned=get("turned"),
+        columns=get("columns", ()),
+        sensor=parts.Sensor(table.array, get("side", ""), get("heel", "")),
+        settings=parts.Settings(known(held), known(get("registers")), known(get("register_changes", ()))),
+        marks=parts.Marks(
+            board_changes=known(get("board_changes", ())),
+            notes=known(get("notes", ())),
+            detections=known(get("detections", none)),
+            zeroings=known(get("zeroings", ())),
+        ),
+        losses=parts.Losses(
+            counts=known(get("counts", {})),
+            verdict=known(get("verdict")),
+            remarks=get("remarks", ()),
+            truncated=get("truncated", False),
+            rebuilt=known(get("rebuilt", {})),
+            lost=known(get("lost", ())),
+        ),
+    )
+
+
 def array_of(geometry: Mapping[str, Any]) -> Array:
     """Return the sensor that a file describes."""
     if not isinstance(geometry, Mapping):
@@ -110,11 +150,10 @@ def notes_of(records: Any) -> tuple[Note, ...]:
 
 
 def detections_of(records: Any) -> Detections:
-    """Return detections from records of (host ns, label, t, known, slope[, repaired]); JSON has no NaN."""
+    """Return detections from records of (host ns, label, t, known, slope, repaired); JSON has no NaN."""
     rows = list(records)
     slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
-    repaired = [row[5] if len(row) > 5 else False for row in rows]
-    label, t, known = ([row[k] for row in rows] for k in (1, 2, 3))
+    label, t, known, repaired = ([row[k] for row in rows] for k in (1, 2, 3, 5))
     return Detections._of(label, t, known, slopes, repaired=repaired)
 
 
@@ -168,6 +207,11 @@ def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
     }
 
 
+def turned_of(value: Any) -> float:
+    """Return the number that readings were subtracted from, as a file states it."""
+    return finite("turned", value, least=-limits.VALUE, most=limits.VALUE)
+
+
 def _texts(texts: Any) -> tuple[str, ...]:
     if not isinstance(texts, list):
         raise ProblemError("no list")
@@ -176,22 +220,22 @@ def _texts(texts: Any) -> tuple[str, ...]:
 
 #: The reader of each entry by name; registers are checked later, as the array that they drive is another entry.
 _ENTRIES: dict[str, Any] = {
-    "array": lambda value, place: sensor(place, array_of(value)),
+    "array": lambda value, place: checked(place, array_of(value)),
     "source": lambda value, _: text("source", value),
     "side": lambda value, _: text("side", value, ("left", "right")),
     "heel": lambda value, _: text("heel", value, ("top", "bottom")),
     "registers": lambda value, _: value,
-    "registers_array": lambda value, place: sensor(place, array_of(value)),
+    "registers_array": lambda value, place: checked(place, array_of(value)),
     "register_changes": lambda value, _: value,
     "board_changes": lambda value, _: board_changes_of(value),
     "notes": lambda value, _: notes_of(value),
     "detections": lambda value, _: detections_of(value),
     "counts": lambda value, _: counts_of(value),
-    # Earlier versions wrote its line alone.
-    "verdict": lambda value, _: Verdict(value) if isinstance(value, str) else Verdict.from_dict(value),
+    "verdict": lambda value, _: Verdict.from_dict(value),
     "remarks": lambda value, _: _texts(value),
     "zeroings": lambda value, _: zeroings_of(value),
     "columns": lambda value, _: _texts(value),
+    "turned": lambda value, _: turned_of(value),
     "untimed": lambda value, _: flag("untimed", value),
     "truncated": lambda value, _: flag("truncated", value),
     "rebuilt": lambda value, _: counts_of(value),

@@ -8,7 +8,7 @@ from taxel._base.files import open_file
 from taxel._core import FormatError
 from taxel.formats.layout import advice
 from taxel.formats.ros import is_bag
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Source
 from taxel.recording.verdict import Verdict
 
 __all__ = ["ENDINGS", "LABELS", "is_label_table", "is_own_table", "kind_of", "kind_of_file", "verdict_of"]
@@ -74,12 +74,10 @@ def kind_of_file(kind: str) -> str:
 _OTHERS = {"arrays": "file of arrays", "table": "table", "ros": "ROS bag"}
 
 
-def verdict_of(contents: Contents) -> Verdict:
+def verdict_of(source: Source) -> Verdict:
     """Return what was lost of a recording, or that its file does not say it."""
-    verdict = contents.verdict
-    if verdict is None:
-        return Verdict._of({"silent": kind_of_file(contents.kind)})
-    return verdict if isinstance(verdict, Verdict) else Verdict(verdict)
+    verdict = source.losses.verdict()
+    return Verdict._of({"silent": kind_of_file(source.origin.kind)}) if verdict is None else verdict
 
 
 def kind_of(path: Path) -> str:

@@ -18,7 +18,9 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.layout import Layout, packaged
 from taxel.frames import Frames
-from taxel.recording.contents import Contents, alone, once
+from taxel.recording.contents import Board, Contents, Pictures, S, Source, Stream, alone
+from taxel.recording.once import known
+from taxel.recording.parts import Changes, Readings
 from taxel.recording.pictures import times_at
 
 __all__ = ["check_size", "laid_out", "on_array"]
@@ -39,58 +41,83 @@ def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
         raise ProblemError(f"array: {array.rows} x {array.columns} taxels; {path} holds pictures of {held}")
 
 
-def on_array(of: Contents, array: Array) -> Contents:
-    """Return the same recording on another description of its sensor, of as many taxels; their names stay."""
-    if array.names is None and of.array.names is not None:
-        array = replace(array, names=of.array.names)
+def on_array(of: S, array: Array) -> S:
+    """Return the same source on another description of its sensor, of as many taxels; their names stay."""
+    if array.names is None and of.sensor.array.names is not None:
+        array = replace(array, names=of.sensor.array.names)
 
-    def events() -> Events | None:
-        if of.events is None:
-            return None
-        same = of.events[:]
+    def events(own: Events) -> Events:
+        same = own[:]
         same.array = array
         return same
 
-    if of.has_events:
-        return of.but(array=array, events=once(events))
+    def frames(own: Frames) -> Frames:
+        return Frames(own.values.reshape(-1, *array.shape), own.t, unit=own.unit, array=array)
 
-    def frames() -> Frames | None:
-        own = of.frames
-        return own and Frames(own.values.reshape(-1, *array.shape), own.t, unit=own.unit, array=array)
+    same = replace(of, sensor=replace(of.sensor, array=array))
+    if isinstance(same, Board):
+        return replace(same, changes=Changes(same.changes.events.to(events)))
+    if isinstance(same, Pictures):
+        return replace(same, readings=replace(same.readings, frames=same.readings.frames.to(frames)))
+    return same
 
-    return of.but(array=array, frames=once(frames))
 
+def laid_out(of: Contents, layout: Layout, *, given: bool) -> Contents:
+    """Return a recording with what its layout says of it; it says nothing of streams of numbers.
 
-def laid_out(of: Contents, layout: Layout) -> Contents:
-    """Return a recording with what its layout says of it.
+    Parameters
+    ----------
+    of : Contents
+    layout : Layout
+    given : bool
+        Whether it was named for this recording; else it lies beside it, and fills only what a file that states its
+        sensor lacks.
 
     Raises
     ------
     FormatError : the layout is of another number of taxels, or contradicts the file (names the layout)
     """
-    if of.sources:
-        sources = {n: one if one.columns else laid_out(one.but(sources={}), layout) for n, one in of.sources.items()}
-        for name, one in sources.items():
-            sources[name] = one.but(sources=sources)
-        return alone(sources)
+    return alone(
+        {
+            name: one if isinstance(one, Stream) else _laid_out(one, layout, given=given)
+            for name, one in of.sources.items()
+        }
+    )
+
+
+def _laid_out(of: Source, layout: Layout, *, given: bool) -> Source:
+    """Return a source with what its layout says of it."""
+    kind, name, own = of.origin.kind, of.origin.name, of.sensor
+    strict = given or kind not in _STATING
     try:
         array = _array(of, layout)
     except ProblemError as error:
-        raise FormatError(f"{layout.place}: {of.name}: {first_line(error)}") from None
-    same = of if array == of.array else on_array(of, array)
-    if (layout.falls is not False or layout.unit or layout.rate_hz) and same.has_events:
-        raise FormatError(f"{layout.place}: {of.name} holds events; falls, unit and rate_hz are of pictures")
-    if not same.has_events and same.frames is not None:
-        # Read at once, so that a layout that contradicts the file is refused where the file is opened.
-        same = same.but(frames=_read(same.frames, layout, of.name, is_alone=of.kind in _ALONE))
+        if strict:
+            raise FormatError(f"{layout.place}: {name}: {first_line(error)}") from None
+        array = own.array
+    if strict and own.heel and layout.heel not in ("", own.heel):
+        raise FormatError(f"{layout.place}: says heel {layout.heel}; {name} says {own.heel}")
+    same = of if array == own.array else on_array(of, array)
+    same = replace(same, sensor=replace(same.sensor, side=own.side or layout.side, heel=own.heel or layout.heel))
+    if not isinstance(same, Pictures):
+        if strict and (layout.turned is not None or layout.unit or layout.rate_hz):
+            raise FormatError(f"{layout.place}: {name} holds events; falls, unit and rate_hz are of pictures")
+        return same
+    was = same.readings.turned
+    if strict and was is not None and layout.falls is not None and layout.turned != was:
+        said = "false" if layout.turned is None else f"{layout.turned:g}"
+        raise FormatError(f"{layout.place}: says falls = {said}; the readings of {name} were turned by falls = {was:g}")
+    full = layout.turned if was is None else None
+    # Read at once, so that a layout that contradicts the file is refused where the file is opened.
+    frames = _read(same.table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
     untimed = same.untimed and layout.rate_hz is None
-    return same.but(side=of.side or layout.side, heel=layout.heel or of.heel, untimed=untimed)
+    return replace(same, readings=Readings(known(frames), untimed, was if full is None else full))
 
 
-def _array(of: Contents, layout: Layout) -> Array:
+def _array(of: Source, layout: Layout) -> Array:
     """Return the sensor of a recording as its layout says, which may not contradict the file."""
-    own = of.array
-    array = layout.array(own.rows * own.columns, own, of.side)
+    own, kind = of.sensor.array, of.origin.kind
+    array = layout.array(own.rows * own.columns, own, of.sensor.side)
     if of.has_events and array.shape != own.shape:
         raise ProblemError(f"says {array.rows} x {array.columns} taxels; its events are of {own.rows} x {own.columns}")
     if min(own.shape) > 1 and array.shape != own.shape:
@@ -98,7 +125,7 @@ def _array(of: Contents, layout: Layout) -> Array:
     if not array._is_measured:
         kept = own if array.shape == own.shape else replace(array, pitch_mm=own.pitch_mm, name=own.name)
         return kept if own.places is None or array.shape == own.shape else array
-    along = own.places is not None and of.kind in _ALONG and own.places == _places_along(of)
+    along = own.places is not None and kind in _ALONG and own.places == _places_along(of)
     if own._is_measured and not along and (own.pitch_mm, own.places) != (array.pitch_mm, array.places):
         raise ProblemError(f"says taxels {array._apart()}; the file says {own._apart()}")
     return array
@@ -108,35 +135,39 @@ def _array(of: Contents, layout: Layout) -> Array:
 _ALONG = ("gaitpdb",)
 
 
-def _places_along(of: Contents) -> object:
-    return packaged(of.kind).array(of.array.columns, of.array, of.side).places
+def _places_along(of: Source) -> object:
+    return packaged(of.origin.kind).array(of.sensor.array.columns, of.sensor.array, of.sensor.side).places
 
 
 #: Kinds of files of one recording, whose times no other one has.
 _ALONE = ("table", "arrays", "npz", "h5", "csv")
 
 
-def _read(own: Frames, layout: Layout, name: str, *, is_alone: bool) -> Frames:
-    """Return pictures in the unit, at the rate and in the direction that a layout says.
+#: Kinds of files that state their sensor, unit, times, and whether readings were turned, as far as these are known.
+_STATING = ("mcap", "npz", "h5")
 
-    No other code holds these pictures yet, so that `own` is changed in place: its times only if it is alone in its
-    file.
+
+def _read(own: Frames, layout: Layout, full: float | None, name: str, *, is_alone: bool, strict: bool) -> Frames:
+    """Return pictures in the unit and at the rate that a layout says, turned to `full` less the reading if it is given.
+
+    If it is not `strict`, the unit and the times of the file stay where it has them. No other code holds these pictures
+    yet, so that `own` is changed in place: its times only if it is alone in its file.
     """
     unit, t, values = own.unit, own.t, own.values
     if layout.unit is not None:
-        if unit not in (*_UNSAID, layout.unit):
+        if unit in _UNSAID:
+            unit = layout.unit
+        elif strict and unit != layout.unit:
             raise FormatError(f"{layout.place}: says unit {layout.unit}; {name} is in {unit}")
-        unit = layout.unit
     if layout.rate_hz is not None:
         if _are_numbers(t):
             try:
                 t = _times_at(layout.rate_hz, _writable(t) if is_alone else np.empty_like(t))
             except ProblemError as error:
                 raise FormatError(f"{layout.place}: {name}: {error}") from None
-        elif len(t) > 1 and abs(layout.rate_hz * (step := _median_step(t)) / 1e6 - 1) > _SLACK:
+        elif strict and len(t) > 1 and abs(layout.rate_hz * (step := _median_step(t)) / 1e6 - 1) > _SLACK:
             raise FormatError(f"{layout.place}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
-    if layout.falls is not False:
-        full = 0.0 if layout.falls is True else layout.falls
+    if full is not None:
         values = _writable(values)
         step = max(1, _PIECE // max(1, values[:1].size))
         for begin in range(0, len(values), step):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +21,20 @@ from taxel.detections import Detections
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.contents import UNKNOWN, Contents, anything, named
-from taxel.recording.fates import after
+from taxel.recording import parts
+from taxel.recording.changes import BoardChange, Zeroing
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, named, saying
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import Zeroing
+from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = ["merge", "merged"]
+
+T = TypeVar("T")
+#: What has a time of its own.
+M = TypeVar("M", Note, BoardChange)
 
 
 def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, beside: bool = False) -> Recording:
@@ -66,140 +73,219 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
     >>> both.events == events, [note.t for note in both.notes], both.lost
     (True, [0, 200], ())
     """
-    parts = [instance("recordings", part, Recording) for part in several("recordings", recordings)]
+    sources = [instance("recordings", part, Recording) for part in several("recordings", recordings)]
     flag("beside", beside)
     gap = None if gap_us is None else number("gap_us", gap_us)
     if gap is not None and not 0 <= gap < 2**52:
         raise ProblemError(f"gap_us is {shown(gap_us)}: must be 0 or more")
-    if not parts:
+    if not sources:
         raise ProblemError("recordings: there must be one or more")
-    return Recording(merged([part._contents for part in parts], gap, beside=beside))
+    return Recording(merged([part._contents for part in sources], gap, beside=beside))
 
 
-def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
+def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
-    if len({part.has_events for part in parts}) > 1:
-        ours, other = parts[0], next(part for part in parts if part.has_events != parts[0].has_events)
-        of_events, of_pictures = (ours, other) if ours.has_events else (other, ours)
+    sources = [recording.one for recording in recordings]
+    if len({part.has_events for part in sources}) > 1:
+        other = next(part for part in sources if part.has_events != sources[0].has_events)
+        events, pictures = (sources[0], other) if sources[0].has_events else (other, sources[0])
         raise ProblemError(
-            f"recordings: {of_events.name} holds events, {of_pictures.name} pictures; convert one of them first"
+            f"recordings: {events.origin.name} holds events, {pictures.origin.name} pictures; convert one of them first"
         )
-    tables = [part.table for part in parts]
+    tables = [part.table for part in sources]
     shifts = _shifts(tables, gap)
-    array, lefts = _side_by_side(tables) if beside else (_common(parts, tables), [0] * len(parts))
-    lost = [
-        f"the pitch or places of {p.name} ({p.array._apart()})"
-        for p in parts
-        if p.array._is_measured and (p.array.pitch_mm, p.array.places) != (array.pitch_mm, array.places)
-    ]
-    lost += [
-        f"the names of the taxels of {p.name}" for p in parts if not beside and p.array.names not in (None, array.names)
-    ]
-    has_events = parts[0].has_events
-    events = _events([t for t in tables if isinstance(t, Events)], shifts, array, lefts) if has_events else None
-    frames = None if has_events else _frames([t for t in tables if isinstance(t, Frames)], shifts, array, beside)
-    common = _Common(parts, lost)
-    fields: dict[str, Any] = {}
-    fields["registers"] = common("registers", None, "the board's registers (the recordings differ)", _same_registers)
-    fields["register_changes"] = common("register_changes", (), "the settings of the registers (the recordings differ)")
-    changes = [tuple(_at(c.t, shift, c) for c in part.board_changes) for part, shift in zip(parts, shifts, strict=True)]
-    fields["board_changes"] = _agreed(changes, (), "the changes of the board (the recordings differ)", lost)
-    fields["counts"] = common("counts", {}, "what each received and lost, by cause (the recordings differ)")
-    fields["rebuilt"] = common("rebuilt", {}, "what reading each had to put up with (the recordings differ)")
-    for name, what in (("side", "the side"), ("heel", "where the heel lies")):
-        fields[name] = common(name, "", f"{what} (the recordings differ)")
-    fields["columns"] = None if beside else common("columns", None, "the names of the columns (the recordings differ)")
-    if beside and any(part.columns is not None for part in parts):
-        fields["columns"] = tuple(name for part in parts for name in part.columns or ())
-    fields["untimed"] = all(part.untimed for part in parts)
-    fields["clock_of"] = common("clock_of", None, "by whose clock times are (the recordings differ)")
-    clocks = [part.clock for part in parts]
-    moved = len(set(shifts)) > 1
-    fields["clock"] = _agreed(clocks, None, "arrival times", lost, _same_clock if not moved else lambda _, __: False)
-    calibrations = [part.calibration for part in parts]
-    whose = "the calibration (the recordings differ)"
-    fields["calibration"] = _agreed(calibrations, None, whose, lost, _same_calibration)
-    if beside and fields["calibration"] is not None and len(parts) > 1:
-        fields["calibration"] = None
-        lost.append("the calibration (it is of one of the sensors)")
-    fields["zeroings"] = _zeroings(parts, shifts, lefts, lost, beside=beside)
-    fields["held"] = _beside_held(parts, array, lefts) if beside else _held(parts, tables, shifts, lost)
-    of_files = _of_files(parts, shifts)
-    together = after(
-        "merge",
-        parts[0].but(lost=tuple(dict.fromkeys(line for part in parts for line in part.lost))),
-        lambda: [*_others(parts), *lost],
-        path=Path("merged"),
-        name="merged",
-        kind="merged",
-        label="board",
-        source="merged of " + ", ".join(part.name for part in parts),
-        array=array,
-        events=events,
-        frames=frames,
-        notes=_notes(parts, tables, shifts),
-        detections=_detections(parts, shifts),
-        verdict=None if all(p.verdict is None for p in parts) else Verdict._together(of_files),
-        remarks=named([(part.name, part.remarks) for part in parts]),
-        truncated=any(part.truncated for part in parts),
-        **fields,
-    )
+    array, lefts = _side_by_side(tables) if beside else (_common(sources, tables), [0] * len(sources))
+    merging = _Merging(sources, tables, shifts, lefts, array, beside)
+    lost = [line for source in sources for line in source.losses.lost()]
+    for recording, source in zip(recordings, sources, strict=True):
+        lost += [*source.part(parts.Wire).lines(), *source.part(parts.Lines).received(), *recording.others()]
+    both = merging.source()
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
-    return together.but(lost=together.lost)
+    return Contents.of(saying(both, known((*lost, *merging.lost))))
 
 
-def _of_files(parts: Sequence[Contents], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
-    """Return name and verdict of each file or merged recording of which there are parts.
+@dataclass
+class _Merging:
+    """Merges sources, a type of part after the other; `lost` lists what they do not agree in."""
 
-    Stretches of one recording, in memory or in files of their own, have the losses of the whole, which count once;
-    sources of one file share its damage.
-    """
-    files: dict[str, Any] = {}
-    verdicts: dict[Any, dict[Any, dict[Verdict, tuple[str, Verdict]]]] = {}
-    for part, shift in zip(parts, shifts, strict=True):
-        said = verdict_of(part)
-        file = id(said) if part.kind == "merged" else part.path
-        if said.stretch_of is not None:
-            file = files.setdefault(said.stretch_of, said.stretch_of if part.kind == "merged" else file)
-        source = part.label if said.stretch_of is not None else (part.name, part.label)
-        verdicts.setdefault(file, {}).setdefault(source, {}).setdefault(said, (part.name, said._later(shift)))
-    of_files = []
-    for sources in verdicts.values():
-        each = [(next(iter(own.values()))[0], Verdict._of_stretches(own.values())) for own in sources.values()]
-        of_files.append((each[0][0], Verdict._of_sources(each)))
-    return of_files
+    sources: Sequence[Source]
+    tables: Sequence[Events | Frames]
+    shifts: list[int]
+    lefts: list[int]
+    array: Array
+    beside: bool
+    lost: list[str] = field(default_factory=list)
 
+    def source(self) -> Source:
+        """Return the sources as one."""
+        names = ", ".join(one.origin.name for one in self.sources)
+        header: dict[str, Any] = {
+            "origin": parts.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}"),
+            "sensor": self.sensor(),
+            "settings": self.settings(),
+            "marks": self.marks(),
+            "timing": self.timing(),
+            "losses": self.losses(),
+        }
+        if self.sources[0].has_events:
+            tables = [table for table in self.tables if isinstance(table, Events)]
+            return Board(changes=parts.Changes(known(_events(tables, self.shifts, self.array, self.lefts))), **header)
+        columns = self.columns()
+        if columns is None:
+            return Pictures(readings=self.readings(), **header)
+        return Stream(readings=self.readings(), lines=parts.Lines(columns), **header)
 
-def _at(t: int | None, shift: int, change: Any) -> Any:
-    """Return a change of the board at its time in the merged recording."""
-    return type(change)(None if t is None else t + shift, change.at_ns, change.change, change.version, change.asked)
+    def agreed(self, values: Iterable[T], empty: T, line: str, same: Callable[[T, T], bool] = operator.eq) -> T:
+        """Return the common value if all recordings agree, else the empty value; then a line says so."""
+        first, *others = every = list(values)
+        if all(one is first or same(first, one) for one in others):
+            return first
+        if any(map(anything, every)):
+            self.lost.append(f"{line} (the recordings differ)")
+        return empty
 
+    def columns(self) -> tuple[str, ...] | None:
+        """Return the names of the columns."""
+        each = [part.columns for part in self.sources]
+        if not self.beside:
+            return self.agreed(each, None, "the names of the columns")
+        return (
+            tuple(name for names in each for name in names or ()) if any(names is not None for names in each) else None
+        )
 
-class _Common:
-    """Merges a field: the common value if all recordings agree, else the empty value and a line of `lost`."""
+    def sensor(self) -> parts.Sensor:
+        """Merge what describes the sensors; what one of them says of its taxels may be lost."""
+        array, sensors = self.array, [part.sensor for part in self.sources]
+        for part in self.sources:
+            own, name = part.sensor.array, part.origin.name
+            if own._is_measured and (own.pitch_mm, own.places) != (array.pitch_mm, array.places):
+                self.lost.append(f"the pitch or places of {name} ({own._apart()})")
+            if not self.beside and own.names not in (None, array.names):
+                self.lost.append(f"the names of the taxels of {name}")
+        calibrations = [one.calibration() for one in sensors]
+        calibration = self.agreed(calibrations, None, "the calibration", _same_calibration)
+        if self.beside and calibration is not None and len(sensors) > 1:
+            self.lost.append("the calibration (it is of one of the sensors)")
+            calibration = None
+        return parts.Sensor(
+            array,
+            self.agreed((one.side for one in sensors), "", "the side"),
+            self.agreed((one.heel for one in sensors), "", "where the heel lies"),
+            known(calibration),
+        )
 
-    def __init__(self, parts: Sequence[Contents], lost: list[str]) -> None:
-        self.parts, self.lost = parts, lost
+    def settings(self) -> parts.Settings:
+        """Merge registers that are equal, and the values that the taxels held at the beginning."""
+        each = [part.settings for part in self.sources]
+        registers = [one.registers() for one in each]
+        held = _beside_held(self.sources, self.array, self.lefts) if self.beside else self.held()
+        changes = self.agreed((one.register_changes() for one in each), (), "the settings of the registers")
+        return parts.Settings(
+            held=known(held),
+            registers=known(self.agreed(registers, None, "the board's registers", _same_registers)),
+            register_changes=known(changes),
+        )
 
-    def __call__(
-        self, name: str, empty: Any, line: str, same: Callable[[Any, Any], bool] = lambda a, b: bool(a == b)
-    ) -> Any:
-        return _agreed([getattr(part, name) for part in self.parts], empty, line, self.lost, same)
+    def marks(self) -> parts.Marks:
+        """Merge what happened at a time; a note with its name stands at the beginning of each recording."""
+        changes, notes, found = list[tuple[BoardChange, ...]](), list[Note](), list[Any]()
+        for part, table, shift in zip(self.sources, self.tables, self.shifts, strict=True):
+            own, d = part.marks, part.marks.detections()
+            changes.append(tuple(_later(change, shift) for change in own.board_changes()))
+            notes.append(Note(part.origin.name, int(table.t.min()) + shift if len(table) else shift, 0))
+            notes += [_later(note, shift) for note in own.notes()]
+            found += zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True)
+        found.sort(key=lambda row: int(row[2]))
+        label, t, when, slope, repaired = ([row[k] for row in found] for k in range(5))
+        return parts.Marks(
+            board_changes=known(self.agreed(changes, (), "the changes of the board")),
+            notes=known(tuple(sorted(notes, key=lambda note: (note.t is None, note.t or 0)))),
+            detections=known(Detections._of(label, t, when, slope, repaired=repaired)),
+            zeroings=known(self.zeroings()),
+        )
 
+    def timing(self) -> parts.Timing:
+        """Merge clocks that are equal."""
+        clocks = [part.timing.clock() for part in self.sources]
+        clock = clocks[0]
+        if len(set(self.shifts)) > 1 or not all(one is clock or _same_clock(clock, one) for one in clocks[1:]):
+            self.lost += ["arrival times"] * any(map(anything, clocks))
+            clock = None
+        return parts.Timing(
+            known(clock), self.agreed((p.timing.clock_of for p in self.sources), None, "by whose clock times are")
+        )
 
-def _agreed(
-    values: Sequence[Any],
-    empty: Any,
-    line: str,
-    lost: list[str],
-    same: Callable[[Any, Any], bool] = lambda a, b: bool(a == b),
-) -> Any:
-    first = values[0]
-    if all(one is first or same(first, one) for one in values[1:]):
+    def losses(self) -> parts.Losses:
+        """Merge what was lost; counts only if they are equal."""
+        each = [part.losses for part in self.sources]
+        verdict = None
+        if any(one.verdict() is not None for one in each):
+            verdict = Verdict._together(_of_files(self.sources, self.shifts))
+        return parts.Losses(
+            counts=known(self.agreed((one.counts() for one in each), {}, "what each received and lost, by cause")),
+            verdict=known(verdict),
+            remarks=named([(part.origin.name, part.losses.remarks) for part in self.sources]),
+            truncated=any(one.truncated for one in each),
+            rebuilt=known(self.agreed((one.rebuilt() for one in each), {}, "what reading each had to put up with")),
+        )
+
+    def readings(self) -> parts.Readings:
+        """Merge frames."""
+        tables = [table for table in self.tables if isinstance(table, Frames)]
+        each = [part.readings for part in self.sources if isinstance(part, Pictures)]
+        return parts.Readings(
+            known(_frames(tables, self.shifts, self.array, self.beside)),
+            all(one.untimed for one in each),
+            self.agreed((one.turned for one in each), None, "whether readings were turned"),
+        )
+
+    def zeroings(self) -> tuple[Zeroing, ...]:
+        """Return the zeroed taxels of all recordings, unless one of them would change a rest in another recording."""
+        every = [
+            [replace(z, t=z.t + shift, x=z.x + left) for z in part.marks.zeroings()]
+            for part, shift, left in zip(self.sources, self.shifts, self.lefts, strict=True)
+        ]
+        together = tuple(sorted({z for own in every for z in own}, key=lambda z: (z.t, z.x, z.y)))
+        # Sensors side by side have no taxels in common.
+        for part, own, shift in zip(self.sources, every, self.shifts, strict=True):
+            stop = _end(part) + shift
+            if not self.beside and {z for z in together if z.t < stop} != {z for z in own if z.t < stop}:
+                self.lost.append(f"{len(together)} zeroed taxels (the recordings differ)")
+                return ()
+        return together
+
+    def held(self) -> NDArray[np.uint16] | None:
+        """Return the values held at the beginning, if they and the events since imply those held in later parts."""
+        every = list(zip(self.sources, self.tables, self.shifts, strict=True))
+        every.sort(key=lambda one: _begin(one[0]) + one[2])
+        first = every[0][0].settings.held()
+        now = np.full(self.array.shape, UNKNOWN, np.uint16) if first is None else first.copy()
+        # All events by time determine the values that the taxels hold at the beginning of each recording.
+        changes = [(t.t + shift, t) for _, t, shift in every if isinstance(t, Events) and t.intensity is not None]
+        at = np.concatenate([t[e.present] for t, e in changes]) if changes else np.zeros(0, np.int64)
+        x, y, ticks = (
+            np.concatenate([getattr(e, name)[e.present] for _, e in changes]) if changes else np.zeros(0, np.uint16)
+            for name in ("x", "y", "intensity")
+        )
+        order = np.argsort(at, kind="stable")
+        done = 0
+        for part, _, shift in every[1:]:
+            held = part.settings.held()
+            if held is None:
+                continue
+            upto = int(np.searchsorted(at[order], _begin(part) + shift, side="left"))
+            new = order[done:upto]
+            now[y[new], x[new]] = ticks[new]
+            done = upto
+            known = held != UNKNOWN
+            if (now[known] != held[known]).any():
+                self.lost.append(f"what {counted(int(known.sum()), 'taxel')} held where {part.origin.name} begins")
         return first
-    if any(map(anything, values)):
-        lost.append(line)
-    return empty
+
+
+def _later(mark: M, shift: int) -> M:
+    """Return what happened at its time in the merged recording."""
+    return replace(mark, t=None if mark.t is None else mark.t + shift)
 
 
 def _same_registers(a: Registers | None, b: Registers | None) -> bool:
@@ -216,109 +302,52 @@ def _same_calibration(a: Calibration | None, b: Calibration | None) -> bool:
     return a is not None and b is not None and a.to_json() == b.to_json()
 
 
-def _others(parts: Sequence[Contents]) -> list[str]:
-    """Return the lines of `lost` for all recordings but the first, whose lines the table of fates gives."""
-    lines: list[str] = []
-    for part in parts[1:]:
-        lines += ["raw datagrams"] * part.holds("datagrams")
-        lines += ["raw bytes (words that are no events)"] * part.holds("payload")
-        lines += ["the lines of the stream as they came"] * part.holds("samples")
-        lines += [f"the source {name}" for name in part.sources if name != part.label]
-    return lines
+def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[str, Verdict]]:
+    """Return name and verdict of each file or merged recording of which there are parts.
+
+    Stretches of one recording, in memory or in files of their own, have the losses of the whole, which count once;
+    sources of one file share its damage.
+    """
+    files: dict[str, Any] = {}
+    verdicts: dict[Any, dict[Any, dict[Verdict, tuple[str, Verdict]]]] = {}
+    for part, shift in zip(sources, shifts, strict=True):
+        said = verdict_of(part)
+        file = id(said) if part.origin.kind == "merged" else part.origin.path
+        if said.stretch_of is not None:
+            file = files.setdefault(said.stretch_of, said.stretch_of if part.origin.kind == "merged" else file)
+        source = part.origin.label if said.stretch_of is not None else (part.origin.name, part.origin.label)
+        verdicts.setdefault(file, {}).setdefault(source, {}).setdefault(said, (part.origin.name, said._later(shift)))
+    of_files = []
+    for of_file in verdicts.values():
+        each = [(next(iter(own.values()))[0], Verdict._of_stretches(own.values())) for own in of_file.values()]
+        of_files.append((each[0][0], Verdict._of_sources(each)))
+    return of_files
 
 
-def _notes(parts: Sequence[Contents], tables: Sequence[Events | Frames], shifts: Sequence[int]) -> tuple[Note, ...]:
-    """Return all notes by time, and a note with its name at the beginning of each recording."""
-    notes: list[Note] = []
-    for part, own, shift in zip(parts, tables, shifts, strict=True):
-        notes.append(Note(part.name, int(own.t.min()) + shift if len(own) else shift, 0))
-        notes += [Note(n.text, None if n.t is None else n.t + shift, n.at_ns) for n in part.notes]
-    return tuple(sorted(notes, key=lambda note: (note.t is None, note.t or 0)))
-
-
-def _detections(parts: Sequence[Contents], shifts: Sequence[int]) -> Detections:
-    """Return all detections in the order of `known`."""
-    rows: list[Any] = []
-    for part, shift in zip(parts, shifts, strict=True):
-        d = part.detections
-        rows += list(zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True))
-    rows.sort(key=lambda row: int(row[2]))
-    label, t, known, slope, repaired = ([row[k] for row in rows] for k in range(5))
-    return Detections._of(label, t, known, slope, repaired=repaired)
-
-
-def _zeroings(
-    parts: Sequence[Contents], shifts: Sequence[int], lefts: Sequence[int], lost: list[str], *, beside: bool
-) -> tuple[Zeroing, ...]:
-    """Return the zeroed taxels of all recordings, unless one of them would change a rest in another recording."""
-    every = [
-        [Zeroing(z.t + shift, z.x + left, z.y, z.rest, z.before) for z in part.zeroings]
-        for part, shift, left in zip(parts, shifts, lefts, strict=True)
-    ]
-    together = tuple(sorted({z for own in every for z in own}, key=lambda z: (z.t, z.x, z.y)))
-    # Sensors side by side have no taxels in common.
-    for part, own, shift in zip(parts, every, shifts, strict=True):
-        stop = _end(part) + shift
-        if not beside and {z for z in together if z.t < stop} != {z for z in own if z.t < stop}:
-            lost.append(f"{len(together)} zeroed taxels (the recordings differ)")
-            return ()
-    return together
-
-
-def _end(part: Contents) -> int:
+def _end(part: Source) -> int:
     """Return the first time after everything in a recording."""
-    if part.stretch is not None:
-        return part.stretch[1]
+    if part.timing.stretch is not None:
+        return part.timing.stretch()[1]
     t = part.table.t
-    return max([int(t.max()) if len(t) else 0, *(z.t for z in part.zeroings)]) + 1
+    return max([int(t.max()) if len(t) else 0, *(z.t for z in part.marks.zeroings())]) + 1
 
 
-def _begin(part: Contents) -> int:
-    if part.stretch is not None:
-        return part.stretch[0]
+def _begin(part: Source) -> int:
+    if part.timing.stretch is not None:
+        return part.timing.stretch()[0]
     t = part.table.t
     return int(t.min()) if len(t) else 0
 
 
-def _held(
-    parts: Sequence[Contents], tables: Sequence[Events | Frames], shifts: Sequence[int], lost: list[str]
-) -> NDArray[np.uint16] | None:
-    """Return the values held at the beginning, if they and the events since imply those held in later parts."""
-    every = list(zip(parts, tables, shifts, strict=True))
-    every.sort(key=lambda one: _begin(one[0]) + one[2])
-    first = every[0][0].held
-    now = np.full(parts[0].array.shape, UNKNOWN, np.uint16) if first is None else first.copy()
-    # All events by time determine the values that the taxels hold at the beginning of each recording.
-    changes = [(t.t + shift, t) for _, t, shift in every if isinstance(t, Events) and t.intensity is not None]
-    at = np.concatenate([t[e.present] for t, e in changes]) if changes else np.zeros(0, np.int64)
-    x, y, ticks = (
-        np.concatenate([getattr(e, name)[e.present] for _, e in changes]) if changes else np.zeros(0, np.uint16)
-        for name in ("x", "y", "intensity")
-    )
-    order = np.argsort(at, kind="stable")
-    done = 0
-    for part, _, shift in every[1:]:
-        held = part.held
-        if held is None:
-            continue
-        upto = int(np.searchsorted(at[order], _begin(part) + shift, side="left"))
-        new = order[done:upto]
-        now[y[new], x[new]] = ticks[new]
-        done = upto
-        known = held != UNKNOWN
-        if (now[known] != held[known]).any():
-            lost.append(f"what {counted(int(known.sum()), 'taxel')} held where {part.name} begins")
-    return first
-
-
-def _beside_held(parts: Sequence[Contents], array: Array, lefts: Sequence[int]) -> NDArray[np.uint16] | None:
+def _beside_held(sources: Sequence[Source], array: Array, lefts: Sequence[int]) -> NDArray[np.uint16] | None:
     """Return the values that the taxels of all sensors held at the beginning."""
-    if all(part.held is None for part in parts):
+    every = [part.settings.held() for part in sources]
+    if all(own is None for own in every):
         return None
     held = np.full(array.shape, UNKNOWN, np.uint16)
-    for part, left in zip(parts, lefts, strict=True):
-        if part.held is not None:
-            held[: part.array.rows, left : left + part.array.columns] = part.held
+    for own, left in zip(every, lefts, strict=True):
+        if own is not None:
+            held[: own.shape[0], left : left + own.shape[1]] = own
     return held
 
 
@@ -337,13 +366,13 @@ def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
     return shifts
 
 
-def _common(parts: Sequence[Contents], tables: Sequence[Events | Frames]) -> Array:
+def _common(sources: Sequence[Source], tables: Sequence[Events | Frames]) -> Array:
     array = tables[0].array
-    for part, table in zip(parts, tables, strict=True):
+    for part, table in zip(sources, tables, strict=True):
         if not array.fits(table.array):
             raise ProblemError(
-                f"{part.name}: {table.array!r}, {parts[0].name}: {array!r}; different sensors are merged "
-                "beside one another only"
+                f"{part.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors are "
+                "merged beside one another only"
             )
     return array
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,21 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.contents import Contents, alone, once
-from taxel.recording.fates import after
+from taxel.recording import parts
+from taxel.recording.changes import BoardChange, Zeroing
+from taxel.recording.contents import Contents, Source, alone, applied
 from taxel.recording.kinds import verdict_of
+from taxel.recording.once import Once
 from taxel.recording.read_mcap import ascending
+from taxel.recording.verdict import Verdict
 
 __all__ = ["HOST", "on_clock"]
 
 #: The name of the host's clock, us since 1970.
 HOST = "host"
 
+#: What has a time of its own.
+M = TypeVar("M", Note, Zeroing, BoardChange)
 Times = Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
 
@@ -35,30 +40,37 @@ def on_clock(of: Contents, name: str) -> Contents:
     ------
     ProblemError : no such source, one without arrival times, or a part by another clock
     """
-    if of.is_slice and of.clock_of is None:
-        raise ProblemError(f"{of.path}: a slice by its own clock; say on_clock({name!r}) before between")
-    sources = of.sources or {of.label: of}
+    one, sources = of.one, of.sources
+    path, label = one.origin.path, one.origin.label
+    if one.timing.stretch is not None and one.timing.clock_of is None:
+        raise ProblemError(f"{path}: a slice by its own clock; say on_clock({name!r}) before between")
     if name not in (*sources, HOST):
-        raise ProblemError(f"{of.path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
-    if of.clock_of is not None:
-        raise ProblemError(f"{of.path}: is on the clock of {of.clock_of} already")
+        raise ProblemError(f"{path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
+    if one.timing.clock_of is not None:
+        raise ProblemError(f"{path}: is on the clock of {one.timing.clock_of} already")
     to = None if name == HOST else _clock(sources[name])
-    moved: dict[str, Contents] = {}
-    for label, one in sources.items():
-        times = None if label == name else _times(_clock(one), to)
-        moved[label] = _moved(one, name, times).but(sources=moved)
+    moved = {
+        of_source: _moved(source, name, None if of_source == name else _times(_clock(source), to))
+        for of_source, source in sources.items()
+    }
     if of.is_several:
         return alone(moved)
-    # The verdict may be that of all sources.
-    return moved[of.label].but(
-        verdict=once(lambda: (moved[of.label] if of.verdict == sources[of.label].verdict else alone(moved)).verdict)
-    )
+    own = moved[label]
+
+    def verdict() -> Verdict | None:
+        # It may be that of all sources.
+        is_own = one.losses.verdict() == sources[label].losses.verdict()
+        return (own if is_own else alone(moved).one).losses.verdict()
+
+    return Contents(replace(own, losses=replace(own.losses, verdict=Once(verdict))), moved)
 
 
-def _clock(of: Contents) -> Clock:
-    clock = of.clock
+def _clock(of: Source) -> Clock:
+    clock = of.timing.clock()
     if clock is None or not len(clock.board_us):
-        raise ProblemError(f"{of.path}: source {of.label!r} has no arrival times, so its clock is not known")
+        raise ProblemError(
+            f"{of.origin.path}: source {of.origin.label!r} has no arrival times, so its clock is not known"
+        )
     return clock
 
 
@@ -72,57 +84,58 @@ def _times(own: Clock, to: Clock | None) -> Times:
     return times
 
 
-def _moved(of: Contents, name: str, times: Times | None) -> Contents:
+def _moved(of: Source, name: str, times: Times | None) -> Source:
     """Return a source with its times converted to another clock; None leaves them unchanged."""
     if times is None:
-        return of.but(clock_of=name)
+        return replace(of, timing=replace(of.timing, clock_of=name))
 
     def one(t: int) -> int:
         return int(times(np.array([t]))[0])
 
-    def events() -> Events | None:
-        own = of.events
-        if own is None:
-            return None
+    def at(every: tuple[M, ...]) -> tuple[M, ...]:
+        return tuple(replace(mark, t=None if mark.t is None else one(mark.t)) for mark in every)
+
+    def events(own: Events) -> Events:
         more: dict[str, Any] = {"array": own.array, "repaired": own.repaired}
         if own.intensity is not None:
             more |= {"intensity": own.intensity, "present": own.present}
         return Events(times(own.t), own.x, own.y, own.p, markers=[(one(t), start) for t, start in own.markers], **more)
 
-    def frames() -> Frames | None:
-        own = of.frames
-        return None if own is None else Frames(own.values, ascending(times(own.t)), unit=own.unit, array=own.array)
+    def frames(own: Frames) -> Frames:
+        return Frames(own.values, ascending(times(own.t)), unit=own.unit, array=own.array)
 
-    def detections() -> Detections:
-        own = of.detections
+    def detections(own: Detections) -> Detections:
         return Detections._of(own.label, times(own.t), times(own.known), own.slope, repaired=own.repaired)
 
-    def notes() -> tuple[Note, ...]:
-        return tuple(replace(note, t=None if note.t is None else one(note.t)) for note in of.notes)
+    def clock(own: Clock | None) -> Clock | None:
+        return None if own is None else Clock(times(own.board_us), own.arrived_ns)
 
-    def verdict() -> str | None:
+    def verdict(own: Verdict | None) -> Verdict | None:
         told = verdict_of(of)
         doubtful, steps = told.doubtful_after_us, told.steps_back
-        at = steps[0]["after_us"] if doubtful is None and steps else doubtful
-        return of.verdict if at is None else told._later(one(at) - at)
+        after = steps[0]["after_us"] if doubtful is None and steps else doubtful
+        return own if after is None else told._later(one(after) - after)
 
-    return after(
-        "on_clock",
-        of,
-        lambda: ["the lines of the stream as they came"] if of.holds("samples") else [],
-        events=once(events) if of.has_events else None,
-        frames=None if of.has_events else once(frames),
-        board_changes=once(
-            lambda: tuple(replace(c, t=None if c.t is None else one(c.t)) for c in of.board_changes),
-            lambda: of.holds("board_changes"),
-        ),
-        notes=once(notes),
-        detections=once(detections),
-        zeroings=once(lambda: tuple(replace(z, t=one(z.t)) for z in of.zeroings)),
-        clock=once(lambda: None if of.clock is None else Clock(times(of.clock.board_us), of.clock.arrived_ns)),
-        clock_of=name,
-        verdict=once(verdict),
-        # The times in the datagrams are by the source's own clock.
-        samples=None,
-        sources={},
-    )
+    def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
+        match part:
+            # The times in the datagrams stay by the source's own clock.
+            case parts.Origin() | parts.Sensor() | parts.Settings() | parts.Wire():
+                return part
+            case parts.Marks():
+                return parts.Marks(
+                    part.board_changes.to(at), part.notes.to(at), part.detections.to(detections), part.zeroings.to(at)
+                )
+            case parts.Timing():
+                return parts.Timing(part.clock.to(clock), name, part.stretch)
+            case parts.Losses():
+                return replace(part, verdict=part.verdict.to(verdict))
+            case parts.Changes():
+                return parts.Changes(part.events.to(events))
+            case parts.Readings():
+                return replace(part, frames=part.frames.to(frames))
+            case parts.Lines():
+                return parts.Lines(part.columns)
+            case _:
+                assert_never(part)
+
+    return applied(of, rule, of.part(parts.Lines).received)

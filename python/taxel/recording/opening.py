@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,26 +25,29 @@ from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import Contents, several
-from taxel.recording.csv import check_head, read_csv
-from taxel.recording.h5 import is_ours, read_h5
+from taxel.recording import parts
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, several, source_from
 from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_own_table, kind_of
 from taxel.recording.layout import check_size, laid_out, on_array
-from taxel.recording.npz import read_npz
+from taxel.recording.once import known
+from taxel.recording.read_csv import check_head, read_csv
 from taxel.recording.read_foreign import is_foreign, read_foreign
+from taxel.recording.read_h5 import is_ours, read_h5
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
+from taxel.recording.read_npz import read_npz
 from taxel.recording.read_ros import Topics, read_ros
-from taxel.recording.recording import Recording, with_notes
-from taxel.recording.sidecars import with_sidecars
+from taxel.recording.recording import Recording, noted
+from taxel.recording.sidecars import labels_of, with_sidecars
 from taxel.recording.without_layout import refuse_without_layout
 
 __all__ = [
     "check_recording",
     "is_recording",
     "joined",
-    "open_any",
+    "open_all",
     "open_joined",
+    "open_one",
     "open_recording",
     "recordings_in",
     "sensors",
@@ -54,7 +57,7 @@ __all__ = [
 FEET = ("left", "right")
 
 
-def open_any(
+def open_one(
     path: str | os.PathLike[str],
     *,
     array: Array | Sequence[Array] | None = None,
@@ -66,16 +69,16 @@ def open_any(
     types: str | os.PathLike[str] | None = None,
     ros: str | None = None,
     limit: int | None = None,
-) -> Any:
-    r"""Open a recording, or a folder of trials.
+) -> Recording:
+    r"""Open a recording.
 
-    `taxel.open` is this function.
+    `taxel.open` is this function; `taxel.open_all` opens those of a folder.
 
     Parameters
     ----------
     path : path
         A .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged; a file of another format
-        that `taxel.formats` reads; a ROS bag; or a folder of either kind.
+        that `taxel.formats` reads, with one trial; or a ROS bag.
     array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
         a larger one if events lie outside it. A .mcap holds its own, which is kept. Of a ROS bag rows and
@@ -99,13 +102,12 @@ def open_any(
 
     Returns
     -------
-    Recording, or list of Recording
-        One for a file as taxel writes it. A list for a folder, in the order of the names (2 before 10), and for a file
-        of another format, which holds one or more trials: their reference events (contact, foot-off ...) become notes.
+    Recording
 
     Raises
     ------
     FormatError : not a recording, damaged so that nothing can be read, or more than may be read (names the place)
+    ProblemError : a folder, or a file of another format with several trials
     OSError : the file does not exist, or cannot be read
 
     Notes
@@ -114,9 +116,68 @@ def open_any(
     first used.
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
-    is described in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) become
-    notes of the recordings that it names, also of a file of pictures that is opened alone. In a folder with files that
-    taxel writes, all other files are ignored.
+    is described in `taxel.recording.write_h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
+    become notes of a file of pictures that it names.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile, taxel
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "step.npz"
+    >>> events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    >>> _ = taxel.convert(events, place)
+    >>> taxel.open(place)
+    Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
+    """
+    how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
+    place = Path(arguments.path("path", path))
+    if place.is_dir() and not is_bag(place):
+        raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
+    every = _open(place, how)
+    if len(every) != 1:
+        names = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
+        raise ProblemError(f"{place}: holds {len(every)} recordings ({names}); taxel.open_all opens each")
+    return every[0]
+
+
+def open_all(
+    path: str | os.PathLike[str],
+    *,
+    array: Array | Sequence[Array] | None = None,
+    layout: str | os.PathLike[str] | None = None,
+    pairing: str = "direct",
+    differences: bool = False,
+    topic: str | Sequence[str] | None = None,
+    field: str | Sequence[str] | None = None,
+    types: str | os.PathLike[str] | None = None,
+    ros: str | None = None,
+    limit: int | None = None,
+) -> list[Recording]:
+    r"""Open all recordings of a folder, or all trials of a file.
+
+    `taxel.open_all` is this function.
+
+    Parameters
+    ----------
+    path : path
+        A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
+    array, layout, pairing, differences, topic, field, types, ros, limit
+        As of `taxel.open`.
+
+    Returns
+    -------
+    list of Recording
+        In the order of the names (2 before 10). A file of another format holds one or more trials: their reference
+        events (contact, foot-off ...) become notes.
+
+    Raises
+    ------
+    FormatError : a folder without a recording; else as of `taxel.open`
+    OSError : the file does not exist, or cannot be read
+
+    Notes
+    -----
+    The reference events of a ``labels.csv`` in the folder (`taxel.Labels`) become notes of the recordings that it
+    names. In a folder with files that taxel writes, all other files are ignored.
 
     Examples
     --------
@@ -126,25 +187,29 @@ def open_any(
     >>> for name in ("step10.npz", "step2.npz"):
     ...     _ = taxel.convert(events, folder / name)
     >>> _ = (folder / "labels.csv").write_text("recording,label,t_us\nstep2,contact,200\n")
-    >>> taxel.open(folder)
+    >>> taxel.open_all(folder)
     [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 note),
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
-    place = Path(arguments.path("path", path))
     how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
+    return _open(Path(arguments.path("path", path)), how)
+
+
+def _open(place: Path, how: How) -> list[Recording]:
+    """Open all recordings of a folder, or all trials of a file."""
     with how.within():
         if place.is_dir() and not is_bag(place):
             return _folder(place, how)
         # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
         if place.exists() and (names := _formats(place)) and not _is_own(place):
             trials = _kept(formats.trials(place, names[0]))
-            return [_named_beside(place, Path(one.name), _of(one, place, names[0], layout)) for one in trials]
-        return _named_beside(place, Path(place.name), _open_one(place, how))
+            return [_named_beside(place, Path(one.name), _of(one, place, names[0], how.layout)) for one in trials]
+        return [_named_beside(place, Path(place.name), _open_one(place, how))]
 
 
 @dataclass(frozen=True)
 class How:
-    """Hold what says how files are opened; the fields are the arguments of `open_any`."""
+    """Hold what says how files are opened; the fields are the arguments of `taxel.open`."""
 
     array: Array | Sequence[Array] | None = None
     layout: str | os.PathLike[str] | None = None
@@ -173,7 +238,7 @@ def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
     ----------
     path : path
     **how
-        The other arguments of `open_any`.
+        The other arguments of `open_one`.
 
     Returns
     -------
@@ -205,9 +270,9 @@ def _open_one(place: Path, how: How) -> Recording:
         if said is not None and is_foreign(place, said):
             if how.topics.are_given:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
-            contents = read_foreign(place, said)
+            contents = Contents.of(read_foreign(place, said))
             if how.array is not None:
-                contents = _on_given(contents, instance("array", how.array, Array))
+                contents = Contents.of(_on_given(contents.one, instance("array", how.array, Array)))
         elif (kind := kind_of(place)) == "ros":
             grid = said.grid() if how.array is None and said is not None else how.array
             contents = read_ros(place, how.topics.but(of_layout), grid)
@@ -216,7 +281,9 @@ def _open_one(place: Path, how: How) -> Recording:
         else:
             own = None if how.array is None else instance("array", how.array, Array)
             contents = _read(place, kind, own, how.pairing, how.differences)
-        return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
+        return Recording(
+            with_sidecars(contents if said is None else laid_out(contents, said, given=how.layout is not None))
+        )
     except MemoryError:
         raise FormatError(
             f"{place}: needs more memory than there is ({limits.available()} bytes are available): --limit BYTES "
@@ -224,16 +291,16 @@ def _open_one(place: Path, how: How) -> Recording:
         ) from None
 
 
-def _on_given(of: Contents, array: Array) -> Contents:
+def _on_given(of: Source, array: Array) -> Source:
     """Return pictures of another program on the given sensor: as many rows and columns, or a row of as many channels.
 
     Raises
     ------
     ProblemError : another number of taxels, rows or columns
     """
-    own = of.array
+    own = of.sensor.array
     if own.shape != (1, array.rows * array.columns):
-        check_size(of.path, own.shape, array)
+        check_size(of.origin.path, own.shape, array)
     says_more = array.shape != own.shape or (array._is_measured and not own._is_measured)
     return on_array(of, array) if says_more else of
 
@@ -243,8 +310,8 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
     if kind == "mcap":
         return read_mcap(place, pairing)
     if kind == "lsa":
-        return read_lsa(place, array or Array.thesis(), pairing, differences)
-    return {"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array)
+        return Contents.of(read_lsa(place, array or Array.thesis(), pairing, differences))
+    return Contents.of({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
 
 
 def _folder(folder: Path, how: How) -> list[Recording]:
@@ -286,8 +353,12 @@ def _kept(trials: Iterable[Trial]) -> Iterator[Trial]:
 
 def _kept_one(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
-    for one in recording._contents.sources.values() or [recording._contents]:
-        limits.keep(sum(_size(table) for table in (vars(one)["events"], vars(one)["frames"])))
+    for one in recording._contents.sources.values():
+        for table in (
+            one.changes.events if isinstance(one, Board) else None,
+            one.readings.frames if isinstance(one, Pictures) else None,
+        ):
+            limits.keep(0 if table is None or not table.is_read else _size(table()))
     return recording
 
 
@@ -307,7 +378,7 @@ def _warn_of_tables(folder: Path, own: Sequence[Path], files: Sequence[Path], ho
         warn(
             f"{folder}: {names} left out, as beside recordings ({kept}) tables and arrays are not read: convert them, "
             "or keep them in a folder of their own",
-            stacklevel=4,
+            stacklevel=5,
         )
 
 
@@ -331,7 +402,7 @@ def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recordin
 def _named_beside(place: Path, name: Path, recording: Recording) -> Recording:
     """Add the reference events of the folder to the notes of pictures that it names; the page opens them one by one."""
     table, own = place.parent / LABELS, recording._contents
-    if any(one.has_events for one in (own.sources or {own.label: own}).values()):
+    if any(one.has_events for one in own.sources.values()):
         return recording
     if not (table.is_file() and is_label_table(table)):
         return recording
@@ -343,23 +414,21 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     """Add the reference events of a recording, and of each of its sources, to the notes."""
     own = recording._contents
     if not own.is_several:
-        return recording.with_notes(_notes(labels, name, own))
-    sources: dict[str, Contents] = {}
-    for label, one in own.sources.items():
-        more = () if one.columns else _notes(labels, name, one)
-        sources[label] = with_notes(one.but(sources={}), tuple(more))
-    for label, one in sources.items():
-        sources[label] = one.but(sources=sources)
-    return Recording(several(sources))
+        return recording.with_notes(_notes(labels, name, own.one))
+    sources = {
+        label: one if isinstance(one, Stream) else noted(one, tuple(_notes(labels, name, one)))
+        for label, one in own.sources.items()
+    }
+    return Recording(Contents(several(sources), sources))
 
 
-def _notes(labels: Labels, name: Path, of: Contents) -> list[Note]:
+def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
-    clock = of.clock if of.clock is not None and len(of.clock.board_us) else None
-    times = labels._of(name, lambda: clock, of.label)
-    which, replaced, there = (of.path, of.label, trial_of(of.name, of.label)), set[int | None](), set[object]()
-    if beside(of.path).is_file():
-        set_here = Labels(beside(of.path))
+    clock = of.timing.clock() if of.timing.clock.holds() else None
+    times = labels._of(name, lambda: clock, of.origin.label)
+    which, replaced, there = labels_of(of.origin), set[int | None](), set[object]()
+    if beside(of.origin.path).is_file():
+        set_here = Labels(beside(of.origin.path))
         replaced, there = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
     return sorted(
         (
@@ -391,15 +460,20 @@ def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | N
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
-    table = trial.recorded
-    events, frames = (table, None) if isinstance(table, Events) else (None, table)
-    path = place if place.is_file() else place / trial.name
-    held: dict[str, Any] = {"events": events, "frames": frames, "source": trial.source, "notes": tuple(notes)}
     label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
-    held |= {"untimed": not trial.timed, "label": label, "lost": _beside_pictures(trial)}
-    contents = Contents(path, trial.name, kind, table.array, side=trial.foot, **held)
+    origin = parts.Origin(place if place.is_file() else place / trial.name, trial.name, kind, label, trial.source)
+    contents = Contents.of(
+        source_from(
+            trial.recorded,
+            origin,
+            untimed=not trial.timed,
+            sensor=parts.Sensor(trial.recorded.array, trial.foot),
+            marks=parts.Marks(notes=known(tuple(notes))),
+            losses=parts.Losses(lost=known(_beside_pictures(trial))),
+        )
+    )
     said = _layout(place, layout)
-    return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
+    return Recording(with_sidecars(contents if said is None else laid_out(contents, said, given=layout is not None)))
 
 
 def _beside_pictures(trial: Trial) -> tuple[str, ...]:
@@ -465,7 +539,7 @@ def joined(opened: Sequence[Recording]) -> list[Recording]:
     Parameters
     ----------
     opened : sequence of Recording
-        As `open_any` returns them, where each foot is a trial.
+        As `open_all` returns them, where each foot is a trial.
 
     Returns
     -------
@@ -474,18 +548,18 @@ def joined(opened: Sequence[Recording]) -> list[Recording]:
     """
     groups: dict[tuple[str, str], dict[str, Contents]] = {}
     for recording in opened:
-        own = recording._contents
+        own = recording._contents.one.origin
         # In a folder the path of a trial ends with its name, and so with its foot.
         key = (str(own.path).removesuffix(f" {own.label}"), own.name.removesuffix(f" {own.label}"))
-        groups.setdefault(key, {})[own.label or own.name] = own
+        groups.setdefault(key, {})[own.label or own.name] = recording._contents
     together: list[Recording] = []
-    for (path, _), sources in groups.items():
-        if set(sources) == set(FEET):
-            both: dict[str, Contents] = {}
-            both.update({foot: sources[foot].but(path=Path(path), sources=both) for foot in FEET})
-            together.append(Recording(several(both)))
+    for (path, _), feet in groups.items():
+        if set(feet) == set(FEET):
+            both = {foot: feet[foot].one for foot in FEET}
+            both = {foot: replace(one, origin=replace(one.origin, path=Path(path))) for foot, one in both.items()}
+            together.append(Recording(Contents(several(both), both)))
         else:
-            together += [Recording(one) for one in sources.values()]
+            together += [Recording(one) for one in feet.values()]
     return together
 
 
@@ -497,9 +571,8 @@ def sensors(recording: Recording) -> list[Recording]:
 
 
 def open_joined(path: str | os.PathLike[str], **how: Any) -> list[Recording]:
-    """Open a file or a folder as `open_any` does, with the feet of each trial joined."""
-    opened = open_any(path, **how)
-    return joined(opened if isinstance(opened, list) else [opened])
+    """Open a file or a folder as `open_all` does, with the feet of each trial joined."""
+    return joined(open_all(path, **how))
 
 
 def _formats(place: Path) -> list[str]:

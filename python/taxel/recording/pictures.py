@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +11,12 @@ from taxel._base.arguments import number
 from taxel._base.columns import frozen
 from taxel._base.limits import TIME_US
 from taxel._core import ProblemError
+from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import UNKNOWN, Contents, once
-from taxel.recording.fates import after
+from taxel.labels import Note
+from taxel.recording import parts
+from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, saying, several
+from taxel.recording.once import UNKNOWN, Once, known
 from taxel.tare import Tare
 
 __all__ = ["FRAMES_HZ", "at_rate", "calibrated", "period_us", "pictures", "times_at"]
@@ -54,12 +56,12 @@ def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
     return t
 
 
-def pictures(of: Contents, rate_hz: float | None = None, *, name: str = "rate_hz") -> Contents:
+def pictures(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz") -> Pictures:
     """Return the same recording as pictures.
 
     Parameters
     ----------
-    of : Contents
+    of : Source
     rate_hz : float, above 0, optional
         Pictures a second, with a period rounded to whole us; default: pictures are unchanged, events have 100 a second.
     name : str
@@ -67,7 +69,7 @@ def pictures(of: Contents, rate_hz: float | None = None, *, name: str = "rate_hz
 
     Returns
     -------
-    Contents
+    Pictures
         For events: the held values of the taxels, beginning with those at the start of the recording, or with 0; for
         pictures: the last one at each time.
 
@@ -77,30 +79,29 @@ def pictures(of: Contents, rate_hz: float | None = None, *, name: str = "rate_hz
     """
     period = None if rate_hz is None else period_us(name, rate_hz)
     if period is not None and of.untimed:
-        raise ProblemError(f"{of.path}: its pictures have no times, so they have no rate; see recording.at_rate")
-    return after(
-        "pictures",
-        of,
-        lambda: ["the events between the pictures"] if of.has_events else [],
-        events=None,
-        frames=once(lambda: _drawn(of, period) if of.has_events else _resampled(of, period)),
-        # The first picture includes the held values.
-        held=None if of.has_events else once(lambda: of.held),
-    )
+        raise ProblemError(f"{of.origin.path}: its pictures have no times, so they have no rate; see recording.at_rate")
+    if isinstance(of, Pictures):
+        return replace(of, readings=replace(of.readings, frames=Once(lambda: _resampled(of.table, period))))
+    if not isinstance(of, Board):
+        # Reading the events raises the error that lists the sources.
+        _ = of.table
+    header = {one: getattr(of, one) for one in ("marks", "timing", "losses")}
+    # The first picture includes the held values.
+    header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
+    frames = Once(lambda: _drawn(of, period))
+    return Drawn(of.origin, of.sensor, parts.Readings(frames), of.part(parts.Wire), **header)
 
 
-def _drawn(of: Contents, period: int | None) -> Frames:
-    events = of.events
-    assert events is not None  # the caller checked
+def _drawn(of: Source, period: int | None) -> Frames:
+    events, held, stretch = of.table, of.settings.held(), of.timing.stretch
+    assert isinstance(events, Events)  # the caller checked
     # A value of 65 535 stands for an unknown one.
-    begins = None if of.held is None else np.where(of.held == UNKNOWN, 0, of.held)
+    begins = None if held is None else np.where(held == UNKNOWN, 0, held)
     period = round(1e6 / FRAMES_HZ) if period is None else period
-    return Frames.from_events(events, period, *(of.stretch or ()), held=begins)
+    return Frames.from_events(events, period, *(() if stretch is None else stretch()), held=begins)
 
 
-def _resampled(of: Contents, period: int | None) -> Frames:
-    own = of.frames
-    assert own is not None  # the caller checked
+def _resampled(own: Frames, period: int | None) -> Frames:
     if period is None or not len(own):
         return own
     t = np.arange(own.t[0], own.t[-1] + 1, period, dtype=np.int64)
@@ -115,36 +116,32 @@ def at_rate(of: Contents, rate_hz: float) -> Contents:
     ProblemError : pictures that have times, or an invalid rate
     """
     period_us("rate_hz", rate_hz)
-    if not of.untimed:
-        raise ProblemError(f"{of.path}: has times of its own; a rate is of pictures without times")
-
-    def time(t: int) -> int:
-        return round(t * 1e6 / rate_hz)
-
-    def frames() -> Frames | None:
-        own = of.frames
-        if own is None:
-            return None
-        t = times_at(own.t, rate_hz)
-        return Frames(own.values, frozen(t), unit=own.unit, array=own.array)
-
-    def sources() -> Mapping[str, Contents]:
-        every: dict[str, Contents] = {}
-        for label, one in of.sources.items():
-            every[label] = at_rate(one.but(sources={}), rate_hz).but(sources=every)
-        return every
-
-    notes = once(lambda: tuple(replace(n, t=None if n.t is None else time(n.t)) for n in of.notes))
-    # Not a row of the table of fates: nothing else changes, and nothing is lost.
-    return of.but(frames=once(frames), notes=notes, untimed=False, sources=once(sources))
+    if not of.one.untimed:
+        raise ProblemError(f"{of.one.origin.path}: has times of its own; a rate is of pictures without times")
+    sources = {name: _at_rate(one, rate_hz) for name, one in of.sources.items()}
+    return Contents(several(sources) if of.is_several else _at_rate(of.one, rate_hz), sources)
 
 
-def calibrated(of: Contents, rate_hz: float | None = None, rest: Tare | None = None) -> Contents:
+def _at_rate(of: Source, rate_hz: float) -> Source:
+    if not isinstance(of, Pictures) or not of.untimed:
+        return of
+
+    def frames(own: Frames) -> Frames:
+        return Frames(own.values, frozen(times_at(own.t, rate_hz)), unit=own.unit, array=own.array)
+
+    def notes(own: tuple[Note, ...]) -> tuple[Note, ...]:
+        return tuple(replace(n, t=None if n.t is None else round(n.t * 1e6 / rate_hz)) for n in own)
+
+    readings = parts.Readings(of.readings.frames.to(frames), untimed=False, turned=of.readings.turned)
+    return replace(of, readings=readings, marks=replace(of.marks, notes=of.marks.notes.to(notes)))
+
+
+def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = None) -> Pictures:
     """Return the same recording as pictures in N or kPa, by its calibration.
 
     Parameters
     ----------
-    of : Contents
+    of : Source
     rate_hz : float, above 0, optional
         As of `pictures`.
     rest : Tare, optional
@@ -154,12 +151,19 @@ def calibrated(of: Contents, rate_hz: float | None = None, rest: Tare | None = N
     ------
     ProblemError : no calibration, or one of another array
     """
-    calibration = of.calibration
+    calibration = of.sensor.calibration()
     if calibration is None:
         raise ProblemError(
-            f"{of.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing is N or kPa"
+            f"{of.origin.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing is N "
+            "or kPa"
         )
     drawn = pictures(of, rate_hz)
-    assert drawn.frames is not None  # pictures
-    frames = calibration.apply(drawn.frames, rest)
-    return after("calibrated", drawn, events=None, frames=frames, held=None, calibration=None)
+    made = replace(
+        drawn,
+        readings=replace(drawn.readings, frames=known(calibration.apply(drawn.table, rest))),
+        settings=replace(drawn.settings, held=known(None)),
+        sensor=replace(drawn.sensor, calibration=known(None)),
+    )
+    if not isinstance(made, Stream):
+        return made
+    return saying(replace(made, lines=parts.Lines(made.lines.columns)), made.lines.received)

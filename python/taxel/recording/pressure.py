@@ -6,7 +6,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,8 @@ from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import UNKNOWN, Contents
+from taxel.recording.contents import Contents, source_from
+from taxel.recording.once import UNKNOWN
 from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
 from taxel.recording.rest import (
@@ -284,7 +284,7 @@ class _Drawn:
         taxels, column = np.unique(events.array.index(events.x[there], events.y[there]), return_inverse=True)
         since = np.full(len(taxels), np.iinfo(np.int64).max)
         np.minimum.at(since, column, events.t[there])
-        begins, held = None, recording._contents.held
+        begins, held = None, recording._contents.one.settings.held()
         if held is not None:
             known = held.reshape(-1)[taxels] != UNKNOWN
             begins = np.where(known, held.reshape(-1)[taxels], 0).astype(np.float32)
@@ -408,7 +408,8 @@ def _rate_hz(recording: Recording) -> float:
 def _times(recording: Recording) -> NDArray[np.int64]:
     """Return the times of the pictures of `Recording.frames`."""
     t = recording.events.t
-    first, stop = recording._contents.stretch or (int(t.min()), int(t.max()) + 1)
+    stretch = recording._contents.one.timing.stretch
+    first, stop = (int(t.min()), int(t.max()) + 1) if stretch is None else stretch()
     return np.arange(first, stop, period_us("rate_hz", _rate_hz(recording)), dtype=np.int64)
 
 
@@ -465,7 +466,7 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     -------
     float32, shape (n, rows, columns), ticks
     """
-    recording = Recording(Contents(Path(), "", "events", events.array, events=events))
+    recording = Recording(Contents.of(source_from(events)))
     drawn = _Drawn.of(recording)
     # The rest is found from the first event on.
     from_first = np.union1d(t, min(t[0], events.t.min())) if len(t) else t

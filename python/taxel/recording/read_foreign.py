@@ -31,9 +31,11 @@ from taxel.formats.checks import ascending, whole_us
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
-from taxel.recording.contents import Contents
-from taxel.recording.h5 import is_ours
+from taxel.recording.contents import Source, source_from
 from taxel.recording.kinds import is_label_table, is_own_table
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Origin
+from taxel.recording.read_h5 import is_ours
 
 __all__ = [
     "ARRAYS",
@@ -101,7 +103,7 @@ def is_lone_array(path: Path) -> bool:
     return len(there) == 1 and all(len(shape) in (2, 3) for shape in there.values())
 
 
-def read_foreign(path: Path, layout: Layout) -> Contents:
+def read_foreign(path: Path, layout: Layout) -> Source:
     """Read a file whose layout says how.
 
     Parameters
@@ -112,7 +114,7 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
 
     Returns
     -------
-    Contents
+    Source
         Readings as they are in the file: `taxel.recording.layout.laid_out` turns those that fall. Without a time column
         and a rate the time of a picture is its number in us: 0, 1, 2 ...
 
@@ -138,8 +140,8 @@ def read_foreign(path: Path, layout: Layout) -> Contents:
     except ProblemError as error:
         raise FormatError(f"{layout.place}: {path.name}: {first_line(error)}") from None
     limited(path, frames)
-    kind = "table" if is_table else "arrays"
-    return Contents(path, path.name, kind, array, frames=frames, untimed=read.t is None, lost=read.lost)
+    origin = Origin(path, path.name, "table" if is_table else "arrays")
+    return source_from(frames, origin, untimed=read.t is None, losses=Losses(lost=known(read.lost)))
 
 
 def times_of(names: Sequence[str]) -> list[int]:

@@ -9,13 +9,15 @@ from taxel import _core
 from taxel._base import limits
 from taxel.array import Array
 from taxel.events import Events
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Board
+from taxel.recording.once import known
+from taxel.recording.parts import Changes, Losses, Origin, Sensor, Wire
 from taxel.recording.verdict import Verdict
 
 __all__ = ["read_lsa"]
 
 
-def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Contents:
+def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Board:
     """Return the contents of a .lsa.
 
     Parameters
@@ -36,16 +38,12 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Conte
     payload, parts, decoder, complete = _core.read_lsa(path, array._parts(), pairing, differences, memory)
     unmarked = None if complete else path.with_suffix(".lss").name
     verdict = Verdict._of({"raw": [unmarked, json.loads(_core.recording_damage(decoder))]})
-    return Contents(
-        path,
-        path.name,
-        "lsa",
-        array,
-        events=Events._from_parts(parts, array),
-        counts={"bytes": len(payload), "decoder": json.loads(decoder)},
-        verdict=verdict,
-        remarks=("times after a silence of more than 6.45 s are short by whole turns of 6.5536 s",),
-        payload=payload,
-        differences=differences,
+    losses = Losses(
+        known({"bytes": len(payload), "decoder": json.loads(decoder)}),
+        known(verdict),
+        ("times after a silence of more than 6.45 s are short by whole turns of 6.5536 s",),
         truncated=not complete,
     )
+    events = known(Events._from_parts(parts, array))
+    wire = Wire(payload=payload, differences=differences)
+    return Board(Origin(path, path.name, "lsa"), Sensor(array), Changes(events), wire, losses=losses)

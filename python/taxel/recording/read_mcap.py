@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +19,19 @@ from taxel.array import Array
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Contents, Once, alone, once
+from taxel.recording import parts
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, alone
 from taxel.recording.description import (
     array_of,
     board_changes_of,
     counts_of,
     detections_of,
     notes_of,
+    turned_of,
     zeroings_of,
 )
-from taxel.recording.notes import Datagrams, Samples
+from taxel.recording.once import Once, known
+from taxel.recording.raw import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
@@ -49,85 +53,91 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     """
     limit = limits.given()
     reader = _core.RecordingReader(path, limits.memory(limit), limit is not None)
-    sources: dict[str, Contents] = {}
+    sources: dict[str, Source] = {}
     for name in reader.sources():
-        one = _Source(path, reader.of_source(name), sources, limit)
+        one = _Source(path, reader.of_source(name), limit)
         if one.header.get("pictures") is not None:
             sources[name] = one.pictures()
         else:
             sources[name] = one.board(pairing) if one.header.get("stream") is None else one.stream()
-    sensors = [name for name, one in sources.items() if not one.has_events and vars(one)["columns"] is None]
+    sensors = [name for name, one in sources.items() if type(one) is Pictures]
     if len(sensors) > 1:
         for name in sensors:
-            sources[name] = sources[name].but(name=f"{path.name} {name}")
+            own = sources[name]
+            sources[name] = replace(own, origin=replace(own.origin, name=f"{path.name} {name}"))
     return alone(sources)
 
 
 class _Source:
     """Reader of one source of a file: its header and trailer, and the values that several fields share."""
 
-    def __init__(
-        self, path: Path, reader: _core.RecordingReader, sources: dict[str, Contents], limit: int | None
-    ) -> None:
+    def __init__(self, path: Path, reader: _core.RecordingReader, limit: int | None) -> None:
         self._reader, self._limit = reader, limit
         about = json.loads(reader.about())
         self.header, self.ending, self.opened = about["header"], about["ending"] or {}, about["rebuilt"]
         self.array = array_of(self.header["array"])
-        self.before = _counts_before(path, self.header)
+        # Those of the recording that a source was converted from.
+        self.before = _stated(path, "counts", counts_of, self.header.get("counts")) or {}
         self.remarks = Once(lambda: json.loads(self.reader().remarks()))
-        self.common: dict[str, Any] = {
-            "path": path,
-            "name": path.name,
-            "kind": "mcap",
-            "array": self.array,
-            "label": self.header.get("name", "board"),
-            "source": self.header["source"],
-            "verdict": once(self.verdict),
-            "truncated": bool(self.opened["unfinished"]) or "finished" not in self.ending,
-            "rebuilt": once(self.rebuilt),
-            "sources": sources,
-            "remarks": tuple(self.header.get("remarks", ())),
-            "lost": tuple(self.header.get("lost", ())),
-            "side": self.header.get("side", ""),
-            "heel": self.header.get("heel", ""),
-        }
+        label = self.header.get("name", "board")
+        self.origin = parts.Origin(path, path.name, "mcap", label, self.header["source"])
+        self.sensor = parts.Sensor(self.array, self.header.get("side", ""), self.header.get("heel", ""))
+
+    def losses(self, counts: Callable[[], dict[str, Any]], found: Callable[[], str] | None = None) -> parts.Losses:
+        """Return what was lost; arguments are those of `counts` and `verdict`."""
+        return parts.Losses(
+            counts=self.counts(counts),
+            verdict=Once(lambda: self.verdict(found)),
+            remarks=tuple(self.header.get("remarks", ())),
+            truncated=bool(self.opened["unfinished"]) or "finished" not in self.ending,
+            rebuilt=Once(self.rebuilt),
+            lost=known(tuple(self.header.get("lost", ()))),
+        )
 
     def reader(self) -> _core.RecordingReader:
         """Return the reader of this source, which reads as much as the memory that is available now allows."""
         return self._reader.within(limits.memory(self._limit))
 
-    def board(self, pairing: str) -> Contents:
+    def board(self, pairing: str) -> Board:
         """Return the contents of a board."""
         decoded = Once(lambda: self.reader().decode(pairing))
-        arrived = lambda: self.remarks()["datagrams"] > 0  # noqa: E731  the same for two fields
-        return Contents(
-            **self.common | {"verdict": once(lambda: self.verdict(lambda: decoded()[7]))},
-            **self.remarked(),
-            events=once(lambda: Events._from_parts(decoded()[0], self.array)),
-            clock=once(lambda: _clock(decoded()), arrived),
-            counts=self.counts(lambda: self.counts_of_board(decoded())),
-            datagrams=once(lambda: Datagrams(*self.reader().datagrams()), arrived),
-            version_2=once(lambda: bool(json.loads(decoded()[5])["intact"])),
-            differences=bool(self.header["difference"]),
-            origin_us=int(self.header["origin_us"]),
-            unmarked=tuple(self.header.get("repaired", ())),
+
+        def arrived() -> bool:
+            return bool(self.remarks()["datagrams"] > 0)
+
+        return Board(
+            self.origin,
+            self.sensor,
+            parts.Changes(Once(lambda: Events._from_parts(decoded()[0], self.array))),
+            parts.Wire(
+                datagrams=Once(lambda: Datagrams(*self.reader().datagrams()), arrived),
+                version_2=Once(lambda: bool(json.loads(decoded()[5])["intact"])),
+                differences=bool(self.header["difference"]),
+                origin_us=int(self.header["origin_us"]),
+                unmarked=tuple(self.header.get("repaired", ())),
+            ),
+            timing=parts.Timing(Once(lambda: _clock(decoded()), arrived)),
+            losses=self.losses(lambda: self.counts_of_board(decoded()), lambda: decoded()[7]),
+            settings=self.settings(),
+            marks=self.marks(),
         )
 
-    def remarked(self) -> dict[str, Any]:
-        """Return the fields that a board and pictures share."""
-        return {
-            "held": once(self.held),
-            "registers": once(self.registers),
-            "register_changes": once(self.register_changes),
-            "board_changes": once(lambda: board_changes_of(self.remarks()["board"])),
-            "notes": once(lambda: notes_of(self.remarks()["notes"])),
-            "detections": once(lambda: detections_of(self.remarks()["detections"])),
-            "zeroings": once(lambda: zeroings_of([one for _, one in self.remarks()["zeroings"]])),
-        }
+    def settings(self) -> parts.Settings:
+        """Return the board's state of a board, or of the pictures that were made of one."""
+        return parts.Settings(Once(self.held), Once(self.registers), Once(self.register_changes))
 
-    def pictures(self) -> Contents:
+    def marks(self) -> parts.Marks:
+        """Return what happened at a time."""
+        return parts.Marks(
+            board_changes=Once(lambda: board_changes_of(self.remarks()["board"])),
+            notes=Once(lambda: notes_of(self.remarks()["notes"])),
+            detections=Once(lambda: detections_of(self.remarks()["detections"])),
+            zeroings=Once(lambda: zeroings_of([one for _, one in self.remarks()["zeroings"]])),
+        )
+
+    def pictures(self) -> Pictures:
         """Return the contents of a source of pictures."""
-        about, place = self.header["pictures"], self.common["path"]
+        about, path = self.header["pictures"], self.origin.path
         read = Once(lambda: self.reader().pictures())
 
         def frames() -> Frames:
@@ -136,24 +146,21 @@ class _Source:
             try:
                 return Frames(shaped, frozen(t), unit=about["unit"], array=self.array)
             except ProblemError as error:
-                raise FormatError(f"{place}, source {self.common['label']}: {error}") from None
+                raise FormatError(f"{path}, source {self.origin.label}: {error}") from None
 
         def counts() -> dict[str, Any]:
             t, _, bad = read()
             damage = {"pictures": len(t), "pictures_that_could_not_be_read": bad}
             return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
-        names = about.get("columns")
-        return Contents(
-            **self.common,
-            **self.remarked(),
-            frames=once(frames),
-            counts=self.counts(counts),
-            columns=tuple(names) if names else None,
-            untimed=not about.get("clock", True),
-        )
+        turned = _stated(path, "turned", turned_of, about.get("turned"))
+        readings = parts.Readings(Once(frames), not about.get("clock", True), turned)
+        header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
+        if not about.get("columns"):
+            return Pictures(self.origin, self.sensor, readings, **header)
+        return Stream(self.origin, self.sensor, readings, parts.Lines(tuple(about["columns"])), **header)
 
-    def stream(self) -> Contents:
+    def stream(self) -> Stream:
         """Return the contents of a stream of numbers, whose lines are pictures of one row."""
         stream = self.header["stream"]
         read = Once(lambda: self.reader().samples())
@@ -172,13 +179,14 @@ class _Source:
             rows = values.reshape(len(t), 1, self.array.columns)[order]
             return Frames(rows.astype(np.float32), ascending(t[order]), unit="as sent", array=self.array)
 
-        return Contents(
-            **self.common | {"verdict": once(lambda: self.verdict(lambda: read()[4]))},
-            frames=once(frames),
-            clock=once(lambda: Clock(read()[2], read()[0])),
-            counts=self.counts(lambda: self.counts_of_stream(read())),
-            samples=once(samples, lambda: self.remarks()["samples"] > 0),
-            columns=tuple(name for name in stream["columns"] if name != stream.get("time")),
+        names = tuple(name for name in stream["columns"] if name != stream.get("time"))
+        return Stream(
+            self.origin,
+            self.sensor,
+            parts.Readings(Once(frames)),
+            parts.Lines(names, Once(samples, lambda: bool(self.remarks()["samples"] > 0))),
+            timing=parts.Timing(Once(lambda: Clock(read()[2], read()[0]))),
+            losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read()[4]),
         )
 
     def driven(self) -> Array:
@@ -210,14 +218,14 @@ class _Source:
         rebuilt = {key: int(value) for key, value in self.opened.items() if key != "unfinished"}
         return {**rebuilt, "bad_chunks": int(self.remarks()["condition"]["bad_chunks"])}
 
-    def counts(self, read: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    def counts(self, read: Callable[[], dict[str, Any]]) -> Once[Mapping[str, Any]]:
         """Return the field of counts: those that are read, or those of the recording that this one was converted from.
 
         Those have the damage of this file beside them.
         """
         if not self.before:
-            return once(read, lambda: True)
-        return once(lambda: {**self.before, **{cause: n for cause, n in self.rebuilt().items() if n}}, lambda: True)
+            return Once(read, lambda: True)
+        return Once(lambda: {**self.before, **{cause: n for cause, n in self.rebuilt().items() if n}}, lambda: True)
 
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
@@ -248,7 +256,7 @@ class _Source:
     def counted(self) -> dict[str, Any]:
         """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""
         counts = self.ending.get("finished", {}).get("counts") or {}
-        return {} if self.header.get("converted") or counts.get("converted") else counts
+        return {} if self.header.get("converted") else counts
 
     def verdict(self, found: Callable[[], str] | None = None) -> Verdict:
         """Return what was lost at which stage; `found` decodes a board or a stream, and returns what it found."""
@@ -262,17 +270,16 @@ class _Source:
         if "finished" not in self.ending:
             return True
         counts = self.ending["finished"]["counts"]
-        converted = self.header.get("converted") or counts.get("converted")
         causes = DOUBTS if counts.get("steps_back") else (*DOUBTS, *STEPS)
-        return not converted and any(counts["decoder"].get(cause, 0) for cause in causes)
+        return not self.header.get("converted") and any(counts["decoder"].get(cause, 0) for cause in causes)
 
 
-def _counts_before(path: Path, header: dict[str, Any]) -> dict[str, Any]:
-    """Return the counts of the recording that a source was converted from, if any."""
+def _stated(path: Path, entry: str, read: Callable[[Any], Any], value: Any) -> Any:
+    """Return what an entry of a header states; None if it is not there."""
     try:
-        return counts_of(header.get("counts", {}))
+        return None if value is None else read(value)
     except ProblemError as error:
-        raise FormatError(f"{path}, header, counts: {error}") from None
+        raise FormatError(f"{path}, header, {entry}: {error}") from None
 
 
 def _clock(decoded: tuple[Any, ...]) -> Clock:

@@ -16,7 +16,9 @@ from taxel.array import Array
 from taxel.formats.ros import Chosen, Read, read
 from taxel.frames import Frames
 from taxel.labels import source_of
-from taxel.recording.contents import Contents, alone
+from taxel.recording.contents import Contents, Source, alone, source_from
+from taxel.recording.once import known
+from taxel.recording.parts import Losses, Origin
 from taxel.recording.read_mcap import ascending
 
 __all__ = ["Topics", "read_ros"]
@@ -96,28 +98,25 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
             f"layout file; taxel info {path} lists its topics"
         )
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
-    sources: dict[str, Contents] = {}
+    sources: dict[str, Source] = {}
     for name, one in zip(_names(path, reads), reads, strict=True):
         told = tuple(_told(one))
         for line in told:
-            warn(f"{path}: topic {one.topic}: {line}", stacklevel=4)
-        sources[name] = Contents(
-            path,
-            path.name,
-            "ros",
-            one.array,
-            label=name,
-            source=one.topic + f".{one.field}" * bool(one.field) + f" ({one.type})",
-            frames=Frames(frozen_whole(one.values), frozen_whole(ascending(one.t)), unit=one.unit, array=one.array),
-            counts={
-                "messages": len(one.t),
-                "messages_of_another_length": one.left_out,
-                "times_by_the_bag": one.by_the_bag,
-            },
+            warn(f"{path}: topic {one.topic}: {line}", stacklevel=5)
+        losses = Losses(
+            known(
+                {
+                    "messages": len(one.t),
+                    "messages_of_another_length": one.left_out,
+                    "times_by_the_bag": one.by_the_bag,
+                }
+            ),
             remarks=() if one.has_stamps else ("at the bag's times, as its messages have no header",),
-            lost=(*told, f"other topics of the bag: {', '.join(one.unread)}") if one.unread else told,
-            sources=sources,
+            lost=known((*told, f"other topics of the bag: {', '.join(one.unread)}") if one.unread else told),
         )
+        source = one.topic + f".{one.field}" * bool(one.field) + f" ({one.type})"
+        frames = Frames(frozen_whole(one.values), frozen_whole(ascending(one.t)), unit=one.unit, array=one.array)
+        sources[name] = source_from(frames, Origin(path, path.name, "ros", name, source), losses=losses)
     return alone(sources)
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,13 +22,15 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.between import Apart, between
-from taxel.recording.contents import UNKNOWN, Contents, once
-from taxel.recording.fates import after
+from taxel.recording.between import Slices, between, inside
+from taxel.recording.changes import BoardChange, Zeroing
+from taxel.recording.contents import Contents, S, Stream
 from taxel.recording.kinds import kind_of_file, verdict_of
-from taxel.recording.notes import BoardChange, Datagrams, Zeroing
 from taxel.recording.on_clock import on_clock
+from taxel.recording.once import UNKNOWN, Once
+from taxel.recording.parts import Wire
 from taxel.recording.pictures import at_rate, calibrated, pictures
+from taxel.recording.raw import Datagrams
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 from taxel.wire import Registers
@@ -85,8 +88,9 @@ class Recording:
         if not isinstance(contents, Contents):
             raise ProblemError(f"contents is {shown(contents)}: a recording is opened by taxel.open(path), not built")
         self._contents = contents
-        self.path, self.name, self.kind = contents.path, contents.name, contents.kind
-        self.array, self.source = contents.array, contents.source
+        one = contents.one
+        self.path, self.name, self.kind = one.origin.path, one.origin.name, one.origin.kind
+        self.array, self.source = one.sensor.array, one.origin.source
         self._cut_from: tuple[weakref.ref[Recording], float, float] | None = None
 
     path: Path
@@ -103,8 +107,8 @@ class Recording:
         ------
         ProblemError : the file holds pictures
         """
-        events = self._contents.events
-        if events is None:
+        events = self._contents.one.table
+        if not isinstance(events, Events):
             raise ProblemError(f"{self.path}: holds pictures and no events; ask for frames()")
         return events
 
@@ -126,9 +130,7 @@ class Recording:
         ------
         ProblemError : an invalid rate, or events without intensities
         """
-        frames = pictures(self._contents, rate_hz).frames
-        assert frames is not None  # pictures
-        return frames
+        return pictures(self._contents.one, rate_hz).table
 
     @property
     def sources(self) -> dict[str, Recording]:
@@ -142,9 +144,8 @@ class Recording:
         ------
         ProblemError : a slice by the clock of one source, as the other sources have other clocks
         """
-        own = self._contents
-        every = own.sources or {own.label: own}
-        return {name: self if len(every) == 1 else Recording(one_source(own, name)) for name in every}
+        every = self._contents.sources
+        return {name: self if len(every) == 1 else Recording(Contents(every[name], every)) for name in every}
 
     def on_clock(self, name: str) -> Recording:
         """Return the same recording with the times of all sources by the clock of one of them, or of the host.
@@ -175,7 +176,7 @@ class Recording:
         otherwise be unknown; for a slice they follow from the events before it. `frames` begins with them, and so do
         encoders and readouts whose argument is the recording (not its events alone).
         """
-        held = self._contents.held
+        held = self._contents.one.settings.held()
         return None if held is None else np.where(held == UNKNOWN, np.nan, held).astype(np.float32)
 
     @property
@@ -187,7 +188,7 @@ class Recording:
         FormatError : it cannot be read
         ProblemError : it is of another array, or of readings in another unit
         """
-        return self._contents.calibration
+        return self._contents.one.sensor.calibration()
 
     def calibrated(self, rate_hz: float | None = None, rest: Tare | None = None) -> Frames:
         """Return pictures in N or kPa, by the calibration in the file's folder.
@@ -203,46 +204,44 @@ class Recording:
         ------
         ProblemError : no calibration lies beside it, or one of another array
         """
-        frames = calibrated(self._contents, rate_hz, rest).frames
-        assert frames is not None  # pictures
-        return frames
+        return calibrated(self._contents.one, rate_hz, rest).table
 
     @property
     def side(self) -> str:
         """The foot or hand that the sensor is of, "left" or "right"; "" if not stated."""
-        return self._contents.side
+        return self._contents.one.sensor.side
 
     @property
     def heel(self) -> str:
         """Where on the sensor the heel lies, "top" or "bottom"; "" if not stated."""
-        return self._contents.heel
+        return self._contents.one.sensor.heel
 
     @property
     def is_slice(self) -> bool:
         """Whether this is a part of the file by time, made by `between`."""
-        return self._contents.is_slice
+        return self._contents.one.timing.stretch is not None
 
     @property
     def has_events(self) -> bool:
         """Whether the file holds events (else pictures)."""
-        return self._contents.has_events
+        return self._contents.one.has_events
 
     @property
     def timed(self) -> bool:
         """Whether it has times; else its pictures are numbered: the time of picture k is k us (`at_rate`)."""
-        return not self._contents.untimed
+        return not self._contents.one.untimed
 
     @property
     def label(self) -> str:
         """The name of the source within its file, as "left"; "" for a file of several sensors as a whole."""
-        return self._contents.label
+        return self._contents.one.origin.label
 
     @property
     def title(self) -> str:
         """The path, with the name of the source or of the trial where the file holds several."""
-        own, place = self._contents, str(self.path)
-        if own.label and len([one for one in own.sources.values() if vars(one)["columns"] is None]) > 1:
-            return f"{place} {own.label}"
+        place, sources = str(self.path), inside(self._contents.sources)
+        if self.label and sum(not isinstance(one, Stream) for one in sources.values()) > 1:
+            return f"{place} {self.label}"
         return place if place.endswith(self.name) else f"{place}, {self.name}"
 
     @property
@@ -255,17 +254,17 @@ class Recording:
         ------
         FormatError : an invalid table of labels (names the line)
         """
-        return self._contents.notes
+        return self._contents.one.marks.notes()
 
     @property
     def zeroings(self) -> tuple[Zeroing, ...]:
         """Taxels that people zeroed while recording, in order; a slice includes those before it, which still apply."""
-        return self._contents.zeroings
+        return self._contents.one.marks.zeroings()
 
     @property
     def detections(self) -> Detections:
         """The detections of a readout while recording."""
-        return self._contents.detections
+        return self._contents.one.marks.detections()
 
     @property
     def registers(self) -> Registers | None:
@@ -273,22 +272,22 @@ class Recording:
 
         They are those of the whole sensor (`Registers.array`), even if the recording is a part of it.
         """
-        return self._contents.registers
+        return self._contents.one.settings.registers()
 
     @property
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:
         """The registers at each change while recording, with the host's time (ns since 1970)."""
-        return self._contents.register_changes
+        return self._contents.one.settings.register_changes()
 
     @property
     def board_changes(self) -> tuple[BoardChange, ...]:
         """Resets of the board and changes of its version of the wire, as detected while recording."""
-        return self._contents.board_changes
+        return self._contents.one.marks.board_changes()
 
     @property
     def clock(self) -> Clock | None:
         """Arrival times against board time; None if the file has no arrival times."""
-        return self._contents.clock
+        return self._contents.one.timing.clock()
 
     @property
     def columns(self) -> list[str]:
@@ -298,22 +297,20 @@ class Recording:
         ------
         ProblemError : the recording is not a stream of numbers
         """
-        columns = self._contents.columns
+        columns = self._contents.one.columns
         if columns is None:
-            raise ProblemError(
-                f"{self.path}: source {self._contents.label!r} is no stream of numbers, so it has no columns"
-            )
+            raise ProblemError(f"{self.path}: source {self.label!r} is no stream of numbers, so it has no columns")
         return list(columns)
 
     @property
     def is_stream(self) -> bool:
         """Whether it is a stream of numbers, such as that of an IMU, instead of an array of taxels."""
-        return self._contents.columns is not None
+        return self._contents.one.columns is not None
 
     @property
     def is_on_clock(self) -> bool:
         """Whether times were converted to another clock by `on_clock`."""
-        return self._contents.clock_of is not None
+        return self._contents.one.timing.clock_of is not None
 
     def datagrams(self) -> Datagrams:
         """Return the raw datagrams as received; a slice returns all those of the file.
@@ -322,11 +319,14 @@ class Recording:
         ------
         ProblemError : there are none: a stream, a part of a sensor, or a kind of file that does not hold them
         """
-        datagrams = self._contents.datagrams
+        if self._contents.is_several:
+            # Reading the events raises the error that lists the sources.
+            _ = self._contents.one.table
+        datagrams = self._contents.one.part(Wire).datagrams()
         if datagrams is not None:
             return datagrams
         if self.is_stream:
-            why = f"source {self._contents.label!r} is a stream of numbers, which has lines and no datagrams"
+            why = f"source {self.label!r} is a stream of numbers, which has lines and no datagrams"
         elif self.kind == "mcap":
             why = "a part of the sensor has no datagrams; those of the file are of the whole"
         else:
@@ -336,7 +336,7 @@ class Recording:
     @property
     def counts(self) -> dict[str, Any]:
         """The numbers of what was received and lost, by cause."""
-        return dict(self._contents.counts)
+        return dict(self._contents.one.losses.counts())
 
     @property
     def verdict(self) -> Verdict:
@@ -345,7 +345,7 @@ class Recording:
         That of a part is that of the whole file. The page *What the output means* lists statuses, causes and wordings;
         all else there is to know is in `remarks`.
         """
-        return verdict_of(self._contents)
+        return verdict_of(self._contents.one)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -363,7 +363,7 @@ class Recording:
         >>> one.verdict, one.remarks
         ('the .npz does not say what was lost', ('converted from one.npz',))
         """
-        return self._contents.remarks
+        return self._contents.one.losses.remarks
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -383,12 +383,12 @@ class Recording:
         >>> whole.lost, half.lost
         ((), ('raw datagrams',))
         """
-        return self._contents.lost
+        return self._contents.one.losses.lost()
 
     @property
     def truncated(self) -> bool:
         """Whether what came last is missing: the writer was killed, or the file was cut within its data."""
-        return self._contents.truncated
+        return self._contents.one.losses.truncated
 
     @property
     def rebuilt(self) -> dict[str, int]:
@@ -396,7 +396,7 @@ class Recording:
 
         A missing or damaged summary (`no_summary`) and damaged final counts (`no_end`) count 1.
         """
-        return dict(self._contents.rebuilt)
+        return dict(self._contents.one.losses.rebuilt())
 
     def between(self, start: float, stop: float) -> Recording:
         """Return the part of ``start <= t < stop`` (us of the board's clock).
@@ -436,7 +436,7 @@ class Recording:
         asked, whole = f" from {plain(start)} to {plain(stop)} us", of()
         if whole is None:
             return f"{asked} of {self.title}"
-        t = whole._contents.table.t
+        t = whole._contents.one.table.t
         return f"{asked}: {whole.title} " + (f"lies from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
@@ -453,10 +453,10 @@ class Recording:
         Examples
         --------
         >>> import pathlib, tempfile, taxel
-        >>> from taxel.recording.contents import Contents
+        >>> from taxel.recording.contents import Contents, Origin, source_from
         >>> frames = taxel.Frames([[[1.0]], [[2.0]]], [0, 1])
-        >>> numbered = Contents(pathlib.Path("grasp"), "grasp", "icub", frames.array, frames=frames, untimed=True)
-        >>> taxel.Recording(numbered).at_rate(50).frames().t
+        >>> numbered = source_from(frames, Origin(pathlib.Path("grasp"), "grasp", "icub"), untimed=True)
+        >>> taxel.Recording(Contents.of(numbered)).at_rate(50).frames().t
         array([    0, 20000])
         """
         return Recording(at_rate(self._contents, rate_hz))
@@ -486,14 +486,14 @@ class Recording:
         own = self._contents
         if own.is_several:
             return escaped(f"Recording({self.name}: {len(own.sources)} sources: {', '.join(own.sources)})")
-        what = own.table if own.has_events else self.frames()
+        what = own.one.table
         noun = "event" if self.has_events else "picture"
         time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) and self.timed else "no time"
         more = [counted(len(self.notes), "note")] * bool(self.notes)
         more += [counted(len(self.detections), "detection")] * bool(len(self.detections))
         more += [counted(len(self.zeroings), "zeroed taxel")] * bool(self.zeroings)
         more += ["truncated"] * self.truncated
-        others = [] if own.is_slice and own.clock_of is None else [name for name in own.sources if name != own.label]
+        others = [] if self.is_slice and not self.is_on_clock else [name for name in own.sources if name != self.label]
         more += [f"beside {', '.join(others)}"] * bool(others)
         size = f"{self.array.rows} x {self.array.columns} taxels"
         return escaped(f"Recording({self.name}: {', '.join([counted(len(what), noun), time, size, *more])})")
@@ -501,21 +501,13 @@ class Recording:
 
 def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:
     """Return the same contents with further notes."""
-
-    def sources() -> Mapping[str, Contents]:
-        if isinstance(of.sources, Apart):
-            return of.sources
-        every = dict(of.sources)
-        if of.label in every:
-            every[of.label] = every[of.label].but(notes=once(lambda: of.notes + more), sources=every)
-        return every
-
-    return after("with_notes", of, notes=once(lambda: of.notes + more), sources=once(sources))
+    label, sources = of.one.origin.label, of.sources
+    if label in sources:
+        one = noted(inside(sources)[label], more)
+        sources = sources.but(label, one) if isinstance(sources, Slices) else {**sources, label: one}
+    return Contents(noted(of.one, more), sources)
 
 
-def one_source(of: Contents, name: str) -> Contents:
-    """Return one source of a file; its `sources` are all those of the file."""
-    one = of.sources[name]
-    fixed = ("path", "kind", "clock_of", "sources")
-    values = {field: value for field, value in vars(one).items() if field not in (*fixed, "lost")}
-    return after("source", of, **values).but(lost=vars(one)["lost"])
+def noted(of: S, more: tuple[Note, ...]) -> S:
+    """Return the same source with further notes."""
+    return replace(of, marks=replace(of.marks, notes=Once(lambda: of.marks.notes() + more)))

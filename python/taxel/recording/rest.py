@@ -130,7 +130,7 @@ class Rest:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
         said = None if path is None else Layout.beside(path)
         with suppress(FormatError, OSError):
-            if said is not None and Layout.read(said).falls is not False:
+            if said is not None and Layout.read(said).turned is not None:
                 return f"values fall from their rest as {said.name} turns them: leave falls out of it, if that is wrong"
         where = "" if path is None else f" {or_given(path)}"
         return f"values fall from their rest: if less means more pressure, say falls = true in a layout file{where}"

@@ -2,35 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import assert_never
 
 import numpy as np
 
-from taxel import _core, wire
+from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.clock import Clock
 from taxel.events import Events
+from taxel.formats.layout import Layout
 from taxel.frames import Frames
-from taxel.recording.contents import Contents, once, several, together
-from taxel.recording.csv import array_in_csv
-from taxel.recording.fates import after, sensor
+from taxel.recording import parts
+from taxel.recording.contents import (
+    Board,
+    Contents,
+    Drawn,
+    Pictures,
+    Source,
+    Stream,
+    applied,
+    parts_of,
+    saying,
+    several,
+    source_from,
+    together,
+)
 from taxel.recording.kinds import ENDINGS, verdict_of
-from taxel.recording.sidecars import calibration_beside, has_calibration
+from taxel.recording.once import known
+from taxel.recording.sidecars import calibration_beside
+from taxel.recording.write_csv import array_in_csv
 from taxel.recording.write_mcap import cut_raw, encoded
+from taxel.wire import decode as wire_decode
 
 __all__ = ["STAMP_US", "is_made", "stored"]
 
 #: The unit of the stamps of wire version 1, us.
 STAMP_US = 100
 
-#: Fields that describe how the datagrams are encoded.
-_OF_DATAGRAMS = ("version_2", "differences", "origin_us", "unmarked")
-
 #: The most numbers of repaired events in the description of a .mcap, which is limited to 16 MiB.
 _MOST = 1_000_000
+
+#: What a file can hold, and a line for each kind of information that it cannot.
+_Kept = tuple[Source, list[str]]
 
 
 def stored(of: Contents, place: Path) -> Contents:
@@ -40,137 +58,210 @@ def stored(of: Contents, place: Path) -> Contents:
     ------
     ProblemError : contents that the kind of file cannot hold at all (pictures in a .lsa)
     """
-    ending = place.suffix.lower()
+    ending, one = place.suffix.lower(), of.one
     if of.is_several and ending == ".mcap" and together(of.sources):
-        parts = {name: stored(one.but(sources={}), place) for name, one in of.sources.items()}
-        parts.update({name: one.but(name=f"{place.name} {name}", sources=parts) for name, one in parts.items()})
-        return several(parts)
-    common: dict[str, Any] = {"path": place, "name": place.name, "kind": ENDINGS[ending], "label": "board"}
-    lines = {".mcap": _mcap, ".lsa": _lsa, ".csv": _csv, ".npz": _table, ".h5": _table}[ending]
-    return lines(of, ending, common | _calibration(of, place))
+        each = {name: _stored(source, ending, place) for name, source in of.sources.items()}
+        each = {name: _named(source, f"{place.name} {name}", name) for name, source in each.items()}
+        return Contents(several(each), each)
+    if of.is_several:
+        # Reading the events raises the error that lists the sources.
+        _ = one.table
+    kept = _stored(one, ending, place)
+    if not isinstance(one, Pictures) or ending != ".mcap":
+        kept = _named(kept, place.name, "board")
+    return Contents.of(saying(kept, of.others))
 
 
-def is_made(of: Contents) -> bool:
+def _named(of: Source, name: str, label: str) -> Source:
+    return replace(of, origin=replace(of.origin, name=name, label=label))
+
+
+def _stored(of: Source, ending: str, place: Path) -> Source:
+    """Return what a file can hold of a source."""
+    kept, lines = {".mcap": _mcap, ".lsa": _lsa, ".csv": _csv, ".npz": _table, ".h5": _table}[ending](of, place)
+    beside = calibration_beside(place, of)
+    kept = replace(
+        kept,
+        origin=replace(kept.origin, path=place, name=place.name, kind=ENDINGS[ending]),
+        sensor=replace(kept.sensor, calibration=beside),
+        # A part that is written to a file becomes a recording of its own.
+        timing=replace(kept.timing, stretch=None),
+    )
+    alone = of.sensor.calibration.holds() and not beside.holds()
+    return saying(
+        kept, lambda: [*lines, *["the calibration, a file of its own: lay a copy beside the new one"] * alone]
+    )
+
+
+def is_made(of: Source) -> bool:
     """Return whether a file's bytes must be made of the events, as no datagrams contain exactly these events."""
-    return of.is_slice or of.clock_of is not None or not (of.holds("datagrams") or of.holds("payload"))
+    has_bytes = bool(of.part(parts.Wire).lines())
+    return of.timing.stretch is not None or of.timing.clock_of is not None or not has_bytes
 
 
-def _calibration(of: Contents, place: Path) -> dict[str, Any]:
-    """Return the calibration beside a new file."""
-    return {"calibration": once(lambda: calibration_beside(place, of), lambda: has_calibration(place))}
+def _sensor(array: Array) -> str:
+    """Return the line of `lost` for a sensor."""
+    some = "" if array.exists is None else f", {array.taxels} exist"
+    return f'the sensor ({array.rows} x {array.columns} taxels{some}, {array._apart()}, "{array.name}")'
 
 
-def _left_beside(of: Contents, place: Path) -> list[str]:
-    """Return a line if the recording's calibration does not lie beside the new file."""
-    if not of.holds("calibration") or has_calibration(place):
-        return []
-    return ["the calibration, a file of its own: lay a copy beside the new one"]
+def _arrivals(of: Source) -> list[str]:
+    """Return what is lost without arrival times, which datagrams have too."""
+    return ["arrival times"] * (of.timing.clock.holds() and not of.part(parts.Wire).datagrams.holds())
 
 
-def _table(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
-    """Return the contents of a .npz or a .h5: all but the raw datagrams."""
-    place = common["path"]
-    return after(ending, of, lambda: _left_beside(of, place), **common, source=of.source or of.name)
+def _table(of: Source, _: Path) -> _Kept:
+    """Return what a .npz or a .h5 holds: all but the raw datagrams."""
+    wire, lines = of.part(parts.Wire), of.part(parts.Lines)
+
+    def rule(part: parts.Part) -> parts.Part | None:
+        match part:
+            case parts.Origin():
+                return replace(part, source=part.source or part.name)
+            case (
+                parts.Sensor() | parts.Settings() | parts.Marks() | parts.Losses() | parts.Changes() | parts.Readings()
+            ):
+                return part
+            case parts.Wire():
+                return parts.Wire()
+            case parts.Lines():
+                return parts.Lines(part.columns)
+            case parts.Timing():
+                return None
+            case _:
+                assert_never(part)
+
+    return applied(of, rule), [*_arrivals(of), *wire.lines(with_times=True), *lines.received()]
 
 
-def _csv(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
-    """Return the contents of a .csv: events without markers, or pictures without their unit."""
-    place = common["path"]
-    table, events, frames = of.table, None, None
-    own = array_in_csv(table)
-    same = replace(of.array, name=own.name, names=None) == own
-    lost = [f'the name of the sensor ("{of.array.name}")' if same else sensor(of.array)]
-    lost += ["the names of the taxels"] * (of.array.names is not None)
-    if isinstance(table, Events):
-        lost += [f"{counted(len(table.markers), 'marker')} of start and stop"] * bool(table.markers)
-        events = table[:]
-        events.markers = ()
-        events.array = array_in_csv(table)
+def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
+    """Return a table alone, and what is lost of each of the other parts; of the bytes it is given."""
+    others = (part for part in parts_of(of).values() if not isinstance(part, parts.Wire))
+    return source_from(table, losses=parts.Losses(lost=of.losses.lost)), [
+        *(line for part in others for line in part.lines()),
+        *_arrivals(of),
+        *wire,
+    ]
+
+
+def _csv(of: Source, place: Path) -> _Kept:
+    """Return what a .csv holds: events without markers, or frames without their unit."""
+    beside, is_turned = Layout.beside(place), isinstance(of, Pictures) and of.readings.turned is not None
+    if is_turned and beside is not None and Layout.read(beside).turned is not None:
+        raise ProblemError(
+            f"{place}: the readings were turned already, which a .csv cannot state, and {beside} beside it would turn "
+            "them again; write it to another folder, or as a .npz, .h5 or .mcap"
+        )
+    whole, own = of.table, of.sensor.array
+    array = array_in_csv(whole)
+    same = replace(own, name=array.name, names=None) == array
+    lost = [f'the name of the sensor ("{own.name}")' if same else _sensor(own)]
+    lost += ["the names of the taxels"] * (own.names is not None)
+    if isinstance(whole, Events):
+        lost += [f"{counted(len(whole.markers), 'marker')} of start and stop"] * bool(whole.markers)
+        events = whole[:]
+        events.markers, events.array = (), array
+        table: Events | Frames = events
     else:
-        lost += [f"the unit ({table.unit})"] * (table.unit != "counts")
-        array = array_in_csv(table)
-        frames = Frames(table.values[:, : array.rows, : array.columns], table.t, array=array)
-    changed: dict[str, Any] = {"events": events, "frames": frames, "array": array_in_csv(table)}
-    return after(ending, of, lambda: [*lost, *_left_beside(of, place)], **common, **changed)
+        lost += [f"the unit ({whole.unit})"] * (whole.unit != "counts")
+        table = Frames(whole.values[:, : array.rows, : array.columns], whole.t, array=array)
+    kept, lines = _bare(of, table, of.part(parts.Wire).lines(with_times=True))
+    return kept, [*lines, *lost]
 
 
-def _lsa(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
-    """Return the contents of a .lsa: the board's bytes as received, or made of the events."""
-    place, events = common["path"], _events(of, common["path"])
-    lost = [sensor(of.array)] * (of.array != Array.thesis())
-    payload = of.payload if of.datagrams is None else of.datagrams.payload
-    if payload is None or is_made(of) or of.version_2:
-        lost += ["raw bytes (words that are no events)"] * of.holds("payload")
+def _lsa(of: Source, place: Path) -> _Kept:
+    """Return what a .lsa holds: the board's bytes as received, or made of the events."""
+    board = _board(of, place)
+    events, wire, own = board.table, board.wire, of.sensor.array
+    datagrams, made = wire.datagrams(), is_made(of)
+    payload = wire.payload if datagrams is None else datagrams.payload
+    if made or wire.version_2():
+        of_wire = wire.lines(with_times=True)
+    else:
+        of_wire = ["arrival times, and where datagrams begin"] * wire.datagrams.holds()
+    of_wire += ["that intensities are differences"] * wire.differences
+    lost = [_sensor(own)] * (own != Array.thesis())
+    if payload is None or made or wire.version_2():
         times = np.concatenate([events.t, np.array([at for at, _ in events.markers], np.int64)])
         lost += ["times finer than 100 us"] * bool((times % STAMP_US).any())
         lost += ["which events are repaired"] * (events.repaired is not None)
         payload = np.frombuffer(_core.wire_encode(events._parts()), np.uint8)
-    again = wire.decode(payload, array=of.array, differences=of.differences and not is_made(of))
+    again = wire_decode(payload, array=own, differences=wire.differences and not made)
     if len(again) != len(events):
         lost.append(f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)")
     elif (again.t != events.t // STAMP_US * STAMP_US).any():
         lost.append("whole turns of 6.5536 s in times")
-    changed: dict[str, Any] = {"array": Array.thesis(), "events": once(lambda: events), "frames": None}
-    return after(ending, of, lambda: [*lost, *_left_beside(of, place)], **common, **changed, payload=payload)
+    kept, lines = _bare(of, events, of_wire)
+    assert isinstance(kept, Board)  # of events
+    return replace(kept, wire=parts.Wire(payload=payload)), [*lines, *lost]
 
 
-def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
-    """Return the contents of a .mcap: all; events without datagrams of exactly these events get new datagrams."""
-    place, is_file = common["path"], of.kind != "events"
+def _mcap(of: Source, place: Path) -> _Kept:
+    """Return what a .mcap holds: all; events without datagrams of exactly these events get new datagrams."""
+    is_file, lines = of.origin.kind != "events", of.losses.damage()
     # Of what recordings were merged stands in `source`.
-    origin = [f"converted from {of.name}"] if is_file and of.kind != "merged" else []
-    changed: dict[str, Any] = {
-        "source": of.source or of.name or ("events" if of.has_events else "pictures"),
-        "rebuilt": {},
-        "truncated": False,
-        "counts": once(lambda: of.counts),
-        "verdict": verdict_of(of) if is_file else None,
-        "remarks": once(lambda: tuple(dict.fromkeys((*of.remarks, *origin)))),
-    }
-    if of.samples is not None:
-        stay = (*_OF_DATAGRAMS, "events", "frames", "clock", "datagrams", "payload", "label")
-        changed |= {name: vars(of)[name] for name in stay}
-        bad = of.counts.get("lines_that_could_not_be_read", 0)
-        lines = [f"{bad} lines that could not be read"] * bool(bad)
-        outside = of.clock is not None and len(of.clock.board_us) > len(of.samples)
-        lines += ["arrival times of lines outside the part"] * outside
-        return after(ending, of, lambda: [*lines, *_mended(of), *_left_beside(of, place)], **(common | changed))
-    if not of.has_events:
-        # Pictures have the times of the board alone.
-        whole = "raw datagrams with their arrival times"
-        lines = [whole] if of.holds("datagrams") else ["arrival times"] * of.holds("clock")
-        lines += ["raw bytes (words that are no events)"] * of.holds("payload")
-        held = {name: vars(of)[name] for name in ("frames", "label")}
-        none = {"events": None, "clock": None, "datagrams": None, "payload": None}
-        made = {"version_2": False, "differences": False, "origin_us": 0, "unmarked": ()}
-        changed = common | changed | held | none | made
-        return after(ending, of, lambda: [*lines, *_mended(of), *_left_beside(of, place)], **changed)
-    events = _events(of, place)
-    changed |= {"events": once(lambda: events), "frames": None, "payload": None}
+    converted = [f"converted from {of.origin.name}"] if is_file and of.origin.kind != "merged" else []
+    samples = of.lines.samples() if isinstance(of, Stream) else None
+    events = None if isinstance(of, Pictures) else known(_board(of, place).table)
+    clock = of.timing.clock() if of.timing.clock.holds() else None
+    wire = _wire(of, clock, lines) if isinstance(of, Board) else parts.Wire()
+    if samples is not None:
+        bad = of.losses.counts().get("lines_that_could_not_be_read", 0)
+        lines += [f"{bad} lines that could not be read"] * bool(bad)
+        lines += ["arrival times of lines outside the part"] * (
+            clock is not None and len(clock.board_us) > len(samples)
+        )
+    elif isinstance(of, Pictures):
+        # Frames have the times of the board alone.
+        clock = None
+        lines += _arrivals(of)
+        lines += of.wire.lines(with_times=True) if isinstance(of, Drawn) else []
+
+    def rule(part: parts.Part) -> parts.Part:
+        match part:
+            case parts.Origin():
+                return replace(part, source=part.source or part.name or ("events" if of.has_events else "pictures"))
+            case parts.Sensor() | parts.Settings() | parts.Marks() | parts.Readings() | parts.Lines():
+                return part
+            case parts.Changes():
+                return parts.Changes(events or part.events)
+            case parts.Timing():
+                lines.extend(part.lines())
+                return parts.Timing(known(clock))
+            case parts.Wire():
+                return wire
+            case parts.Losses():
+                return parts.Losses(
+                    counts=part.counts,
+                    verdict=known(verdict_of(of) if is_file else None),
+                    remarks=tuple(dict.fromkeys((*part.remarks, *converted))),
+                    lost=part.lost,
+                )
+            case _:
+                assert_never(part)
+
+    return applied(of, rule), lines
+
+
+def _wire(of: Board, clock: Clock | None, lost: list[str]) -> parts.Wire:
+    """Return the datagrams of a new .mcap: those received, or new ones made of the events."""
+    wire = of.wire
     if not is_made(of):
-        same = (*_OF_DATAGRAMS, "clock", "datagrams", "payload")
-        changed |= {name: vars(of)[name] for name in same}
-        if of.datagrams is None and of.payload is not None:
-            changed["datagrams"] = cut_raw(of.payload)
-        return after(ending, of, lambda: [*_mended(of), *_left_beside(of, place)], **common, **changed)
-    clock = of.clock if of.clock is not None and len(of.clock.board_us) else None
-    lost = ["raw datagrams"] * of.holds("datagrams") + ["raw bytes (words that are no events)"] * of.holds("payload")
-    origin_us, datagrams, unmarked = encoded(events, of.held, clock)
+        datagrams = wire.datagrams
+        if wire.payload is not None and datagrams() is None:
+            datagrams = known(cut_raw(wire.payload))
+        return replace(wire, datagrams=datagrams, payload=None)
+    lost += wire.lines()
+    origin_us, made, unmarked = encoded(of.table, of.settings.held(), clock)
     lost += [f"that {len(unmarked) - _MOST} of the events are repaired"] * (len(unmarked) > _MOST)
-    changed |= {"datagrams": datagrams, "version_2": True, "differences": False, "clock": clock}
-    changed |= {"origin_us": origin_us, "unmarked": tuple(unmarked[:_MOST].tolist())}
-    return after(ending, of, lambda: [*lost, *_mended(of), *_left_beside(of, place)], **common, **changed)
+    return parts.Wire(
+        known(made), version_2=known(True), origin_us=origin_us, unmarked=tuple(unmarked[:_MOST].tolist())
+    )
 
 
-def _mended(of: Contents) -> list[str]:
-    """Return a line if a new .mcap is made of a damaged file, as the new file itself is undamaged."""
-    return ["that its end is missing"] * of.truncated + ["what reading had to put up with"] * of.holds("rebuilt")
-
-
-def _events(of: Contents, place: Path) -> Events:
-    events = of.events
-    if events is None:
+def _board(of: Source, place: Path) -> Board:
+    if not isinstance(of, Board):
         raise ProblemError(
             f"{place}: a {place.suffix.lower()} holds events and no pictures; write those to .mcap, .npz, .csv or .h5"
         )
-    return events
+    return of

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Self, get_args
 
 from taxel import _core
-from taxel._base.arguments import text
 from taxel._core import ProblemError
 
 __all__ = ["STATUSES", "Status", "Verdict"]
@@ -21,23 +19,13 @@ STATUSES: tuple[Status, ...] = get_args(Status)
 #: The whole numbers of a verdict, each a mapping from cause to number.
 _NUMBERS = ("lost", "damaged", "noted")
 
-#: The error in a text that an error stopped a recording.
-_ERROR = re.compile(r"(?<=stopped by an error) \(.*\)(?=: what came last)")
-
 
 class Verdict(str):
     """State what a recording lost: a line of text with a status, and numbers by cause.
 
     The page *What the output means* lists statuses, causes and wordings.
 
-    Parameters
-    ----------
-    line : str
-        A line that an earlier version wrote: only its status is known, and no numbers. A verdict keeps its numbers.
-
-    Raises
-    ------
-    ProblemError : a line that is no text
+    Made by `taxel.open`, or by `from_dict`.
 
     Attributes
     ----------
@@ -54,8 +42,7 @@ class Verdict(str):
         The time after which times are doubtful; of several parts the earliest.
     steps_back : list of dict of int
         Where times step back in the order of arrival, at most the 256 largest steps: "after_us", the latest time before
-        it; "by_us", how far the earliest event is before that; "events", how many are. Files of earlier versions do
-        not state them.
+        it; "by_us", how far the earliest event is before that; "events", how many are.
     stretch_of : str or None
         Of a stretch of a recording a name of the whole, whose losses these are: `merge` counts them once.
     parts : dict of Verdict
@@ -72,11 +59,12 @@ class Verdict(str):
 
     _held: Mapping[str, Any]
 
-    def __new__(cls, line: str) -> Self:
-        """Return the verdict of a line."""
-        if isinstance(line, Verdict):
-            return cls._from(line._held)
-        return cls._of({"line": text("line", line)})
+    def __new__(cls, *_: object) -> Self:
+        """Refuse a verdict built by hand."""
+        raise ProblemError("a verdict comes with a recording, or from Verdict.from_dict; it is not built")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Verdict._from, (self._held,)
 
     @classmethod
     def _of(cls, basis: Mapping[str, Any]) -> Self:
@@ -86,24 +74,24 @@ class Verdict(str):
     @classmethod
     def _from(cls, held: Mapping[str, Any]) -> Self:
         """Return the verdict that the compiled part states."""
-        made = super().__new__(cls, held["text"])
+        made = str.__new__(cls, held["text"])
         made._held = held
         return made
 
     @classmethod
-    def _together(cls, parts: Iterable[tuple[str, str]]) -> Self:
+    def _together(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on several recordings or sources, each with its name."""
-        return cls._of({"together": [(name, Verdict(one)._held) for name, one in parts]})
+        return cls._of({"together": [(name, one._held) for name, one in parts]})
 
     @classmethod
-    def _of_sources(cls, parts: Iterable[tuple[str, str]]) -> Self:
+    def _of_sources(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on the sources of one file, each with its name; damage of the file counts once."""
-        return cls._of({"sources": [(name, Verdict(one)._held) for name, one in parts]})
+        return cls._of({"sources": [(name, one._held) for name, one in parts]})
 
     @classmethod
-    def _of_stretches(cls, parts: Iterable[tuple[str, str]]) -> Self:
+    def _of_stretches(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on stretches of one recording, each with its name; what the whole lost counts once."""
-        return cls._of({"stretches": [(name, Verdict(one)._held) for name, one in parts]})
+        return cls._of({"stretches": [(name, one._held) for name, one in parts]})
 
     def _as_stretch_of(self, whole: str) -> Self:
         """Return the same verdict as that of a stretch of the recording of this name."""
@@ -163,8 +151,8 @@ class Verdict(str):
 
         Examples
         --------
-        >>> Verdict("nothing lost").to_dict()["status"]
-        'complete'
+        >>> Verdict.from_dict({"status": "complete", "text": "nothing lost"}).to_dict()["lost"]
+        {}
         """
         numbers = {name: dict(self._held[name]) for name in _NUMBERS}
         parts = {name: part.to_dict() for name, part in self.parts.items()}
@@ -187,10 +175,11 @@ class Verdict(str):
 
         Examples
         --------
-        >>> Verdict.from_dict(Verdict("nothing lost").to_dict()) == "nothing lost"
-        True
+        >>> verdict = Verdict.from_dict({"status": "complete", "text": "nothing lost"})
+        >>> verdict, Verdict.from_dict(verdict.to_dict()) == verdict
+        ('nothing lost', True)
         """
-        return cls._of({"together": [("", _stated(held))]})
+        return cls._from(_stated(held))
 
 
 def _are_steps(steps: Any) -> bool:
@@ -227,12 +216,6 @@ def _stated(held: Any) -> dict[str, Any]:
     if STATUSES.index(own["status"]) < STATUSES.index("damaged") and own.get(doubtful) is not None:
         raise ProblemError(
             f"verdict: its status is {own['status']}, but its times are doubtful: must be damaged, or worse"
-        )
-    # The text on several parts has their names, and that of an error what the system said.
-    told = Verdict(_ERROR.sub("", own["text"])).status
-    if STATUSES.index(own["status"]) < STATUSES.index(told) and not parts:
-        raise ProblemError(
-            f"verdict: its status is {own['status']}, but its text says {told}: must be {told}, or worse"
         )
     stated = {str(name): _stated(part) for name, part in parts.items()}
     for name, part in stated.items():

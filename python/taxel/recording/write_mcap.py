@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,17 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._core import RecordingWriter
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Contents, once
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import Datagrams
+from taxel.recording.once import known
 from taxel.recording.pressure import above_rest
+from taxel.recording.raw import Datagrams
 from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, ticks_by_unit
 
-__all__ = ["cut_raw", "encoded", "write_mcap"]
+__all__ = ["RecordingWriter", "cut_raw", "encoded", "write_mcap"]
 
 #: Number of values of a block of pictures: a chunk of the file.
 _BLOCK = 1 << 18
@@ -38,7 +41,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     ----------
     part : Path
     contents : Contents
-        With datagrams, or the lines of a stream.
+        Of a board with datagrams, of a stream with lines, or of frames.
     compression : {"none", "lz4", "zstd"}
     counts : mapping from str to dict
         For each source the numbers of what was received and lost, under the names of the live format.
@@ -47,98 +50,104 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     ------
     OSError : the disk is full ...
     """
-    if contents.is_several or (not contents.has_events and contents.samples is None):
-        _write_pictures(part, contents.sources or {contents.label: contents}, compression, counts)
-        return
-    samples = contents.samples
+    one = contents.one
+    samples = one.lines.samples() if isinstance(one, Stream) else None
     if samples is not None:
-        header = {**samples.about, "sources": [], **_told(contents)}
-        writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+        header = {**samples.about, "sources": [], **_told(one)}
+        writer = RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
-        writer.finish(json.dumps(counts[contents.label]))
+        writer.finish(json.dumps(counts[one.origin.label]))
         return
-    datagrams, events = contents.datagrams, contents.events
-    assert datagrams is not None and events is not None  # noqa: PT018  `stored` sets both
+    if not isinstance(one, Board):
+        every = {name: source for name, source in contents.sources.items() if isinstance(source, Pictures)}
+        _write_pictures(part, every, compression, counts)
+        return
+    wire, events = one.wire, one.table
+    datagrams = wire.datagrams()
+    assert datagrams is not None  # `stored` sets them
     # Host times before 1970 are not possible, so all board times are shifted together.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)
     header = {
-        **_header(contents),
-        "repaired": contents.unmarked,
-        "difference": contents.differences,
-        "origin_us": contents.origin_us,
+        **_header(one),
+        "repaired": wire.unmarked,
+        "difference": wire.differences,
+        "origin_us": wire.origin_us,
         "started_ns": int(arrived[0]) if len(arrived) else 0,
     }
-    writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+    writer = RecordingWriter(part, json.dumps(header), compression, True)
     # Written before all datagrams, as the recorder does, because a player reads it there.
-    if contents.held is not None:
-        writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(contents.held).reshape(-1))
+    if (held := one.settings.held()) is not None:
+        writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(held).reshape(-1))
     done = 0
     # Commands of the host are written between the datagrams before and after them, an order that the decoder needs.
-    for change in contents.board_changes:
+    for change in one.marks.board_changes():
         upto = int(np.searchsorted(datagrams.arrived_ns, change.at_ns, side="left"))
         _add_datagrams(writer, datagrams, arrived, done, max(done, upto))
         writer.board_change(max(0, change.at_ns), json.dumps(change._described()))
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
-    _add_remarks(writer, events, contents)
-    writer.finish(json.dumps(counts[contents.label]))
+    _add_remarks(writer, events, one)
+    writer.finish(json.dumps(counts[one.origin.label]))
 
 
-def _header(contents: Contents) -> dict[str, Any]:
+def _header(of: Source) -> dict[str, Any]:
     """Return what a header states of a sensor."""
-    registers = contents.registers
-    driven = contents.array if registers is None else registers.array
+    registers, array = of.settings.registers(), of.sensor.array
+    driven = array if registers is None else registers.array
     return {
-        "array": contents.array._geometry(),
+        "array": array._geometry(),
         "registers": None if registers is None else json.loads(registers._json()),
-        **({} if driven == contents.array else {"driven": driven._geometry()}),
-        **_told(contents),
-        "source": contents.source,
-        "side": contents.side,
-        "heel": contents.heel,
+        **({} if driven == array else {"driven": driven._geometry()}),
+        **_told(of),
+        "source": of.origin.source,
+        "side": of.sensor.side,
+        "heel": of.sensor.heel,
     }
 
 
-def _told(contents: Contents) -> dict[str, Any]:
+def _told(of: Source) -> dict[str, Any]:
     """Return what a header states of the recording that a file was made of."""
     # The verdict stands here and not with the final counts, so that a file that was cut still states it.
-    converted = None if contents.verdict is None else verdict_of(contents)._held
-    counts = dict(contents.counts)
-    return {"lost": contents.lost, "remarks": contents.remarks, "converted": converted, "counts": counts}
+    converted = None if of.losses.verdict() is None else verdict_of(of)._held
+    counts = dict(of.losses.counts())
+    return {"lost": of.losses.lost(), "remarks": of.losses.remarks, "converted": converted, "counts": counts}
 
 
 def _write_pictures(
-    part: Path, sources: Mapping[str, Contents], compression: str, counts: Mapping[str, dict[str, Any]]
+    part: Path, sources: Mapping[str, Pictures], compression: str, counts: Mapping[str, dict[str, Any]]
 ) -> None:
     """Write sources of pictures, all by one clock; times in the file are those of the board, from 0 on."""
-    tables = {name: one.frames for name, one in sources.items()}
-    begins = [int(one.t[0]) for one in tables.values() if one is not None and len(one)]
-    origin_us = min([0, *begins])
+    tables = {name: one.table for name, one in sources.items()}
+    origin_us = min([0, *(int(one.t[0]) for one in tables.values() if len(one))])
     headers = [
         {
             **_header(one),
             "name": name,
-            "pictures": {"unit": frames.unit, "clock": not one.untimed, "columns": one.columns or ()},
+            "pictures": {
+                "unit": one.table.unit,
+                "clock": not one.untimed,
+                "columns": one.columns or (),
+                "turned": one.readings.turned,
+            },
         }
-        for (name, one), frames in zip(sources.items(), tables.values(), strict=True)
-        if frames is not None
+        for name, one in sources.items()
     ]
     header = {**headers[0], "sources": headers[1:], "started_ns": 0}
-    writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+    writer = RecordingWriter(part, json.dumps(header), compression, True)
     tracks = {name: writer.track(name) for name in sources}
 
     def at_ns(t: int) -> int:
         return max(0, (t - origin_us) * 1000)
 
-    shown = {name: _low_rate(sources[name], frames) for name, frames in tables.items() if frames is not None}
+    shown = {name: _low_rate(one) for name, one in sources.items()}
     drawn = dict.fromkeys(shown, 0)
     for name, one in sources.items():
-        if one.held is not None:
-            tracks[name].held(0, None, np.ascontiguousarray(one.held).reshape(-1))
-        for change in one.board_changes:
+        if (held := one.settings.held()) is not None:
+            tracks[name].held(0, None, np.ascontiguousarray(held).reshape(-1))
+        for change in one.marks.board_changes():
             tracks[name].board_change(max(0, change.at_ns), json.dumps(change._described()))
-    for name, first, block, whole in _blocks({name: one for name, one in tables.items() if one is not None}):
+    for name, first, block, whole in _blocks(tables):
         t = np.ascontiguousarray(block.t)
         values = np.ascontiguousarray(block.values).reshape(-1)
         tracks[name].pictures(first, (t - origin_us) * 1000, t, values, whole)
@@ -155,17 +164,18 @@ def _write_pictures(
     writer.finish(json.dumps(counts[next(iter(sources))]))
 
 
-def _low_rate(contents: Contents, frames: Frames) -> tuple[Frames, tuple[float, str, str]]:
+def _low_rate(of: Pictures) -> tuple[Frames, tuple[float, str, str]]:
     """Return pictures above rest, ten a second, and what white is at least, the rest that was subtracted, the unit.
 
     There are none where pictures have no times.
     """
+    frames = of.table
     _, first = np.unique(frames.t // _EVERY_US, return_index=True)
-    first = first[: 0 if contents.untimed else None]
+    first = first[: 0 if of.untimed else None]
     few = Frames(frames.values[first], frames.t[first], unit=frames.unit, array=frames.array)
     if not len(few):
         return few, (1.0, "none", few.unit)
-    recording = Recording(contents.but(frames=once(lambda: few), sources={}))
+    recording = Recording(Contents.of(replace(of, readings=replace(of.readings, frames=known(few)))))
     above, _, rest = cast("tuple[Frames, float, Rest]", above_rest(recording))
     return above, (1.0 / ticks_by_unit(few), _RESTS.get(rest.source, rest.source), above.unit)
 
@@ -227,14 +237,14 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
         )
 
 
-def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
-    clock = contents.clock if contents.clock is not None and len(contents.clock.board_us) else None
+def _add_remarks(writer: Any, events: Events, of: Source) -> None:
+    clock = of.timing.clock() if of.timing.clock.holds() else None
 
     def at_ns(t: int) -> int:
         return max(0, t * 1000 if clock is None else int(clock.host_ns(t)))
 
-    detections = contents.detections
-    noted = [note.t for note in contents.notes if note.t is not None]
+    detections = of.marks.detections()
+    noted = [note.t for note in of.marks.notes() if note.t is not None]
     around = np.concatenate(
         [detections.t, detections.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)]
     )
@@ -242,18 +252,18 @@ def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
         writer.marker(at_ns(t), t, start)
     for t, ticks in _core.RecordingPictures(events._parts(), around):
         writer.picture(at_ns(t), t, events.array.columns, ticks)
-    _add_small(writer, contents, at_ns)
+    _add_small(writer, of, at_ns)
 
 
-def _add_small(writer: Any, contents: Contents, at_ns: Callable[[int], int]) -> None:
+def _add_small(writer: Any, of: Source, at_ns: Callable[[int], int]) -> None:
     """Write notes, zeroed taxels, registers and detections."""
-    for note in contents.notes:
+    for note in of.marks.notes():
         writer.note(note.at_ns, note.t, note.text)
-    for zeroing in contents.zeroings:
+    for zeroing in of.marks.zeroings():
         writer.zeroing(at_ns(zeroing.t), zeroing.t, zeroing.x, zeroing.y, zeroing.rest, zeroing.before)
-    for at, values in contents.register_changes:
+    for at, values in of.settings.register_changes():
         writer.registers(at, values._json())
-    for d in contents.detections:
+    for d in of.marks.detections():
         writer.detection(at_ns(d.known), d.label, d.t, d.known, d.slope, d.repaired)
 
 

@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, numbers, text, whole
+from taxel._base.arguments import buffer_bytes, flag, instance, numbers, text, whole
 from taxel._base.messages import escaped, plain
 from taxel._base.options import option
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit
 from taxel.wire import Registers
-from taxel.wire.buffer import buffer_bytes
 
 __all__ = ["NOT_RETURNED", "Board", "Version2", "fitting", "reading"]
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taxel import _core
-from taxel._base.arguments import whole
-from taxel.wire.buffer import buffer_bytes
+from taxel._base.arguments import buffer_bytes, whole
 
 __all__ = ["Command"]
 

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import column, flag, instance, text, whole
+from taxel._base.arguments import buffer_bytes, column, flag, instance, text, whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.wire.buffer import buffer_bytes
 from taxel.wire.columns import Columns
 from taxel.wire.counts import Counts, Received, Status
 

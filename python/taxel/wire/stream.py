@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from taxel import _core
-from taxel.wire.buffer import buffer_bytes
+from taxel._base.arguments import buffer_bytes
 
 __all__ = ["StreamReader"]
 

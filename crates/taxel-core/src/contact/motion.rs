@@ -1,7 +1,6 @@
 //! A scene worked out: each body's trajectory at even steps, and all touches.
 
-use super::track::{MOST_STEPS, Track, too_many};
-use super::trajectory::Trajectory;
+use super::trajectory::{MOST_STEPS, Track, Trajectory, too_many};
 use super::{Bonded, Contact, Narrow, Push, Scene, Surface};
 use crate::spikes::us;
 use crate::{Array, Error, Result, Stop};

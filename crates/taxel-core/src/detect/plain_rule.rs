@@ -37,18 +37,14 @@ pub struct PlainRule {
     /// The threshold, above 0: taxels, units of noise, or the sensor's unit.
     pub threshold: f64,
     /// The part of the threshold below which the load ends, above 0, at most 1; 1 with an age.
-    #[serde(default = "whole")]
     pub release: f64,
     /// The number of frames in a row, 1 or more; 1 with an age.
-    #[serde(default = "single")]
     pub frames: u32,
     /// The age of a touch at which the rule decides between two kinds, ms; `None`: it detects onsets and ends.
-    #[serde(default)]
     pub age_ms: Option<f64>,
     /// The labels of onset and end, or of the kinds below and above the threshold; `None` omits those detections.
     pub labels: [Option<String>; 2],
-    /// The board's noise floor, 0 or more, in the sensor's unit (ticks); default 3, that of the fast presets.
-    #[serde(default = "usual_floor")]
+    /// The board's noise floor, 0 or more, in the sensor's unit (ticks).
     pub noise_floor: f64,
     /// The unit of the values on which it was tuned, as of a readout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -56,18 +52,6 @@ pub struct PlainRule {
     /// The taxels' rest. It is valid for one board on one day: a saved rule has none and receives one when it is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
-}
-
-fn whole() -> f64 {
-    1.0
-}
-
-fn single() -> u32 {
-    1
-}
-
-fn usual_floor() -> f64 {
-    3.0
 }
 
 impl PlainRule {

@@ -25,7 +25,6 @@ pub struct Readout {
     /// stream starts.
     pub encoder: Encoder,
     /// The sensor; `None` admits every array with the right number of trains.
-    #[serde(default)]
     pub array: Option<Array>,
     /// The unit of the values on which it was trained, "ticks" of a board's; `None` if it is not known. It is compared
     /// where values have a unit: those of a stream have none.
@@ -40,7 +39,6 @@ pub struct Readout {
     /// Reading: the thesis has no such factor. 6.3.2 objects that a threshold below the trained one is crossed earlier
     /// than intended; this is the price for detecting inputs slightly weaker than the weakest trained one, which only
     /// just reaches it.
-    #[serde(default = "one")]
     pub run_threshold: f64,
     /// The delays at which every train of the encoder enters the neurons, ms, ascending: first all trains at the first
     /// delay, then all at the second (`SpikeTrains.delayed`). By default a single delay of 0.
@@ -51,10 +49,6 @@ pub struct Readout {
     /// The range of each neuron's inputs in its training data, by label; empty if it is not known.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub seen: BTreeMap<String, Seen>,
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 fn at_once() -> Vec<f64> {

@@ -12,7 +12,6 @@ pub struct TrainedNeuron {
     /// The neuron's parameters.
     pub neuron: Neuron,
     /// The delay after the event at which the neuron was trained to fire, in addition to the encoder's latency, ms.
-    #[serde(default)]
     pub delay_ms: f64,
     /// The parts of a composite encoder that it receives, in any order; none stands for all trains of the encoder.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

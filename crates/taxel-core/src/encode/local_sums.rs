@@ -321,7 +321,7 @@ impl LocalSums {
         tracked: bool,
         running_us: &[f64],
     ) -> Result<Self> {
-        let (rest, measured, grid) = (tare.rest_of(array)?, tare.noise_of_places()?, Grid::new(array));
+        let (rest, measured, grid) = (tare.rest_of(array)?, tare.noise_of_places(), Grid::new(array));
         let (mut begins, mut sd) = (vec![f64::NO_REST; grid.cells], vec![None; grid.cells]);
         for (cell, place) in grid.taxels() {
             begins[cell] = rest.values()[place];

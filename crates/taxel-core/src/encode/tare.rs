@@ -18,15 +18,13 @@ pub struct Tare {
     /// Rest by place (`row * columns + column`), in the sensor's unit; `None` for a taxel without any event.
     pub rest: Vec<Option<f64>>,
     /// Standard deviation of the taxels' values over the interval, weighted by time, in the sensor's unit; `None` where
-    /// the rest is unknown, and as a whole in a tare that was saved before this was measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub noise: Option<Vec<Option<f64>>>,
+    /// the rest is unknown.
+    pub noise: Vec<Option<f64>>,
     /// Start of the interval at rest, us.
     pub start_us: i64,
     /// End of the interval, us.
     pub stop_us: i64,
     /// A note, for example the board and the day.
-    #[serde(default)]
     pub note: String,
 }
 
@@ -48,11 +46,13 @@ impl Tare {
         if let Some(place) = self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
             return Err(problem!("tare: rest of the taxel at {} is not finite", self.array.place_of(place)));
         }
-        let Some(noise) = &self.noise else { return Ok(()) };
-        if noise.len() != self.array.len() {
-            return Err(problem!("tare: noise of {} taxels for {rows} x {columns}: must be one each", noise.len()));
+        if self.noise.len() != self.array.len() {
+            return Err(problem!(
+                "tare: noise of {} taxels for {rows} x {columns}: must be one each",
+                self.noise.len()
+            ));
         }
-        match noise.iter().position(|noise| noise.is_some_and(|n| !(n >= 0.0 && n.is_finite()))) {
+        match self.noise.iter().position(|noise| noise.is_some_and(|n| !(n >= 0.0 && n.is_finite()))) {
             Some(place) => {
                 let place = self.array.place_of(place);
                 Err(problem!("tare: noise of the taxel at {place} must be 0 or more and finite"))
@@ -83,15 +83,8 @@ impl Tare {
     }
 
     /// The noise of each place; 0 where it is not known.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` if the tare has no noise.
-    pub(super) fn noise_of_places(&self) -> Result<Vec<f64>> {
-        let Some(noise) = &self.noise else {
-            return Err(problem!("the tare has no noise of the taxels (an older taxel saved it): take it anew"));
-        };
-        Ok(noise.iter().map(|noise| noise.unwrap_or(0.0)).collect())
+    pub(super) fn noise_of_places(&self) -> Vec<f64> {
+        self.noise.iter().map(|noise| noise.unwrap_or(0.0)).collect()
     }
 
     /// Computes a tare from events in order of time, from `start` to `stop` us, or from all of them.
@@ -312,6 +305,6 @@ impl TareBuilder {
         if rest.iter().all(Option::is_none) {
             return Err(problem!("tare from {start} to {stop} us: nothing came"));
         }
-        Ok(Tare { rest, noise: Some(noise), array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
+        Ok(Tare { rest, noise, array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
     }
 }

@@ -1,13 +1,26 @@
 //! The window of the ISI and SPIKE distances, and the intervals before the first and after the last spike.
 
+use super::law::{One, Ready, summed};
 use super::patterns::Patterns;
-use crate::{Result, problem};
+use crate::{Result, Stop, problem};
 
 /// The start and end of the time that counts, ms.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     pub(super) start: f64,
     pub(super) stop: f64,
+}
+
+/// A distance of two ascending trains inside a window.
+pub(super) struct Within {
+    pub(super) window: Window,
+    pub(super) between: fn(&[f64], &[f64], Window) -> f64,
+}
+
+impl Ready for Within {
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        summed(a, b, stop, |a, b| Ok((self.between)(a, b, self.window)))
+    }
 }
 
 /// The given window, or by default the widest of the patterns' own; every spike must be inside.

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::edges::{Window, begun, distinct, interval};
-use super::law::{Law, One, Ready, summed};
+use super::edges::{Window, Within, begun, distinct, interval};
+use super::law::{Law, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
 use crate::parameters::Described;
-use crate::{Result, Stop};
+use crate::Result;
 
 /// The mean over the window of `|x - y| / max(x, y)`, where x and y are the two trains' interspike intervals at each
 /// time.
@@ -32,15 +32,7 @@ impl Law for IsiDistance {
     }
 
     fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        Ok(Box::new(Within(super::edges::window(self.window, a, b)?)))
-    }
-}
-
-struct Within(Window);
-
-impl Ready for Within {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
-        summed(a, b, stop, |a, b| Ok(between(a, b, self.0)))
+        Ok(Box::new(Within { window: super::edges::window(self.window, a, b)?, between }))
     }
 }
 

@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::edges::{Window, begun, distinct, interval};
+use super::edges::{Window, Within, begun, distinct, interval};
 use super::isi_distance::mean;
-use super::law::{Law, One, Ready, summed};
+use super::law::{Law, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
 use crate::parameters::Described;
-use crate::{Result, Stop};
+use crate::Result;
 
 /// The mean over the window of the distance between the spikes around each time and their nearest ones in the other
 /// train.
@@ -33,15 +33,7 @@ impl Law for SpikeDistance {
     }
 
     fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        Ok(Box::new(Within(super::edges::window(self.window, a, b)?)))
-    }
-}
-
-struct Within(Window);
-
-impl Ready for Within {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
-        summed(a, b, stop, |a, b| Ok(between(a, b, self.0)))
+        Ok(Box::new(Within { window: super::edges::window(self.window, a, b)?, between }))
     }
 }
 

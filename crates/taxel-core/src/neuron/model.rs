@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kernel::{Kernel, Shape};
 use super::points::{Grid, MOST_LAID_OUT, check_points, points_between};
-use super::rounding::rounding_ms;
+use super::rounding_ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};

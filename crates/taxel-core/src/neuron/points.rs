@@ -4,7 +4,7 @@
 //! by more than a trained potential tolerates. The state of a neuron and the ages of its inputs are therefore both
 //! computed from step numbers, never from differences of rounded times.
 
-use super::rounding::rounding_ms;
+use super::rounding_ms;
 use crate::{Result, problem};
 
 /// Limits on the points that are stored (a few GB), and on those that are stepped through (about ten seconds).

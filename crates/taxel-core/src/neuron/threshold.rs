@@ -1,7 +1,7 @@
 //! The threshold after a spike, and output spikes.
 
 use super::model::{FirstThreshold, Neuron, left_of_rise};
-use super::rounding::rounding_ms;
+use super::rounding_ms;
 
 /// A spike of the neuron.
 #[derive(Debug, Clone, Copy, PartialEq)]

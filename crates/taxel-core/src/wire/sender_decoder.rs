@@ -5,7 +5,7 @@ mod order;
 mod recent;
 
 use crate::wire::decoder::{Counts, Decoder};
-use crate::wire::silence::silence;
+use crate::wire::silence;
 use crate::wire::v1::{FIRST, WORD_BYTES};
 use crate::wire::v2::{self, Header, Outcome};
 use crate::{Array, Events};

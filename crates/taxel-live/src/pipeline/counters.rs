@@ -138,6 +138,7 @@ const LOST_NS: i64 = 500_000_000;
 /// Whether datagrams arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(inline))]
 pub enum ArrivalState {
     /// None has arrived so far.
     Nothing,
@@ -151,6 +152,7 @@ pub enum ArrivalState {
 
 /// Whether datagrams arrive, since when none do, and how long they may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Arrival {
     /// Whether they arrive.
     pub state: ArrivalState,

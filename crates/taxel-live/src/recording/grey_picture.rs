@@ -120,9 +120,9 @@ mod tests {
     /// A scale above this rest, which does not change.
     fn tared(rest: &[f64]) -> GreyScale {
         let array = Array { rows: 1, columns: rest.len() as u16, ..Array::thesis() };
-        let rest = rest.iter().map(|&rest| Some(rest)).collect();
+        let rest: Vec<_> = rest.iter().map(|&rest| Some(rest)).collect();
         let mut scale = GreyScale::new(array.len());
-        scale.tare(&Tare { array, rest, noise: None, start_us: 0, stop_us: 1, note: String::new() });
+        scale.tare(&Tare { array, noise: vec![None; rest.len()], rest, start_us: 0, stop_us: 1, note: String::new() });
         scale
     }
 
@@ -180,7 +180,7 @@ mod tests {
     fn a_tare_is_what_is_subtracted_once_there_is_one() {
         let array = Array { rows: 1, columns: 3, ..Array::thesis() };
         let rest = vec![Some(90.5), None, Some(20.0)];
-        let tare = Tare { array, rest, noise: None, start_us: 0, stop_us: 1, note: String::new() };
+        let tare = Tare { array, rest, noise: vec![None; 3], start_us: 0, stop_us: 1, note: String::new() };
         let mut scale = GreyScale::new(3);
         scale.draw(0, 3, &[100, 50, 20]);
         scale.tare(&tare);

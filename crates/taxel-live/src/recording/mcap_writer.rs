@@ -12,13 +12,14 @@ mod write_queue;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD as STANDARD;
 use serde_json::json;
 use taxel_core::detect::Detection;
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
-use super::base64::base64;
 use super::grey_picture::GreyScale;
 use super::pictures::{Encoding, write_message};
 use super::{BoardChange, Compression, Counts, Header, OutputFile, Stream, Topic, WriterOptions};
@@ -382,7 +383,7 @@ impl Track {
     fn push_grey(&self, at: (i64, i64), columns: usize, bytes: &[u8], about: serde_json::Value) -> Result<()> {
         let mut picture = json!({
             "timestamp": time(at.0), "frame_id": "taxel", "width": columns, "height": bytes.len() / columns,
-            "encoding": "mono8", "step": columns, "data": base64(bytes), "t_us": at.1,
+            "encoding": "mono8", "step": columns, "data": STANDARD.encode(bytes), "t_us": at.1,
         });
         if let (Some(picture), serde_json::Value::Object(about)) = (picture.as_object_mut(), about) {
             picture.extend(about);
@@ -399,7 +400,7 @@ impl Track {
     /// As [`Track::datagram`].
     pub fn held(&self, at_ns: i64, t_us: Option<i64>, ticks: &[u16]) -> Result<()> {
         let bytes: Vec<u8> = ticks.iter().flat_map(|value| value.to_le_bytes()).collect();
-        let held = json!({ "t_us": t_us, "encoding": "uint16, little-endian", "ticks": base64(&bytes) });
+        let held = json!({ "t_us": t_us, "encoding": "uint16, little-endian", "ticks": STANDARD.encode(&bytes) });
         self.push_json(Topic::Held, at_ns, &held)
     }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 pub(super) const BEGIN: &str = "taxel";
 /// Name of the metadata record at its end.
 pub(super) const END: &str = "taxel.end";
-/// Key of the checksum of its counts; files of earlier versions have none.
+/// Key of the checksum of its counts.
 pub(super) const CHECK: &str = "check";
 
 /// The checksum of the final counts in a metadata record, which has no checksum of its own.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use taxel_core::problem;
 
 /// Properties of a source of pictures, beside its array.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PictureSource {
     /// Unit of the values.
     pub unit: String,
@@ -17,6 +17,9 @@ pub struct PictureSource {
     /// The names of the columns, if each is a quantity of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub columns: Vec<String>,
+    /// The number that each reading was subtracted from, as readings fall with pressure; none if they were not turned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turned: Option<f64>,
 }
 
 fn yes() -> bool {

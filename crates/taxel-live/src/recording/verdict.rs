@@ -50,7 +50,6 @@ pub enum Status {
 
 /// What a recording lost.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(from = "Stored")]
 pub struct Verdict {
     /// How much is there.
     pub status: Status,
@@ -70,47 +69,6 @@ pub struct Verdict {
     pub stretch_of: Option<String>,
     /// The verdicts of the recordings or sources that this one is made of, by name.
     pub parts: Vec<(String, Verdict)>,
-}
-
-/// A verdict in a file; earlier versions wrote its line alone.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Stored {
-    Line(String),
-    Whole(Whole),
-}
-
-#[derive(Deserialize)]
-struct Whole {
-    status: Status,
-    text: String,
-    #[serde(default)]
-    lost: BTreeMap<String, u64>,
-    #[serde(default)]
-    damaged: BTreeMap<String, u64>,
-    #[serde(default)]
-    noted: BTreeMap<String, u64>,
-    #[serde(default)]
-    doubtful_after_us: Option<i64>,
-    #[serde(default)]
-    steps_back: Vec<StepBack>,
-    #[serde(default)]
-    stretch_of: Option<String>,
-    #[serde(default)]
-    parts: Vec<(String, Verdict)>,
-}
-
-impl From<Stored> for Verdict {
-    fn from(stored: Stored) -> Self {
-        match stored {
-            Stored::Line(line) => Self::of_line(&line),
-            Stored::Whole(whole) => {
-                let Whole { status, text, lost, damaged, noted, doubtful_after_us, steps_back, stretch_of, parts } =
-                    whole;
-                Self { status, text, lost, damaged, noted, doubtful_after_us, steps_back, stretch_of, parts }
-            }
-        }
-    }
 }
 
 /// Counts of datagrams and bytes, by what happened to them; the sums of the causes equal the totals.
@@ -153,9 +111,6 @@ pub struct Counts {
     /// For version 2: datagrams that the board sent and that never arrived intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
-    /// The verdict of the recording that this one was converted from; earlier versions wrote it here, and none into the header.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub converted: Option<Box<Verdict>>,
 }
 
 /// How a recording ended, as the file states.
@@ -213,8 +168,6 @@ pub enum Basis {
     Stretches(Vec<(String, Verdict)>),
     /// The recording with this verdict, of which all times are later by so many us.
     Later(i64, Verdict),
-    /// The line that an earlier version wrote.
-    Line(String),
 }
 
 /// One source of a file of the live format: how it ended, and what reading found.
@@ -277,7 +230,6 @@ impl Verdict {
             Basis::Sources(parts) => Self::of_sources(parts),
             Basis::Stretches(parts) => Self::of_stretches(parts),
             Basis::Later(us, verdict) => verdict.later(us),
-            Basis::Line(line) => Self::of_line(&line),
         }
     }
 
@@ -293,9 +245,6 @@ impl Verdict {
 
     /// The verdict on counts; `nothing_lost` is the line if they show no loss and do not count what was sent.
     pub(crate) fn of_counts(counts: &Counts, nothing_lost: &str) -> Self {
-        if let Some(verdict) = &counts.converted {
-            return verdict.as_ref().clone();
-        }
         let bridged = counts.bridged.as_deref().copied().unwrap_or_default();
         let of_board = |cause: &str| counts.decoder.get(cause).copied().unwrap_or(0);
         let dropped = [
@@ -551,42 +500,6 @@ impl Verdict {
         });
         parts.chain(back).chain(doubt).collect::<Vec<_>>().join("; ")
     }
-
-    /// The verdict whose line is all that an earlier version wrote: its status, without numbers.
-    fn of_line(line: &str) -> Self {
-        // Versions before wrote from what a recording was converted into its verdict.
-        let text = line.rsplit("a recording that says: ").next().unwrap_or(line).to_owned();
-        // Datagrams that came again are no damage.
-        let repeated = |piece: &&str| {
-            piece.contains("in the bytes that came: ") && !piece.contains(", ") && piece.ends_with(" repeated")
-        };
-        let told: Vec<&str> = text.split("; ").filter(|piece| !repeated(piece)).collect();
-        let has = |words: &[&str]| words.iter().any(|words| told.iter().any(|piece| piece.contains(words)));
-        let status = if has(&["nothing arrived"]) {
-            Status::NothingArrived
-        } else if has(&["LOST"]) {
-            Status::Lost
-        } else if has(&["not finished", "what came last is missing"]) {
-            Status::Unfinished
-        } else if has(&[
-            "in the bytes that came",
-            "could not be read",
-            "damage in the file",
-            "counts are damaged",
-            "are doubtful",
-        ]) {
-            Status::Damaged
-        } else if has(&["does not say"]) {
-            Status::Unknown
-        } else if has(&["nothing lost after arrival", "resets of the board", "reset of the board"]) {
-            Status::CompleteAfterArrival
-        } else if has(&["nothing lost"]) {
-            Status::Complete
-        } else {
-            Status::Unknown
-        };
-        Self { status, text, ..Self::default() }
-    }
 }
 
 /// A number and what it counts, in the plural unless it is 1.
@@ -596,16 +509,9 @@ fn counted(n: u64, what: &str) -> String {
 
 /// A number and what it counts, which is given in the plural: of 1 the first word that ends in s, its noun, is in the singular.
 fn numbered(n: u64, plural: &str) -> String {
-    let mut words: Vec<String> = plural.split(' ').map(str::to_owned).collect();
-    if n == 1
-        && let Some(noun) = words.iter_mut().find(|word| word.ends_with('s'))
-    {
-        *noun = match noun.strip_suffix("ies") {
-            Some(stem) => format!("{stem}y"),
-            None => noun.trim_end_matches('s').to_owned(),
-        };
-    }
-    format!("{n} {}", words.join(" "))
+    let noun = plural.split(' ').find(|word| n == 1 && word.ends_with('s')).unwrap_or_default();
+    let singular = noun.strip_suffix("ies").map(|stem| format!("{stem}y"));
+    format!("{n} {}", plural.replacen(noun, &singular.unwrap_or(noun.trim_end_matches('s').to_owned()), 1))
 }
 
 /// What the text says of the bytes of lines that have no end or no beginning.

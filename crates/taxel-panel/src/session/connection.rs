@@ -3,7 +3,8 @@
 use std::time::{Duration, Instant};
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket};
-use serde_json::Value;
+
+use crate::messages::Message as Sent;
 
 /// A client that does not read a message within this time is disconnected.
 const SEND_WITHIN: Duration = Duration::from_secs(5);
@@ -71,8 +72,8 @@ impl Connection {
         self.send(Message::text(text)).await
     }
 
-    pub(super) async fn send_json(&mut self, message: &Value) -> Result<(), Closing> {
-        self.send(Message::text(message.to_string())).await
+    pub(super) async fn send_message(&mut self, message: &Sent) -> Result<(), Closing> {
+        self.send_text(&message.text()).await
     }
 
     pub(super) async fn send_bytes(&mut self, bytes: Vec<u8>) -> Result<(), Closing> {

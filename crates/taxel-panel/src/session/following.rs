@@ -10,7 +10,7 @@ use crate::encoded_spikes::EncodedSpikes;
 use crate::live_source::LiveSource;
 use crate::picture::{self, About};
 use crate::player::{Player, ViewOptions};
-use crate::request::{Answer, Refusal};
+use crate::refusal::{Answer, Refusal};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{COLUMN_US, column_of};
 

@@ -3,14 +3,15 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
 use crate::indexed::Shown;
-use crate::label_requests::is_label_request;
 use crate::limits::MOST_BYTES;
-use crate::request::{Refusal, Request};
+use crate::messages::Message;
+use crate::refusal::Refusal;
+use crate::request::Request;
 use crate::requests::carry_out;
 
 /// Maximum number of pending requests, but for those that change labels: a person's work is not refused.
@@ -28,7 +29,7 @@ const MOST_ANSWERS: usize = 64;
 
 /// See the module.
 pub(super) struct PendingRequests {
-    answers: mpsc::Sender<Value>,
+    answers: mpsc::Sender<Message>,
     permits: Arc<Semaphore>,
     label_permits: Arc<Semaphore>,
     /// Whether there were too many requests that change labels, and more than half of them still wait.
@@ -37,7 +38,7 @@ pub(super) struct PendingRequests {
 
 impl PendingRequests {
     /// Also returns where the answers arrive.
-    pub(super) fn new() -> (Self, mpsc::Receiver<Value>) {
+    pub(super) fn new() -> (Self, mpsc::Receiver<Message>) {
         let (answers, receiver) = mpsc::channel(MOST_ANSWERS);
         let permits = |most| Arc::new(Semaphore::new(most));
         let (permits, label_permits) = (permits(MOST_PENDING), permits(MOST_LABEL_REQUESTS));
@@ -59,21 +60,21 @@ impl PendingRequests {
         hub: &Arc<Hub>,
         id: Value,
         what: String,
-        message: Map<String, Value>,
+        request: Request,
         bytes: usize,
         shown: Option<Shown>,
-    ) -> Option<Value> {
-        let (permits, count) = match is_label_request(&what) {
+    ) -> Option<Message> {
+        let (permits, count) = match request.changes_labels() {
             true => (&self.label_permits, bytes.div_ceil(PART).clamp(1, MOST_BYTES / PART)),
             false => (&self.permits, 1),
         };
         let Ok(permit) = Arc::clone(permits).try_acquire_many_owned(count as u32) else {
             let refusal = Refusal::from("too many requests at a time: wait for their answers");
-            return Some(refusal.message(&id, &what));
+            return Some(Message::refused(id, what, refusal));
         };
         let (hub, answers) = (Arc::clone(hub), self.answers.clone());
         tokio::spawn(async move {
-            let last = match carry_out(hub, &what, shown.as_ref(), Request(&message)).await {
+            let last = match carry_out(hub, shown.as_ref(), request).await {
                 Ok(answer) => {
                     if let Some(answer) = answer {
                         // The client may have left in the meantime, here and below.
@@ -82,9 +83,9 @@ impl PendingRequests {
                     if id.is_null() {
                         return;
                     }
-                    json!({ "type": "done", "id": id })
+                    Message::Done { id }
                 }
-                Err(refusal) => refusal.message(&id, &what),
+                Err(refusal) => Message::refused(id, what, refusal),
             };
             let _ = answers.send(last).await;
             drop(permit);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value};
 use taxel_core::encode::Encoder;
 use taxel_live::locked::lock;
 
@@ -17,16 +17,14 @@ use crate::indexed::Shown;
 use crate::keyframe_index::KeyframeIndex;
 use crate::label_requests;
 use crate::live_source::LiveSource;
-use crate::messages;
+use crate::messages::{Message, ViewState};
 use crate::opening;
 use crate::picture::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::player::{Player, ViewOptions};
-use crate::request::{Answer, Refusal, Request, taxel};
+use crate::refusal::{Answer, Refusal};
+use crate::request::Taxel;
 use crate::requests::readout_of;
 use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
-
-/// Maximum number of time stamps in a `step`.
-const MOST_STEPS: i64 = 1000;
 
 /// Where in its source a view is.
 enum Position {
@@ -115,32 +113,28 @@ impl Viewport {
     }
 
     /// The `transport` message.
-    pub(super) fn transport_message(&self) -> Value {
+    pub(super) fn transport_message(&self) -> Message {
         let state = match (&self.position, self.playback.is_playing()) {
-            (Position::Following, _) => "following",
-            (Position::At(_), true) => "playing",
-            (Position::At(_), false) => "paused",
+            (Position::Following, _) => ViewState::Following,
+            (Position::At(_), true) => ViewState::Playing,
+            (Position::At(_), false) => ViewState::Paused,
         };
-        json!({
-            "type": "transport", "source": self.recording_name(), "state": state, "speed": self.playback.speed(),
-            "t_us": self.t(),
-        })
+        let source = self.recording_name().map(str::to_owned);
+        Message::Transport { source, state, speed: self.playback.speed(), t_us: self.t() }
     }
 
     /// The `overview` message.
-    pub(super) fn overview_message(&self) -> Answer<Value> {
-        let (start, step, events, force) = match (&self.recording, &self.live) {
-            (Some(shown), _) => return Ok(shown.indexed.overview(&shown.name)),
+    pub(super) fn overview_message(&self) -> Answer<Message> {
+        match (&self.recording, &self.live) {
+            (Some(shown), _) => Ok(shown.indexed.overview(&shown.name)),
             (None, Some(live)) => {
-                let (start, step, events) = live.index.event_rate();
-                let force = lock(&live.state).time_columns().greatest_sums(start, step, events.len(), COLUMN_US);
-                (start, step, events, force)
+                let (start_us, step_us, events) = live.index.event_rate();
+                let columns = lock(&live.state);
+                let force = columns.time_columns().greatest_sums(start_us, step_us, events.len(), COLUMN_US);
+                Ok(Message::Overview { source: None, start_us, step_us, events, force })
             }
-            (None, None) => return Err("nothing is shown".into()),
-        };
-        Ok(json!({
-            "type": "overview", "source": null, "start_us": start, "step_us": step, "events": events, "force": force,
-        }))
+            (None, None) => Err("nothing is shown".into()),
+        }
     }
 
     /// Board time of the view, us.
@@ -235,7 +229,7 @@ impl Viewport {
     }
 
     /// The `spikes` message, where the encoder has made any since the last call.
-    pub(super) fn spikes_message(&mut self) -> Option<Value> {
+    pub(super) fn spikes_message(&mut self) -> Option<Message> {
         self.options.encoder.as_ref()?;
         let spikes = match &mut self.position {
             Position::Following => self.following.encode(self.live.as_ref()?),
@@ -362,21 +356,14 @@ impl Viewport {
 
     // ------------------------------------------------------------------------------------------ requests
 
-    pub(super) async fn watch(&mut self, request: &Request<'_>) -> Answer {
+    pub(super) async fn watch(&mut self, taxel: Option<Taxel>) -> Answer {
         let index = self.index()?;
         let array = index.array();
-        self.options.watched = match request.get("taxel").filter(|value| !value.is_null()) {
-            None => None,
-            Some(value) => {
-                let inside = taxel(value).filter(|&(x, y)| x < array.columns && y < array.rows);
-                let Some((x, y)) = inside else {
-                    let (rows, columns) = (array.rows, array.columns);
-                    let reason = format!("must be [x, y] on {rows} rows x {columns} columns, or null");
-                    return Err(Refusal::of("taxel", reason));
-                };
-                u32::try_from(array.index(x, y)).ok()
-            }
-        };
+        let (rows, columns) = (array.rows, array.columns);
+        if taxel.is_some_and(|(x, y)| x >= columns || y >= rows) {
+            return Err(Refusal::of("taxel", format!("must be [x, y] on {rows} rows x {columns} columns, or null")));
+        }
+        self.options.watched = taxel.and_then(|(x, y)| u32::try_from(array.index(x, y)).ok());
         if !matches!(self.position, Position::Following) {
             return self.reopen().await;
         }
@@ -386,9 +373,9 @@ impl Viewport {
         Ok(())
     }
 
-    pub(super) async fn encode(&mut self, request: &Request<'_>) -> Answer {
+    pub(super) async fn encode(&mut self, encoder: Option<Map<String, Value>>) -> Answer {
         self.options.encoder = None;
-        if let Some(wanted) = request.get("encoder").filter(|value| !value.is_null()) {
+        if let Some(wanted) = encoder.map(Value::Object) {
             let index = self.index()?;
             let encoder = Encoder::from_json(&wanted.to_string()).map_err(taxel_live::Error::from);
             let encoder = encoder.and_then(|encoder| encodes(&index, &encoder).map(|()| encoder));
@@ -399,26 +386,23 @@ impl Viewport {
         self.reopen().await
     }
 
-    pub(super) async fn zoom(&mut self, request: &Request<'_>) -> Answer {
-        let (least, most) = COLUMNS_US;
-        let column_us = request.whole("column_us", least, most)?;
+    pub(super) async fn zoom(&mut self, column_us: i64, end_us: Option<i64>) -> Answer {
         if !is_column(column_us) {
+            let (least, most) = COLUMNS_US;
             return Err(Refusal::of("column_us", format!("must be {least} times a power of two, up to {most}")));
         }
-        let end = if request.has("end_us") { Some(request.time("end_us")?) } else { None };
         self.options.column_us = column_us;
-        self.window_us = end.filter(|_| !matches!(self.position, Position::Following));
+        self.window_us = end_us.filter(|_| !matches!(self.position, Position::Following));
         self.reopen().await
     }
 
-    pub(super) async fn seek_request(&mut self, request: &Request<'_>) -> Answer {
-        let t = request.time("t_us")?;
+    pub(super) async fn seek_request(&mut self, t: i64) -> Answer {
         self.playback.pause();
         self.seek(t).await
     }
 
-    pub(super) async fn play(&mut self, request: &Request<'_>) -> Answer {
-        let speed = if request.has("speed") { request.number("speed", 0.001, 100.0)? } else { self.playback.speed() };
+    pub(super) async fn play(&mut self, speed: Option<f64>) -> Answer {
+        let speed = speed.unwrap_or_else(|| self.playback.speed());
         let t = self.t().ok_or("nothing is shown yet")?;
         if matches!(self.position, Position::Following) {
             // Playing the live source from now on would be a delay of zero, which is following.
@@ -443,8 +427,7 @@ impl Viewport {
         Ok(())
     }
 
-    pub(super) async fn step(&mut self, request: &Request<'_>) -> Answer {
-        let steps = request.whole("frames", -MOST_STEPS, MOST_STEPS)?;
+    pub(super) async fn step(&mut self, steps: i64) -> Answer {
         self.pause().await?;
         for _ in 0..steps.unsigned_abs() {
             let moved = if steps > 0 {
@@ -477,14 +460,12 @@ impl Viewport {
     }
 
     /// Opens a recording at its beginning; returns the messages about it.
-    pub(super) async fn open(&mut self, hub: &Arc<Hub>, request: &Request<'_>) -> Answer<Vec<Value>> {
-        let name = request.text("name", 110)?.to_owned();
-        let trial = request.optional_text("trial", 255)?.map(str::to_owned);
+    pub(super) async fn open(&mut self, hub: &Arc<Hub>, name: String, trial: Option<String>) -> Answer<Vec<Message>> {
         self.show(hub, name, trial, None).await
     }
 
     /// Shows the whole of a recording where its beginning is shown, at the same time; returns the messages about it.
-    pub(super) async fn reopen_whole(&mut self, hub: &Arc<Hub>, name: &str) -> Option<Vec<Value>> {
+    pub(super) async fn reopen_whole(&mut self, hub: &Arc<Hub>, name: &str) -> Option<Vec<Message>> {
         let shown = self.recording.clone().filter(|shown| shown.name == name)?;
         let (t, playing) = (self.t(), self.playback.is_playing());
         let messages = self.show(hub, shown.name, shown.trial, t).await;
@@ -501,7 +482,7 @@ impl Viewport {
         name: String,
         trial: Option<String>,
         t: Option<i64>,
-    ) -> Answer<Vec<Value>> {
+    ) -> Answer<Vec<Message>> {
         let begun = Instant::now();
         // The reason names the file.
         let refused = |error: taxel_live::Error| Refusal { reason: error.to_string(), field: Some("name".to_owned()) };
@@ -510,8 +491,8 @@ impl Viewport {
         let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;
         let (file, out) =
             (hub.folder.file(&name).map_err(refused)?, hub.folder.file(&readout_of(&name)).map_err(refused)?);
-        let train = hub.ask(move |handler| handler.train_command(&file, &out)).await?;
-        let mut answer = vec![indexed.opened(&name, bytes, &train, begun)];
+        let train = hub.ask(move |handlers| handlers.training.command(&file, &out)).await?;
+        let mut answer = vec![indexed.opened(&name, bytes, train, begun)];
         let index = indexed.index();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
         (self.recording, self.window_us) = (Some(Shown { name: name.clone(), trial, indexed }), None);
@@ -523,7 +504,7 @@ impl Viewport {
         answer.push(hub.labels.message(&name));
         answer.push(self.transport_message());
         if let Err(refusal) = labels {
-            answer.push(messages::warning(refusal.reason));
+            answer.push(Message::warning(refusal.reason));
         }
         Ok(answer)
     }

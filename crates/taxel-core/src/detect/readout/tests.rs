@@ -106,7 +106,7 @@ fn another_array_and_a_missing_tare_are_refused() {
     let tare = Tare {
         array: array.clone(),
         rest: vec![Some(0.0); 63 * 64],
-        noise: None,
+        noise: vec![None; 63 * 64],
         start_us: 0,
         stop_us: 1,
         note: String::new(),
@@ -153,7 +153,8 @@ fn lowered(mut events: Events, z: &Zeroing, rise: u16) -> Events {
 fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
     let array = Array::new(6, 6, 2.0, "small").unwrap();
     let rest = vec![Some(130.0); 36];
-    let tare = Tare { array: array.clone(), rest, noise: None, start_us: -1, stop_us: 0, note: String::new() };
+    let tare =
+        Tare { array: array.clone(), rest, noise: vec![None; 36], start_us: -1, stop_us: 0, note: String::new() };
     let (mut count, mut changed) = (0, 0);
     for (seed, name) in (0..40).zip(["contact_area", "moments"].into_iter().cycle()) {
         let mut random = StdRng::seed_from_u64(seed);

@@ -1,7 +1,7 @@
 //! Unwraps the stamps of version 1: finds the turn of the 16-bit counter to which a stamp belongs.
 
 use crate::events::FARTHEST_BACK_US;
-use crate::wire::silence::silence;
+use crate::wire::silence;
 use crate::wire::v1::STAMP_US;
 
 /// How far a stamp may be behind the latest time and still count as a step back (reordered datagrams), in stamps: 0.1

@@ -18,10 +18,8 @@ pub struct Registers {
     #[serde(alias = "use_frame_sync")]
     pub frame_sync: bool,
     /// Version of the wire protocol that the board uses (read: the manual has only one).
-    #[serde(default = "at_reset::wire_version")]
     pub wire_version: u8,
     /// FA-1: increase of the threshold by a spike, T A of Table 5.3. In units of 1/256 theta_0.
-    #[serde(default = "at_reset::threshold_jump")]
     pub threshold_jump: u16,
     /// Time from one driven line to the next. In units of 10 ns.
     #[serde(alias = "row_change_period")]
@@ -39,10 +37,8 @@ pub struct Registers {
     #[serde(alias = "ramp_time")]
     pub ramp: u16,
     /// FA-1: theta_0, in ticks after the power law. In units of 1/1024.
-    #[serde(default = "at_reset::threshold_rest")]
     pub threshold_rest: u16,
     /// FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3. In units of 1/1024 theta_0.
-    #[serde(default = "at_reset::threshold_decay")]
     pub threshold_decay: u8,
     /// Largest difference that does not cause an event. In units of ticks.
     pub noise_floor: u8,
@@ -52,22 +48,6 @@ pub struct Registers {
     pub record: bool,
     /// Channels of the converter, 16 or 64: a property of the board, not a register.
     pub channels: u8,
-}
-
-/// Values at reset of the fields that older files lack.
-mod at_reset {
-    pub(super) const fn wire_version() -> u8 {
-        1
-    }
-    pub(super) const fn threshold_jump() -> u16 {
-        0
-    }
-    pub(super) const fn threshold_rest() -> u16 {
-        0
-    }
-    pub(super) const fn threshold_decay() -> u8 {
-        0
-    }
 }
 
 impl Registers {

@@ -154,14 +154,6 @@ fn a_board_of_any_size_resets_to_registers_that_keep_the_rules() {
 }
 
 #[test]
-fn a_file_that_knows_nothing_of_version_2_is_read() {
-    let old = r#"{"random_lines":false,"mechanoreceptor":false,"invert_comparator":false,"frame_sync":true,
-        "line_period":300,"line_read":300,"step_period":75,"step_read":55,"ramp":150,"noise_floor":3,"lines":64,
-        "record":false,"channels":16}"#;
-    assert_eq!(serde_json::from_str::<Registers>(old).unwrap(), Registers::default());
-}
-
-#[test]
 fn what_is_hardly_meant_is_warned_of() {
     let mut registers = Registers::default();
     registers.set("step_read", 56, &thesis()).unwrap();

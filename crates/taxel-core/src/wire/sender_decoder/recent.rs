@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use crate::Array;
 use crate::Events;
-use crate::wire::silence::silence;
+use crate::wire::silence;
 use crate::wire::{Pairing, decode};
 
 /// Number of datagrams that one is compared with.

@@ -15,7 +15,7 @@ use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Refused};
 use crate::events::FARTHEST_BACK_US;
 use crate::vectors::Instructions;
 use crate::wire::columns::{Columns, Laid, Room, Table};
-use crate::wire::silence::silence;
+use crate::wire::silence;
 use crate::{Array, Events, Result, problem};
 use held::Held;
 #[cfg(target_arch = "x86_64")]

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD as STANDARD;
 use serde_json::Value;
 use taxel_core::Marker;
 use taxel_core::detect::Detection;
@@ -10,7 +12,6 @@ use taxel_core::held::UNKNOWN;
 use taxel_core::wire::{self, Registers};
 
 use super::message::Message;
-use crate::recording::base64::unbase64;
 use crate::recording::{BoardChange, Counts, Note, Topic};
 
 /// All small messages of a recording.
@@ -175,7 +176,7 @@ impl Remarks {
 /// far.
 fn held(data: &[u8]) -> Option<Vec<u16>> {
     let value: Value = serde_json::from_slice(data).ok()?;
-    let ticks = unbase64(value["ticks"].as_str()?)?;
+    let ticks = STANDARD.decode(value["ticks"].as_str()?).ok()?;
     Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect())
 }
 

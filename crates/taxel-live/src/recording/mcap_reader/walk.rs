@@ -321,10 +321,9 @@ impl<'a> Walk<'a> {
                     Some((key.strip_prefix("counts.")?.to_owned(), serde_json::from_str(text).ok()?))
                 });
                 self.ends = ends.collect();
-                let stated = record.metadata.get(CHECK);
                 self.ending = match record.metadata.get("stopped") {
                     Some(why) => Some(Ending::Stopped(why.clone())),
-                    None if stated.is_some_and(|stated| *stated != check(&record.metadata)) => None,
+                    None if record.metadata.get(CHECK) != Some(&check(&record.metadata)) => None,
                     None => {
                         let counts = record.metadata.get("counts").and_then(|text| serde_json::from_str(text).ok());
                         counts.map(|counts| Ending::Finished { counts })

@@ -26,14 +26,13 @@ impl Verdict {
         let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
         let Condition { before_first, repeated, changed, so_far, converted, decoded, lines, origin_us, .. } = condition;
         let is_converted = converted.is_some();
+        let converted = converted.map(|verdict| *verdict);
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
         let mut decoded = decoded.unwrap_or_default();
         let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
         let mut no_counts = false;
         let (mut verdict, why) = match ending {
-            Some(Ending::Finished { counts }) => {
-                let converted = converted.or(counts.converted.clone());
-                let mut counts = Counts { converted, ..counts };
+            Some(Ending::Finished { mut counts }) => {
                 if changed && !skipped {
                     // What reading lacks beside what had been missing when it was recorded was lost with the change.
                     let before = counts.missing.unwrap_or(0);
@@ -41,7 +40,7 @@ impl Verdict {
                     *lost.entry(Topic::Datagrams).or_default() += since;
                     counts.decoder = counts.decoder_with(&decoded.damage);
                 }
-                (Self::of_counts(&counts, nothing_lost), None)
+                (converted.unwrap_or_else(|| Self::of_counts(&counts, nothing_lost)), None)
             }
             ending => {
                 let why = match ending {
@@ -49,17 +48,15 @@ impl Verdict {
                     _ if rebuilt.no_end => NO_END.to_owned(),
                     _ => "not finished: what came last is missing".to_owned(),
                 };
-                let counts = match converted {
-                    Some(_) => Some(Counts { converted, ..so_far.unwrap_or_default() }),
-                    None => so_far.filter(|counts| counts.received > 0 || counts.decoder.values().any(|n| *n > 0)),
-                };
-                no_counts = counts.is_none();
+                let counts = so_far.filter(|counts| counts.received > 0 || counts.decoder.values().any(|n| *n > 0));
+                no_counts = counts.is_none() && converted.is_none();
                 // The file may hold more than its counts, which are saved now and then; where parts were skipped,
                 // decoding finds faults that never came.
                 let counts = counts.unwrap_or_else(|| Counts { recorded: messages, ..Counts::default() });
                 let found = if skipped { Found::default() } else { decoded.clone() };
                 let (inner, before) = if skipped { (0, 0) } else { (skipped_numbers, before_first) };
-                (Self::of_counts(&so_far_with(counts, found, inner, before), nothing_lost), Some(why))
+                let counted = || Self::of_counts(&so_far_with(counts, found, inner, before), nothing_lost);
+                (converted.unwrap_or_else(counted), Some(why))
             }
         };
         let came_short = !verdict.lost.is_empty();

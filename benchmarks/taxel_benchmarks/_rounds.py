@@ -1,0 +1,133 @@
+"""Measuring: ours and peers in one run, in turn, by the CPU time of the process; BLAS in one thread."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.linalg  # noqa: F401  its pool of threads can be limited once it is loaded
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+#: A ratio is not stable if the interquartile range of the rounds is larger than this share of the median.
+WIDEST = 0.15
+
+
+def measure(
+    runs: Mapping[str, Callable[[], Any]], *, rounds: int, work: float = 1.0, warm_up: bool = True
+) -> dict[str, dict[str, Any]]:
+    """Run all of them `rounds` times in turn, BLAS in one thread; return seconds and `work` per second.
+
+    The CPU time is that of the process, of ours and of peers: threads that either starts count.
+
+    Parameters
+    ----------
+    runs : by name, called without arguments
+    rounds : int
+    work : float
+        Amount of work of one call, in the unit of the rate: events, spikes ...
+    warm_up : bool
+        Whether each runs once before; calls of minutes need none.
+    """
+    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    walls: dict[str, list[float]] = {name: [] for name in runs}
+    for done in range(0 if warm_up else 1, rounds + 1):
+        with threadpool_limits(1):  # each time, as a first call may load libraries
+            for name, run in runs.items():
+                wall, cpu = time.perf_counter(), time.process_time()
+                run()
+                cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+                if done:
+                    seconds[name].append(cpu)
+                    walls[name].append(wall)
+    return {name: summary(seconds[name], walls[name], work) for name in runs}
+
+
+def summary(seconds: Sequence[float], walls: Sequence[float], work: float = 1.0) -> dict[str, Any]:
+    """Return median, quartiles and every round of CPU seconds, the median of wall seconds, and the rate."""
+    low, middle, high = np.percentile(seconds, [25, 50, 75]).tolist()
+    return {
+        "cpu_s": {"median": middle, "quartiles": [low, high], "rounds": list(seconds)},
+        "wall_s": {"median": float(np.median(walls))},
+        "rate": work / middle,
+        "stable": high - low <= WIDEST * middle,
+    }
+
+
+def compared(
+    results: Mapping[str, Mapping[str, Any]], pairs: Mapping[str, tuple[str, str]]
+) -> tuple[dict[str, float], dict[str, list[float]]]:
+    """Return how many times less CPU time ours took than the peer: medians over the rounds, and quartiles.
+
+    Parameters
+    ----------
+    results : what `measure` returned
+    pairs : by the ratio's name, the names of ours and of the peer
+    """
+
+    def rates(name: str) -> NDArray[np.float64]:
+        of = results[name]
+        return of["rate"] * of["cpu_s"]["median"] / np.array(of["cpu_s"]["rounds"])
+
+    ratios, spread = {}, {}
+    for name, (ours, peer) in pairs.items():
+        # Both of a round ran one after the other, so that what slows the machine for a while slows both.
+        low, ratios[name], high = np.percentile(rates(ours) / rates(peer), [25, 50, 75]).tolist()
+        spread[name] = [low, high]
+    return ratios, spread
+
+
+def thread_seconds() -> dict[str, float]:
+    """Return the CPU time of each named thread of this process so far, s."""
+    seconds: dict[str, float] = {}
+    for task in Path("/proc/self/task").iterdir():
+        name = (task / "comm").read_text().strip()
+        seconds[name] = seconds.get(name, 0.0) + int((task / "schedstat").read_text().split()[0]) / 1e9
+    return seconds
+
+
+def stamp(*packages: str) -> dict[str, Any]:
+    """Return machine, versions and commit; `taxel bench` writes a result of a clean commit only."""
+    from taxel.report import code_version  # noqa: PLC0415  what a benchmark measures is loaded by itself
+
+    versions = {"python": platform.python_version()}
+    versions |= {package: version(package) for package in ("taxel", "numpy", *packages)}
+    return {
+        "machine": {
+            "cpu": processor(),
+            "cores": os.cpu_count(),
+            "load": os.getloadavg()[0],
+            "system": platform.platform(),
+        },
+        "versions": versions,
+        "commit": code_version("taxel", "taxel_benchmarks"),
+    }
+
+
+def processor() -> str:
+    """Return the processor's model and its widest vectors, as models of one name have AVX-512 or not."""
+    about = dict(map(str.strip, line.partition(":")[::2]) for line in _read("/proc/cpuinfo"))
+    flags = about.get("flags", "").split()
+    widest = next((name for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2")) if flag in flags), None)
+    return ", ".join(filter(None, (about.get("model name", platform.processor()), widest)))
+
+
+def version(package: str) -> str:
+    """Return the version of an installed package."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "in the checkout" if package == "taxel" else "absent"
+
+
+def _read(path: str) -> list[str]:
+    try:
+        return Path(path).read_text().splitlines()
+    except OSError:
+        return []

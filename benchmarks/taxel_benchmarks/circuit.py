@@ -1,0 +1,124 @@
+"""One frame's exact network of 64 x 64 taxels: against NumPy's dense solves, and with wires against SciPy's sparse one.
+
+Peers without wire resistance: ``numpy.linalg.solve`` of all 128 lines' balances with a right-hand side a read column,
+and of the 64 that are left when the read columns' lines, which only taxels join, are eliminated. With it (8192
+voltages): ``scipy.sparse.linalg.splu`` of the same matrix. Voltages are compared. All in one thread.
+
+Peer: `numpy.linalg.solve`, of all lines and of half, and SciPy's `splu`. Unit: CPU seconds a frame. Goal: not slower
+than any, and the same voltages.
+"""
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from taxel.simulate.circuit import Fabric, VirtualGround
+from taxel_benchmarks._goals import at_most, not_slower
+from taxel_benchmarks._rounds import compared, measure, stamp
+
+#: By the ratio's name, ours and the peer.
+PAIRS = {
+    "numpy.linalg.solve": ("taxel", "numpy.linalg.solve"),
+    "numpy.linalg.solve, half the lines": ("taxel", "numpy.linalg.solve, half the lines"),
+    "scipy splu, with wires": ("taxel, with wires", "scipy splu, with wires"),
+}
+
+
+def pressed(size):
+    """Return conductances under a ball, uS: a footprint of some 12 mm; all other taxels are at rest."""
+    y, x = np.mgrid[:size, :size]
+    away = np.hypot(x - 0.4 * size, y - 0.55 * size) / (0.15 * size)
+    return Fabric().conductance(0.3 * np.clip(1 - away**2, 0, None) ** 1.5)
+
+
+def ends(lines):
+    """Return the source's voltage, its conductance and that of a switch: V, S, S."""
+    feedback = 1e-3 / lines.feedback_kohm
+    return lines.v_trans * lines.gain / (1 + lines.gain), (1 + lines.gain) * feedback, 1 / lines.switch_ohm
+
+
+def dense(lines, g_us):
+    """Return the outputs by NumPy alone."""
+    n, m = g_us.shape
+    g = 1e-6 * g_us
+    source, sense, switch = ends(lines)
+    a = np.zeros((n + m, n + m))
+    a[:n, n:], a[n:, :n] = -g, -g.T
+    np.fill_diagonal(a, np.r_[g.sum(1) + sense, g.sum(0) + switch])
+    b = np.zeros((n + m, m))
+    b[:n], b[n:] = sense * source, switch * lines.v_trans * (1 - np.eye(m))
+    inputs = np.linalg.solve(a, b)[:n]
+    return np.clip(lines.gain * (lines.v_trans - inputs), 0, lines.rail_v)
+
+
+def eliminated(lines, g_us):
+    """Return the outputs by NumPy alone, the balances of the read columns solved by hand."""
+    m = g_us.shape[1]
+    g = 1e-6 * g_us
+    source, sense, switch = ends(lines)
+    share = g / (g.sum(0) + switch)
+    a = -share @ g.T
+    a[np.diag_indices_from(a)] += g.sum(1) + sense
+    inputs = np.linalg.solve(a, sense * source + share @ (switch * lines.v_trans * (1 - np.eye(m))))
+    return np.clip(lines.gain * (lines.v_trans - inputs), 0, lines.rail_v)
+
+
+def sparse(lines, g_us):
+    """Return the outputs by SciPy, with wires."""
+    n, m = g_us.shape
+    g = 1e-6 * g_us
+    source, sense, switch = ends(lines)
+    rows = np.arange(n * m).reshape(n, m)
+    columns = rows + n * m
+    wire = 1 / lines.wire_ohm
+    first, second = 1 / (1 / sense + lines.wire_ohm), 1 / (1 / switch + lines.wire_ohm)
+    pairs = [(rows, columns, g), (rows[:, 1:], rows[:, :-1], wire), (columns[1:], columns[:-1], wire)]
+    p, q, c = (np.concatenate([np.broadcast_to(one[k], one[0].shape).ravel() for one in pairs]) for k in range(3))
+    held = np.r_[rows[:, 0], columns[0]]
+    at = np.r_[p, q, p, q, held], np.r_[p, q, q, p, held]
+    a = csc_array((np.r_[c, c, -c, -c, np.full(n, first), np.full(m, second)], at), shape=(2 * n * m,) * 2)
+    b = np.zeros((2 * n * m, m))
+    b[rows[:, 0]] = first * source
+    b[columns[0]] = second * lines.v_trans * (1 - np.eye(m))
+    factor = splu(a, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    into = first * (source - factor.solve(b)[rows[:, 0]])
+    return np.clip(source - into / sense + 1e3 * lines.feedback_kohm * into, 0, lines.rail_v)
+
+
+def goals(result):
+    """Return the goals with what a result reached."""
+    apart = {f"{name}: largest difference, V": one for name, one in result["largest difference, V"].items()}
+    return not_slower(result, *PAIRS) + at_most(dict.fromkeys(apart, 1e-8), apart)
+
+
+def run(*, quick):
+    """Measure; quick: 16 x 16, few rounds."""
+    size, rounds = (16, 3) if quick else (64, 25)
+    g = pressed(size)
+    plain, wired = VirtualGround(), VirtualGround(wire_ohm=0.5)
+    apart = {
+        "without wires": float(np.abs(plain.volts(g) - dense(plain, g)).max()),
+        "half the lines": float(np.abs(plain.volts(g) - eliminated(plain, g)).max()),
+        "with wires": float(np.abs(wired.volts(g) - sparse(wired, g)).max()),
+    }
+    results = measure(
+        {
+            "taxel": lambda: plain.volts(g),
+            "numpy.linalg.solve": lambda: dense(plain, g),
+            "numpy.linalg.solve, half the lines": lambda: eliminated(plain, g),
+            "taxel, with wires": lambda: wired.volts(g),
+            "scipy splu, with wires": lambda: sparse(wired, g),
+        },
+        rounds=rounds,
+    )
+    ratios, spread = compared(results, PAIRS)
+    return {
+        "question": __doc__.splitlines()[0],
+        **stamp("scipy"),
+        "size": [size, size],
+        "largest difference, V": apart,
+        "results": results,
+        "ratios": ratios,
+        "spread": spread,
+        "stable": all(result["stable"] for result in results.values()),
+    }

@@ -1,0 +1,216 @@
+"""Distances between spike trains against elephant's matrices and PySpike's: the cost of a pair, and of a large matrix.
+
+Trains of 1 s, Victor-Purpura at 50/s, van Rossum at 20 ms. Elephant and PySpike are called for a whole matrix of trains
+(``victor_purpura_distance``, ``van_rossum_distance``, ``isi_distance_matrix``, ``spike_distance_matrix``), as are we
+(``taxel.metrics.pairwise``); elephant's calls on two trains take 2 to 20 times as long a pair as its matrices. Then
+patterns of 256 taxels with about 100 spikes each, as in a matrix of 1800 by 1800: 240 or fewer against each other,
+scaled to all 1 619 100 pairs. One thread.
+
+Peer: elephant, and PySpike. Unit: CPU seconds a pair; of the large matrix, minutes. Goal: not slower than either, and
+the same distances.
+"""
+
+import os
+import subprocess
+import sys
+import time
+import warnings
+from functools import partial
+
+import numpy as np
+
+from taxel import Array, ProblemError, SpikeTrains
+from taxel.metrics import pairwise
+from taxel_benchmarks._goals import at_most, not_slower
+from taxel_benchmarks._peer import missing
+from taxel_benchmarks._rounds import compared, measure, stamp
+
+Q, TAU = 0.05, 20.0
+MATRIX, TAXELS, SPIKES = 1800, 256, 100
+
+#: The modules that each peer needs.
+MEASURED = ("elephant victor_purpura", "elephant van_rossum", "PySpike isi_distance", "PySpike spike_distance")
+PEERS = {"elephant": "elephant neo quantities", "PySpike": "pyspike"}
+
+
+def trains(random, count, spikes, stop=1000.0):
+    return [np.sort(random.uniform(0, stop, spikes)) for _ in range(count)]
+
+
+def pattern(random):
+    times = [np.sort(random.uniform(0, 1000, random.poisson(SPIKES))) for _ in range(TAXELS)]
+    return SpikeTrains.from_lists(times, 0.0, 1000.0)
+
+
+def off(ours, theirs):
+    """Return the largest difference of two matrices."""
+    return float(np.abs(ours - theirs).max())
+
+
+def by_elephant(lists):
+    """Return elephant's matrices of these trains."""
+    import quantities as pq  # noqa: PLC0415  a peer need not be there
+    from elephant.spike_train_dissimilarity import (  # noqa: PLC0415
+        van_rossum_distance,
+        victor_purpura_distance,
+    )
+    from neo import SpikeTrain  # noqa: PLC0415
+
+    neo = [SpikeTrain(t, units="ms", t_start=0, t_stop=1000) for t in lists]
+    return {
+        "elephant victor_purpura": lambda: victor_purpura_distance(neo, Q / pq.ms),
+        "elephant van_rossum": lambda: van_rossum_distance(neo, TAU * pq.ms),
+    }
+
+
+def by_pyspike(lists):
+    """Return PySpike's matrices of these trains."""
+    import pyspike  # noqa: PLC0415  a peer need not be there
+
+    spy = [pyspike.SpikeTrain(t, (0.0, 1000.0)) for t in lists]
+    return {
+        "PySpike isi_distance": lambda: pyspike.isi_distance_matrix(spy),
+        "PySpike spike_distance": lambda: pyspike.spike_distance_matrix(spy),
+    }
+
+
+CALLS = {"elephant": by_elephant, "PySpike": by_pyspike}
+
+
+def against_peers(spikes, absent, *, quick):
+    """Measure ours and the peers on pairs of trains with this number of spikes."""
+    random = np.random.default_rng(spikes)
+    count = 10 if quick else 60
+    lists = trains(random, count, spikes)
+    ours = SpikeTrains.from_lists(lists, 0.0, 1000.0)
+    pairs = count * (count - 1) / 2
+    # Fast functions are called several times in a round, so that the time can be measured.
+    often = 5 if quick else 50
+    repeated = {
+        "taxel victor_purpura": lambda: pairwise("victor_purpura", ours, q=Q, threads=1),
+        "taxel van_rossum": lambda: pairwise("van_rossum", ours, tau=TAU, threads=1),
+        "taxel isi_distance": lambda: pairwise("isi_distance", ours, threads=1),
+        "taxel spike_distance": lambda: pairwise("spike_distance", ours, threads=1),
+    }
+    peers = {name: run for peer in PEERS if peer not in absent for name, run in CALLS[peer](lists).items()}
+    mine = {name: (lambda run=run: [run() for _ in range(often)]) for name, run in repeated.items()}
+    results = measure({**mine, **peers}, rounds=1 if quick else 5, work=pairs)
+    for name in mine:
+        for clock in ("cpu_s", "wall_s"):
+            results[name][clock] = {key: (np.array(one) / often).tolist() for key, one in results[name][clock].items()}
+        results[name]["rate"] *= often
+    for result in results.values():
+        result["us_a_pair"] = 1e6 / result["rate"]
+    couples = {name: (f"taxel {name.split()[1]}", name) for name in peers}
+    ratios, spread = compared(results, {f"{name}, {spikes} spikes": couple for name, couple in couples.items()})
+    return {
+        "trains": count,
+        "results": results,
+        "ratios": ratios,
+        "spread": spread,
+        "largest difference": {name: off(repeated[couple[0]](), peers[name]()) for name, couple in couples.items()},
+    }
+
+
+def minutes(metric, patterns, **parameters):
+    """Return the CPU minutes of a matrix of all of these patterns, on one thread."""
+    begun = time.process_time()
+    pairwise(metric, patterns, threads=1, **parameters)
+    return (time.process_time() - begun) / 60
+
+
+def drawn(count):
+    """Return the first patterns of the large matrix."""
+    random = np.random.default_rng(0)
+    return [pattern(random) for _ in range(count)]
+
+
+def minutes_with(instructions, count):
+    """Return the CPU minutes of a matrix of Victor-Purpura where these vector instructions are the widest."""
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "taxel_benchmarks.metrics", str(count)],
+        env=os.environ | {"TAXEL_INSTRUCTIONS": instructions},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise ProblemError(done.stderr.splitlines()[-1])
+    return float(done.stdout)
+
+
+def large(*, quick):
+    """Measure matrices over patterns of many taxels, and scale them to `MATRIX` patterns."""
+    most = 12 if quick else 240
+    patterns = drawn(most)
+    array = {"array": Array(16, 16, pitch_mm=2.67)}
+    whole = MATRIX * (MATRIX - 1) / 2
+    found = {}
+    least = max(most // 12, 4)
+    for name, count, work in (
+        ("van Rossum summed over taxels", most, partial(minutes, "van_rossum", patterns, tau=TAU)),
+        (
+            "van Rossum with the spatial kernel",
+            most,
+            partial(minutes, "van_rossum_spatial", patterns, tau=TAU, **array),
+        ),
+        ("the same, tau 0.4 ms as in the thesis", most, partial(minutes, "van_rossum_spatial", patterns, **array)),
+        (
+            "sum of absolute differences with the spatial kernel",
+            least,
+            partial(minutes, "van_rossum_spatial_absolute", patterns[:least], **array),
+        ),
+        *(
+            (f"Victor-Purpura summed over taxels, {name}", count, partial(minutes_with, instructions, count))
+            for name, instructions, count in (
+                ("AVX-512", "avx512", most),
+                ("AVX2", "avx2", most),
+                ("no vectors", "plain", max(most // 6, 4)),
+            )
+        ),
+    ):
+        pairs = count * (count - 1) / 2
+        try:
+            took = work()
+        except ProblemError as error:
+            found[name] = {"not measured": str(error)}
+            continue
+        found[name] = {
+            "patterns": count,
+            "pairs": pairs,
+            "share of all pairs": pairs / whole,
+            "cpu_minutes": took,
+            "cpu_minutes for all pairs, scaled": took * whole / pairs,
+        }
+    return {"matrix": MATRIX, "taxels": TAXELS, "spikes a taxel": SPIKES, "results": found}
+
+
+def goals(result):
+    """Return the goals with what a result reached."""
+    names = [f"{name}, {spikes}" for spikes in result["against peers"] for name in MEASURED]
+    apart = {
+        f"difference, {name}, {spikes}": part["largest difference"].get(name)
+        for spikes, part in result["against peers"].items()
+        for name in MEASURED
+    }
+    return not_slower(result, *names) + at_most(dict.fromkeys(apart, 1e-9), apart)
+
+
+def run(*, quick):
+    """Measure; quick: few trains, one round."""
+    warnings.simplefilter("ignore")
+    absent = missing(PEERS)
+    small = {f"{spikes} spikes": against_peers(spikes, absent, quick=quick) for spikes in (20, 200)}
+    return {
+        "question": __doc__.splitlines()[0],
+        **stamp("elephant", "pyspike", "neo"),
+        "left out": absent,
+        "against peers": small,
+        "large matrices": large(quick=quick),
+        **{of: {name: one for part in small.values() for name, one in part[of].items()} for of in ("ratios", "spread")},
+        "stable": all(r["stable"] for part in small.values() for r in part["results"].values()),
+    }
+
+
+if __name__ == "__main__":
+    print(minutes("victor_purpura", drawn(int(sys.argv[1])), q=Q))

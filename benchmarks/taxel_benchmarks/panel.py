@@ -1,0 +1,427 @@
+"""The live panel: pictures a second beside 99 other clients and in a browser, seeking and opening recordings.
+
+Sender and clients share this machine, over loopback, the sender a process of its own. The fast client reads all
+messages and sends a credit for each picture; half of the others request pictures and never read. CPU is of
+the thread `taxel-panel` alone. Times of a seek are from the request to the picture with its 5 s of raster.
+
+Recordings of pictures are an hour of both insoles, 2 x 99 sensors at 100 Hz, as .mcap, one of them as .h5 and as a text
+table, all in the page cache. A client's times of opening are from its request to the first picture, the overview and
+the whole; the page's, in Chromium without GPU at 1300 x 900, from its address to a map and an overview that are drawn.
+CPU is of this process and its children, medians of rounds. Commands are processes of their own.
+
+Peer: none but a hundred clients of its own, as nothing else speaks its protocol. Unit: pictures; cores; ms of a seek;
+s. Goal: 50 pictures/s beside 99 others and in Chromium, nothing lost, .025 core of the server alone and .14 with the
+others, a GB indexed within 2 s (scaled from 218 and 135 MB), any time within 50 ms; an hour of insoles opens
+in 2 s and is complete within 5, a text table shows its first picture in 2 s, then progress; taxel view answers within
+1 s.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import taxel
+from taxel import ProblemError
+from taxel.live import Live, Panel
+from taxel_benchmarks._goals import Goal
+from taxel_benchmarks._peer import missing
+from taxel_benchmarks._rounds import stamp, thread_seconds
+
+if TYPE_CHECKING:
+    from websockets.sync.client import ClientConnection
+
+SIDES, CHANGES_PER_S = (64,), 1e5
+#: The modules that the clients of the panel need.
+PEERS = {"all of it": "websockets", "the page in Chromium": "playwright"}
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
+#: Runs a command, then prints the largest memory of its process: wait4 would give that of the process that began it.
+COMMAND = """
+import sys
+from taxel.cli import main
+try:
+    main(sys.argv[1:])
+finally:
+    print(next(line for line in open("/proc/self/status") if line.startswith("VmHWM")), flush=True)
+"""
+#: Goals for the server's cores, by the number of other clients.
+CORES = {0: 0.025, 99: 0.14}
+#: Words of the figures that are better when smaller.
+SMALLER = ("cores",)
+
+#: Notes in a page when its map showed more than one colour and its overview had bins, and counts the pictures drawn.
+WATCH = """
+window.seen = { pictures: 0 };
+const proto = CanvasRenderingContext2D.prototype;
+let frame = null, bins = 0;
+for (const name of ["putImageData", "fillRect", "fill", "drawImage"]) {
+  const own = proto[name];
+  proto[name] = function (...given) {
+    own.apply(this, given);
+    const id = this.canvas.id;
+    if (id === "pressure-map") {
+      if (frame !== document.timeline.currentTime) seen.pictures++;
+      frame = document.timeline.currentTime;
+      if (seen.map === undefined) {
+        const { data } = this.getImageData(0, 0, this.canvas.width, this.canvas.height);
+        if (new Set(new Uint32Array(data.buffer)).size > 2) seen.map = performance.now();
+      }
+    }
+    if (id === "strip" && name === "fillRect" && ++bins === 100) seen.overview = performance.now();
+  };
+}
+"""
+
+#: Bytes of a datagram: 19 changes and their values, 192 us of them.
+EACH = 190
+
+SEND = """
+import pickle, sys
+from taxel.live import send
+send(pickle.load(open(sys.argv[1], "rb")), port=int(sys.argv[2]), period_us=190.0, seconds=float(sys.argv[3]))
+"""
+
+
+def events(side: int, count: int, seconds: float) -> taxel.Events:
+    """Return changes spread over an array and over time, ten touches a second."""
+    random = np.random.default_rng(18)
+    t = np.sort(random.uniform(0, seconds * 1e6, count).astype(np.int64) // 100 * 100)
+    middle = (t // 100_000 * 17) % side
+    x, y = (np.clip(middle + random.integers(-6, 7, count), 0, side - 1) for _ in range(2))
+    p = random.integers(0, 2, count) == 1
+    return taxel.Events(
+        t, x, y, p, intensity=random.integers(40, 140, count), array=taxel.Array(side, side, name="bench")
+    )
+
+
+def connected(panel: Panel) -> ClientConnection:
+    """Connect a client that has requested two pictures."""
+    from websockets.sync.client import connect  # noqa: PLC0415  an extra
+
+    host = "{}:{}".format(*panel.address)
+    client = connect(
+        f"ws://{host}/socket",
+        origin=f"http://{host}",
+        subprotocols=["taxel.panel.1", f"token.{panel.token}"],
+        max_size=None,
+        open_timeout=60,
+    )
+    client.send(json.dumps({"type": "credit", "n": 2}))
+    return client
+
+
+def sending(side: int, port: int, seconds: float, scratch: Path) -> subprocess.Popen[bytes]:
+    """Send events to a port, by a process of its own."""
+    words = taxel.wire.encode(events(side, round(CHANGES_PER_S), 1.0))
+    payload = scratch / f"{side}.pickle"
+    payload.write_bytes(pickle.dumps([words[k : k + EACH] for k in range(0, len(words), EACH)]))
+    return subprocess.Popen([sys.executable, "-c", SEND, str(payload), str(port), str(seconds)])
+
+
+def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str, Any]:
+    """Count the pictures of a fast client while events arrive."""
+    array = taxel.Array(side, side, name="bench")
+    with Live(0, host="127.0.0.1", array=array) as live, Panel(live, folder=scratch) as panel:
+        crowd = [connected(panel) for _ in range(others)]
+        good = connected(panel)
+        sender = sending(side, live.address[1], seconds + 1.0, scratch)
+        time.sleep(0.5)
+        pictures, before, begun = 0, thread_seconds().get("taxel-panel", 0.0), time.perf_counter()
+        while time.perf_counter() - begun < seconds:
+            if isinstance(good.recv(timeout=60), bytes):
+                pictures += 1
+                good.send(json.dumps({"type": "credit", "n": 1}))
+        wall = time.perf_counter() - begun
+        cpu = thread_seconds()["taxel-panel"] - before
+        sender.wait()
+        for one in [good, *crowd]:
+            one.socket.close()
+        capture = live.counters["capture"]
+    return {
+        "side": side,
+        "others": others,
+        "pictures_per_s": pictures / wall,
+        "server_cores": cpu / wall,
+        "lost": capture["dropped_by_kernel"] + capture["dropped_by_queue"],
+    }
+
+
+def seeking(version: int, count: int, seeks: int, scratch: Path) -> dict[str, Any]:
+    """Seek in a recording of this number of changes, in the words of a version of the wire."""
+    path, made = scratch / f"seek{version}.mcap", events(64, count, count / CHANGES_PER_S)
+    if version == 1:
+        raw = scratch / "seek.lsa"
+        raw.write_bytes(taxel.wire.encode(made))
+        taxel.convert(raw, path)
+    else:
+        taxel.convert(made, path)
+    size, random = path.stat().st_size, np.random.default_rng(1)
+    with Panel(path) as panel:
+        client = connected(panel)
+        client.send(json.dumps({"type": "watch", "taxel": [32, 32]}))
+        cpu = time.process_time()
+        begun = time.perf_counter()
+        client.send(json.dumps({"type": "open", "name": path.name, "id": 1}))
+        opened: dict[str, Any] = {}
+        while opened.get("type") != "opened":
+            message = client.recv(timeout=600)
+            opened = {} if isinstance(message, bytes) else json.loads(message)
+        index = {"wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - cpu}
+        walls, cpus = [], []
+        for t_us in random.integers(opened["start_us"], opened["stop_us"], seeks):
+            cpu, begun = time.process_time(), time.perf_counter()
+            client.send(json.dumps({"type": "seek", "t_us": int(t_us)}))
+            while True:
+                message = client.recv(timeout=60)
+                if isinstance(message, bytes):
+                    client.send(json.dumps({"type": "credit", "n": 1}))
+                    if int.from_bytes(message[16:24], "little", signed=True) == t_us:
+                        break
+            walls.append(1e3 * (time.perf_counter() - begun))
+            cpus.append(1e3 * (time.process_time() - cpu))
+        client.socket.close()
+    return {
+        "version": version,
+        "file_mb": size / 1e6,
+        "changes": count,
+        "index": {**index, "cpu_s_per_gb": index["cpu_s"] / size * 1e9, "wall_s_per_gb": index["wall_s"] / size * 1e9},
+        "seek_ms": {"median": float(np.median(walls)), "max": max(walls), "cpu_median": float(np.median(cpus))},
+    }
+
+
+def insoles(seconds: float) -> taxel.Recording:
+    """Return a walk on two insoles of 99 sensors at 100 Hz: steps of a second, in kPa with fractions."""
+    from taxel.recording.contents import Source, alone, source_from  # noqa: PLC0415  a recording in memory
+    from taxel.recording.parts import Origin  # noqa: PLC0415
+
+    random, n = np.random.default_rng(7), round(100 * seconds)
+    y, x = np.divmod(np.arange(99), 9)
+    array = taxel.Array(1, 99, name="bench insole", places=taxel.Places(10.0 * x, 24.0 * y, unit="mm"))
+    t = np.arange(n, dtype=np.int64) * 10_000
+    sources: dict[str, Source] = {}
+    for k, foot in enumerate(("left", "right")):
+        phase = (np.arange(n) / 100 + k / 2) % 1.0
+        load = np.where(phase < 0.6, np.sin(np.pi * phase / 0.6), 0.0)[:, None] * random.random(99) * 300
+        values = np.round(load * (1 + 0.05 * random.standard_normal((n, 1))), 1).astype(np.float32)
+        frames = taxel.Frames(values[:, None], t, unit="kPa", array=array)
+        sources[foot] = source_from(frames, Origin(Path("insoles"), f"insoles {foot}", "pedar", foot))
+    return taxel.Recording(alone(sources))
+
+
+def opening(path: Path) -> dict[str, Any]:
+    """Open a recording of pictures; measure the time to the first picture, to the overview and to all of it."""
+    with Panel(path) as panel:
+        client = connected(panel)
+        cpu, begun = used_s(), time.perf_counter()
+        client.send(json.dumps({"type": "open", "name": path.name}))
+        client.send(json.dumps({"type": "overview"}))
+        times: dict[str, float] = {}
+        left_s: float | None = 0.0
+        progress = 0
+        while not {"picture_s", "overview_s", "complete_s"} <= times.keys():
+            message = client.recv(timeout=600)
+            now = time.perf_counter() - begun
+            if isinstance(message, bytes):
+                client.send(json.dumps({"type": "credit", "n": 1}))
+                if left_s != 0.0:
+                    times.setdefault("picture_s", now)
+                continue
+            told = json.loads(message)
+            progress += told["type"] == "loading"
+            if told["type"] == "opened":
+                left_s = told["pictures"]["left_s"]
+                if left_s is None:
+                    times["complete_s"] = now
+            elif told["type"] == "overview":
+                times.setdefault("overview_s", now)
+        cpu = used_s() - cpu
+        client.socket.close()
+    return {**times, "cpu_s": cpu, "progress": progress}
+
+
+def used_s() -> float:
+    """Return the CPU time of this process and of its children that have ended."""
+    of = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in of)
+
+
+def medians(rounds: int, measured: Callable[[], dict[str, Any]]) -> dict[str, float]:
+    """Measure several times; return the median of each number."""
+    every = [measured() for _ in range(rounds)]
+    return {name: float(np.median([one[name] for one in every])) for name in every[0]}
+
+
+@contextmanager
+def page(url: str) -> Iterator[Any]:
+    """Show an address in Chromium without GPU, with what it draws noted in `seen`."""
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415  an extra
+
+    with sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        shown = browser.new_page(viewport={"width": 1300, "height": 900})
+        shown.add_init_script(WATCH)
+        shown.goto(url, wait_until="commit")
+        yield shown
+        browser.close()
+
+
+def opening_on_page(path: Path) -> dict[str, float]:
+    """Open a recording in Chromium; measure the time until its map and its overview are drawn."""
+    with Panel(path) as panel, page(panel.url) as shown:
+        end = time.monotonic() + 120
+        while not {"map", "overview"} <= (seen := shown.evaluate("seen")).keys():
+            if time.monotonic() > end:
+                raise ProblemError(f"{path}: not drawn within 120 s; {seen}")
+            time.sleep(0.05)
+    return {"map_s": seen["map"] / 1e3, "overview_s": seen["overview"] / 1e3}
+
+
+def on_page(side: int, seconds: float, scratch: Path) -> dict[str, Any]:
+    """Count the pictures that Chromium draws while events arrive."""
+    array = taxel.Array(side, side, name="bench")
+    with Live(0, host="127.0.0.1", array=array) as live, Panel(live) as panel, page(panel.url) as shown:
+        sender = sending(side, live.address[1], seconds + 3, scratch)
+        shown.wait_for_timeout(2000)
+        before, begun = shown.evaluate("seen.pictures"), time.perf_counter()
+        shown.wait_for_timeout(1000 * seconds)
+        pictures, wall = shown.evaluate("seen.pictures") - before, time.perf_counter() - begun
+        sender.wait()
+    return {"side": side, "pictures_per_s": pictures / wall}
+
+
+def command(*words: str | Path) -> dict[str, float]:
+    """Run a command to its end, or `taxel view` until it says its address; measure time, CPU and largest memory."""
+    begun = time.perf_counter()
+    process = subprocess.Popen([sys.executable, "-c", COMMAND, *map(str, words)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None  # a pipe
+    if words[0] == "view":
+        process.stdout.readline()
+        memory = {}
+        wall = time.perf_counter() - begun
+        process.kill()
+    else:
+        memory = {"memory_mb": int(process.stdout.read().split()[-2]) * 1024 / 1e6}
+        wall = time.perf_counter() - begun
+    process.stdout.close()
+    _, status, of = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode > 0:
+        raise ProblemError(f"taxel {' '.join(map(str, words))}: ended with {process.returncode}")
+    return {"wall_s": wall, "cpu_s": of.ru_utime + of.ru_stime, **memory}
+
+
+def openings(seconds: float, rounds: int, scratch: Path, *, chromium: bool) -> list[dict[str, Any]]:
+    """Open both insoles from a .mcap, one from a .h5 and from a text table: by a client, on the page, by commands."""
+    both = insoles(seconds)
+    files = {
+        scratch / "insoles.mcap": both,
+        **{scratch / f"insole.{end}": both.sources["left"] for end in ("h5", "csv")},
+    }
+    rows = []
+    for file, of in files.items():
+        taxel.convert(of, file)
+        row: dict[str, Any] = {"file": file.name, "file_mb": file.stat().st_size / 1e6}
+        row |= medians(rounds, partial(opening, file))
+        if chromium:
+            row["page"] = medians(rounds, partial(opening_on_page, file))
+        words: dict[str, tuple[str | Path, ...]] = {
+            "view": ("view", file, "--no-open", "--json"),
+            "info": ("info", file),
+            "convert": ("convert", file, scratch / "converted.mcap", "--overwrite"),
+        }
+        rows.append(row | {name: medians(rounds, partial(command, *said)) for name, said in words.items()})
+    return rows
+
+
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    if "following" not in result:
+        return []
+    rows, (*hours, table) = result["following"], result["opening"]
+    found = [
+        Goal("pictures/s beside others, the least", min(row["pictures_per_s"] for row in rows), 50),
+        Goal("pictures lost", sum(row["lost"] for row in rows), 0, at_most=True),
+        *(
+            Goal(f"the server's cores, {row['others']} others", row["server_cores"], CORES[row["others"]], at_most=True)
+            for row in rows
+        ),
+        Goal(
+            "an hour of insoles opens, s",
+            max(max(one["picture_s"], one["overview_s"]) for one in hours),
+            2,
+            at_most=True,
+        ),
+        Goal("an hour of insoles is complete, s", max(one["complete_s"] for one in hours), 5, at_most=True),
+        Goal("a text table shows its first picture, s", table["picture_s"], 2, at_most=True),
+        Goal("messages of progress on a text table", table["progress"], 1),
+        Goal("taxel view answers, s", max(one["view"]["wall_s"] for one in result["opening"]), 1, at_most=True),
+    ]
+    # Without Chromium these two were not measured.
+    drawn = max(max(one["page"].values()) for one in hours) if result["page"] else None
+    found.append(Goal("an hour of insoles is drawn in Chromium, s", drawn, 2, at_most=True))
+    found.append(Goal("pictures/s in Chromium", result["page"] and result["page"]["pictures_per_s"], 50))
+    for one in result["seeking"]:
+        version = f"version {one['version']}"
+        scaled = f"{version}: a GB indexed, scaled from {one['file_mb']:.0f} MB, s"
+        found.append(Goal(scaled, one["index"]["wall_s_per_gb"], 2, at_most=True))
+        found.append(Goal(f"{version}: any time, ms", one["seek_ms"]["max"], 50, at_most=True))
+    return found
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    absent = missing(PEERS)
+    if "all of it" in absent:
+        if not quick:
+            raise ProblemError("panel: its clients need websockets: pip install websockets")
+        return stamp() | {"left out": absent, "ratios": {}}
+    if CHROMIUM is None:
+        absent.setdefault("the page in Chromium", "no Chromium: on Debian, apt install chromium")
+    chromium = "the page in Chromium" not in absent
+    seconds = 1.0 if quick else 5.0
+    load = os.getloadavg()[0]
+    with tempfile.TemporaryDirectory() as folder:
+        scratch = Path(folder)
+        rows = [following(side, others, seconds, scratch) for side in SIDES for others in CORES]
+        shown = on_page(SIDES[0], seconds, scratch) if chromium else None
+        sought = [seeking(v, 200_000 if quick else 20_000_000, 5 if quick else 50, scratch) for v in (1, 2)]
+        opened = openings(10.0 if quick else 3600.0, 1 if quick else 3, scratch, chromium=chromium)
+    return {
+        "question": (__doc__ or "").splitlines()[0],
+        **stamp(),
+        "load_before": load,
+        "load_after": os.getloadavg()[0],
+        "following": rows,
+        "page": shown,
+        "seeking": sought,
+        "opening": opened,
+        "left out": absent,
+        "ratios": {
+            **{
+                f"{row['side']} x {row['side']}, {row['others']} others: {what}": of
+                for row in rows
+                for what, of in {
+                    "pictures/s over 50": row["pictures_per_s"] / 50,
+                    "the server's cores": row["server_cores"],
+                }.items()
+            },
+            **({"Chromium: pictures/s over 50": shown["pictures_per_s"] / 50} if shown else {}),
+            **{f"{one['file']}: 2 s over the first picture": 2 / one["picture_s"] for one in opened},
+            **{f"{one['file']}: 5 s over all of it": 5 / one["complete_s"] for one in opened[:-1]},
+        },
+        "stable": load < (os.cpu_count() or 1),
+    }

@@ -1,0 +1,268 @@
+"""Decoding of bytes to events, beside a plain C loop, blocked NumPy, expelliarmus and faery (both EVT2).
+
+One thread, 20 million words. Like is compared with like, `warm`, `fresh` or `file` (`DOES`): from the same place, into
+the same memory. Ours are the nouns' own columns (t int64, x and y uint16, p bool: 13 bytes an event, and 3 more for
+values); so are the C loop's, which is told beforehand whether there are values; NumPy writes 11 bytes (x and y uint8),
+which is its best. The peers on EVT2 read a file of as many events of their own format, and ours one of our words.
+
+Peer: a plain C loop, blocked NumPy, expelliarmus and faery. Unit: million words/s. Goal: not slower than any; a mixed
+stream twice as fast as the C loop; with AVX2 alone the same.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import taxel
+from taxel import wire
+from taxel_benchmarks._goals import Goal, at_least, not_slower
+from taxel_benchmarks._instructions import beside_avx2
+from taxel_benchmarks._peer import missing
+from taxel_benchmarks._rounds import compared, measure, stamp
+
+WORDS, BLOCK = 20_000_000, 65_536
+
+#: Clean changes; changes that alternate with their values; a random mix of both.
+STREAMS = ("clean", "pairs", "mix")
+#: What each row does, by the end of its name.
+DOES = {
+    "warm": "words in memory, into columns that were written before",
+    "fresh": "words in memory, into columns that are allocated in the call",
+    "file": f"a file in the page cache, read and decoded in chunks of {BLOCK} words, each into new columns",
+    "EVT2": f"a file in the page cache, read and decoded in chunks ({BLOCK} events by expelliarmus), into new columns",
+}
+
+C_LOOP = r"""
+#include <stdint.h>
+#include <stddef.h>
+/* Word by word, with a look at every byte's place; an intensity belongs to the change directly before it. */
+size_t decode(const uint8_t *b, size_t n, int64_t *t, uint16_t *x, uint16_t *y, uint8_t *p, uint16_t *ticks,
+              uint8_t *present) {
+  size_t rows = 0, i = 0;
+  int64_t latest = -1;
+  int open = 0;
+  while (i + 5 <= n) {
+    if (!(b[i] & 0x80) || ((b[i + 1] | b[i + 2] | b[i + 3] | b[i + 4]) & 0x80)) { i++; continue; }
+    uint16_t value = (uint16_t)(b[i] << 14 | b[i + 1] << 7 | b[i + 2]), cx = b[i + 3] & 63, cy = b[i + 4] & 63;
+    if (!(b[i] & 0x28)) {
+      uint16_t ahead = (uint16_t)(value - latest);
+      int64_t now = latest < 0 ? value : ahead >= 64536 ? latest + ahead - 65536 : latest + ahead;
+      if (now > latest) latest = now;
+      t[rows] = now * 100; x[rows] = cx; y[rows] = cy; p[rows] = b[i] >> 6 & 1;
+      if (ticks) { ticks[rows] = 0; present[rows] = 0; }
+      rows++; open = 1;
+    } else {
+      if (ticks && (b[i] & 0x28) == 0x20 && open && x[rows - 1] == cx && y[rows - 1] == cy) {
+        ticks[rows - 1] = value; present[rows - 1] = 1;
+      }
+      open = 0;
+    }
+    i += 5;
+  }
+  return rows;
+}
+"""
+
+#: The modules that each peer on EVT2 needs: faery writes the file.
+EVT2 = {"faery, EVT2": "faery", "expelliarmus, EVT2": "faery expelliarmus"}
+
+
+def streams(words: int) -> dict[str, bytes]:
+    """Return clean changes, changes that alternate with their intensities, and a random mix of kinds."""
+    rng = np.random.default_rng(1)
+    stamps = np.cumsum(rng.random(words) < 1 / 4096) + 60_000
+    x, y, p = rng.integers(0, 64, words), rng.integers(0, 64, words), rng.integers(0, 2, words)
+    ticks, alternate, random = rng.integers(0, 150, words), np.arange(words) % 2, rng.integers(0, 2, words)
+    twice = [np.repeat(column[::2], 2)[:words] for column in (x, y, p)]
+
+    def pack(intensity: Any, x: Any, y: Any, p: Any) -> bytes:
+        value = np.where(intensity, ticks, stamps % 65_536)
+        out = np.empty((words, 5), np.uint8)
+        out[:, 0] = 0x80 | p << 6 | intensity << 5 | value >> 14
+        out[:, 1], out[:, 2], out[:, 3], out[:, 4] = value >> 7 & 127, value & 127, x, y
+        return out.tobytes()
+
+    return {"clean": pack(0 * x, x, y, p), "pairs": pack(alternate, *twice), "mix": pack(random, x, y, p)}
+
+
+def numpy_blocked(data: bytes, columns: tuple[NDArray[Any], ...]) -> None:
+    """Decode clean changes in NumPy's fastest way: byte columns of a block, then a pass for each field."""
+    raw = np.frombuffer(data, np.uint8).reshape(-1, 5)
+    t, x, y, p = columns
+    planes, stamp16, high = np.empty((5, BLOCK), np.uint8), np.empty(BLOCK, np.uint16), np.empty(BLOCK, np.uint16)
+    latest = None
+    for at in range(0, len(raw), BLOCK):
+        n = min(BLOCK, len(raw) - at)
+        block, s, h, to = planes[:, :n], stamp16[:n], high[:n], slice(at, at + n)
+        np.copyto(block, raw[to].T)
+        if block[0].min() < 0x80 or (block[0] & 0x28).any() or block[1:].max() > 0x7F:
+            raise ValueError("this decoder takes clean changes only")
+        np.left_shift(block[0], 14, out=s, dtype=np.uint16)
+        np.left_shift(block[1], 7, out=h, dtype=np.uint16)
+        s |= h
+        s |= block[2]
+        latest = int(s[0]) if latest is None else latest
+        s -= np.uint16(latest % 65_536)
+        np.multiply(s, 100, out=t[to], dtype=np.int64)
+        t[to] += 100 * latest
+        latest += int(s[-1])
+        x[to], y[to] = block[3], block[4]
+        np.right_shift(block[0], 6, out=p[to])
+        p[to] &= 1
+
+
+def compiled(folder: Path) -> Callable[..., int] | None:
+    """Return the C loop, compiled on this machine; None without a compiler."""
+    if shutil.which("cc") is None:
+        return None
+    (folder / "loop.c").write_text(C_LOOP)
+    library = folder / "loop.so"
+    subprocess.run(["cc", "-O3", "-shared", "-fPIC", "-o", library, folder / "loop.c"], check=True)
+    function = ctypes.CDLL(str(library)).decode
+    function.restype = ctypes.c_size_t
+    return function
+
+
+def evt2(folder: Path, words: int) -> dict[str, Callable[[], Any]]:
+    """Return the peers that read as many events from an EVT2 file; those that are not installed are left out."""
+    absent = missing(EVT2)
+    if "faery, EVT2" in absent:
+        return {}
+    import faery  # noqa: PLC0415  a peer need not be there
+
+    rng, path = np.random.default_rng(2), folder / "events.raw"
+    events = np.zeros(words, faery.EVENTS_DTYPE)
+    events["t"] = np.sort(rng.integers(0, words // 20, words))
+    events["x"], events["y"] = rng.integers(0, 64, words), rng.integers(0, 64, words)
+    events["on"] = rng.integers(0, 2, words).astype(bool)
+    faery.events_stream_from_array(events, dimensions=(64, 64)).to_file(path, version="evt2")
+
+    def by_faery() -> None:
+        for packet in faery.events_stream_from_file(path):
+            len(packet)
+
+    runs: dict[str, Callable[[], Any]] = {"faery, EVT2": by_faery}
+    if absent:
+        return runs
+    from expelliarmus import Wizard  # noqa: PLC0415  a peer need not be there
+
+    def by_expelliarmus() -> None:
+        wizard = Wizard(encoding="evt2", chunk_size=BLOCK)
+        wizard.set_file(path)
+        for chunk in wizard.read_chunk():
+            len(chunk)
+
+    return runs | {"expelliarmus, EVT2": by_expelliarmus}
+
+
+def pairs() -> dict[str, tuple[str, str]]:
+    """Return ours and the peer of each ratio, by its name."""
+    both = [(f"taxel, {of}, {to}", f"C loop, {of}, {to}") for of in STREAMS for to in ("warm", "fresh")]
+    both += [(f"taxel, clean, {to}", f"numpy, clean, {to}") for to in ("warm", "fresh")]
+    both += [("taxel, clean, file", peer) for peer in EVT2]
+    return {f"{ours} / {peer}": (ours, peer) for ours, peer in both}
+
+
+def goals(result: Mapping[str, Any]) -> list[Goal]:
+    """Return the goals with what a result reached."""
+    twice = {"taxel, mix, warm / C loop, mix, warm": 2.0}
+    return not_slower(result, *(name for name in pairs() if name not in twice)) + at_least(twice, result["ratios"])
+
+
+@beside_avx2
+def run(*, quick: bool) -> dict[str, Any]:
+    words, rounds = (WORDS // 20, 3) if quick else (WORDS, 11)
+    data = streams(words)
+    columns = wire.Columns(words + 2)
+
+    def blocked() -> tuple[NDArray[Any], ...]:
+        return np.empty(words, np.int64), *(np.empty(words, np.uint8) for _ in range(3))
+
+    written = blocked()
+    for column in written:
+        column.fill(1)
+    runs: dict[str, Callable[[], Any]] = {
+        "numpy, clean, warm": lambda: numpy_blocked(data["clean"], written),
+        "numpy, clean, fresh": lambda: numpy_blocked(data["clean"], blocked()),
+    }
+    for name, stream in data.items():
+        runs[f"taxel, {name}, warm"] = lambda stream=stream: wire.Decoder().push_into(columns, stream)
+        runs[f"taxel, {name}, fresh"] = lambda stream=stream: wire.Decoder().push(stream)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        (folder / "words").write_bytes(data["clean"])
+        loop = compiled(folder)
+        if loop is not None:
+            for name, stream in data.items():
+                runs[f"C loop, {name}, warm"] = partial(by_loop, loop, stream, columns, values=name == "pairs")
+                runs[f"C loop, {name}, fresh"] = partial(by_loop, loop, stream, None, values=name == "pairs")
+        runs["taxel, clean, file"] = partial(from_file, folder / "words")
+        runs |= evt2(folder, words)
+        _agree(data, columns, written, loop)
+        # Each peer directly behind ours.
+        order = sorted(runs, key=lambda name: (name.partition(", ")[2], not name.startswith("taxel")))
+        results = measure({name: runs[name] for name in order}, rounds=rounds, work=words)
+    for name, row in results.items():
+        row["does"] = DOES[name.rpartition(", ")[2]]
+    ratios, spread = compared(results, {name: pair for name, pair in pairs().items() if pair[1] in results})
+    for name in data:
+        ratios[f"taxel, {name}, warm, million words/s"] = results[f"taxel, {name}, warm"]["rate"] / 1e6
+    return {
+        "question": __doc__.splitlines()[0],
+        **stamp("expelliarmus", "faery"),
+        "words": words,
+        "left out": missing(EVT2) | ({} if loop is not None else {"C loop": "no cc"}),
+        "results": results,
+        "ratios": ratios,
+        "spread": spread,
+        "stable": all(result["stable"] for result in results.values()),
+    }
+
+
+def by_loop(loop: Callable[..., int], stream: bytes, columns: wire.Columns | None, *, values: bool) -> int:
+    """Decode with the C loop, into new columns unless some are given; return the number of events."""
+    room = len(stream) // 5
+    sizes = (np.int64, np.uint16, np.uint16, np.uint8, np.uint16, np.uint8)[: 6 if values else 4]
+    into = [np.empty(room, size) for size in sizes] if columns is None else _c_order(columns)[: len(sizes)]
+    places = [ctypes.c_void_p(column.ctypes.data) for column in into] + [None] * (6 - len(sizes))
+    return loop(stream, ctypes.c_size_t(len(stream)), *places)
+
+
+def from_file(path: Path) -> None:
+    """Read words and decode them, a block at a time, each into new columns."""
+    decoder = wire.Decoder()
+    with path.open("rb") as file:
+        while chunk := file.read(5 * BLOCK):
+            len(decoder.push(chunk))
+
+
+def _c_order(columns: wire.Columns) -> tuple[NDArray[Any], ...]:
+    return columns.t, columns.x, columns.y, columns.p, columns.intensity, columns.present
+
+
+def _agree(
+    data: dict[str, bytes], columns: wire.Columns, blocked: tuple[NDArray[Any], ...], loop: Callable[..., int] | None
+) -> None:
+    """Check that all decode the same, before anything is measured."""
+    expected = wire.decode(data["clean"])
+    numpy_blocked(data["clean"], blocked)
+    for ours, theirs in zip((expected.t, expected.x, expected.y, expected.p), blocked, strict=True):
+        if not np.array_equal(ours, theirs):
+            raise taxel.Error("the NumPy decoder disagrees with ours")
+    for stream in data.values() if loop is not None else ():
+        rows = by_loop(loop, stream, columns, values=True)  # type: ignore[arg-type]
+        ours = wire.decode(stream)
+        pairs = () if ours.intensity is None else (ours.intensity, ours.present)
+        for mine, theirs in zip((ours.t, ours.x, ours.y, ours.p, *pairs), _c_order(columns), strict=False):
+            if not np.array_equal(mine, theirs[:rows]):
+                raise taxel.Error("the C loop disagrees with ours")

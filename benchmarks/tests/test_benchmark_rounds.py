@@ -1,0 +1,222 @@
+"""Ours and peers are measured in turn, by one clock, BLAS in one thread; a ratio is that of the rounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from taxel import Array, SpikeTrains, wire
+from taxel_benchmarks import _memory, _peer, _rounds, _touch, latency, learn_cone_x, wire_decode
+
+
+class Clock:
+    """A clock that calls move on, and what was called."""
+
+    def __init__(self) -> None:
+        self.now, self.called = 0.0, ""
+
+    def run(self, name: str, *seconds: float) -> Callable[[], None]:
+        """Return a run that takes these seconds, call by call, again and again."""
+        left: list[float] = []
+
+        def call() -> None:
+            left[:] = left or seconds
+            self.now += left.pop(0)
+            self.called += name
+
+        return call
+
+    def peer(self, name: str, *seconds: float, **more: Any) -> Callable[[], dict[str, Any]]:
+        call = self.run(name, *seconds)
+
+        def ask() -> dict[str, Any]:
+            before = self.now
+            call()
+            return more or {"cpu_s": self.now - before}
+
+        return ask
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    one = Clock()
+    times = SimpleNamespace(process_time=lambda: one.now, perf_counter=lambda: 2 * one.now)
+    monkeypatch.setattr(_rounds, "time", times)
+    return one
+
+
+def test_each_runs_once_to_warm_up_and_then_all_in_turn(clock: Clock) -> None:
+    runs = {"a": clock.run("a", 9.0, 1.0, 2.0, 4.0), "b": clock.run("b", 5.0)}
+    found = _rounds.measure(runs, rounds=3, work=6.0)
+    assert clock.called == "abababab"
+    assert found["a"]["cpu_s"] == {"median": 2.0, "quartiles": [1.5, 3.0], "rounds": [1.0, 2.0, 4.0]}
+    assert (found["a"]["wall_s"]["median"], found["a"]["rate"], found["a"]["stable"]) == (4.0, 3.0, False)
+    assert found["b"]["stable"]
+    _rounds.measure(runs, rounds=1, warm_up=False)
+    assert clock.called == "abababab" + "ab"
+
+
+def test_a_ratio_is_the_median_of_those_of_the_rounds(clock: Clock) -> None:
+    """A machine that is three times slower in some rounds leaves it; so does work that differs."""
+    runs = {"ours": clock.run("o", 1.0, 1.0, 3.0), "peer": clock.run("p", 1.0, 4.0, 3.0, 2.0)}
+    found = _rounds.measure(runs, rounds=3)
+    # Rounds: ours 1, 3, 1, the peer 4, 3, 2.
+    assert found["ours"]["cpu_s"]["rounds"] == [1.0, 3.0, 1.0]
+    ratios, spread = _rounds.compared(found, {"much": ("ours", "peer")})
+    assert ratios == {"much": 2.0}
+    assert spread == {"much": [1.5, 3.0]}
+    found["ours"]["rate"] *= 10
+    assert _rounds.compared(found, {"much": ("ours", "peer")})[0] == {"much": 20.0}
+
+
+def test_blas_has_one_thread() -> None:
+    counts: list[int] = []
+
+    def call() -> None:
+        np.ones((8, 8)) @ np.ones((8, 8))
+        counts.extend(one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas")
+
+    with threadpool_limits(2):
+        call()
+        assert 2 in counts
+        counts.clear()
+        _rounds.measure({"one": call}, rounds=2)
+    assert counts
+    assert set(counts) == {1}
+
+
+def test_peers_run_in_turn_with_ours_and_long_ones_once(clock: Clock) -> None:
+    peers = {
+        "fast": clock.peer("f", 2.0, 3.0, 2.0),
+        "slow": clock.peer("s", 50.0),
+        "stopped": clock.peer("x", 60.0, stopped="after 60 s", limit_s=60),
+        "broken": clock.peer("b", 0.0, failed=["ImportError"]),
+    }
+    ours, found = _peer.in_turn(clock.run("o", 1.0, 1.0, 1.0, 2.0), peers, 3)
+    assert clock.called == "oofsxbofof"
+    assert ours["cpu_s"]["rounds"] == [1.0, 1.0, 2.0]
+    assert found.pop("broken") == {"failed": ["ImportError"]}
+    times = {name: (one["times"], one["rounds"]) for name, one in found.items()}
+    assert times == {"fast": (2.0, 3), "slow": (50.0, 1), "stopped": (60.0, 1)}
+    assert found["fast"]["quartiles"] == [1.5, 2.5]
+    told = _peer.ratios_of({"small": {"ours": ours, **found}})
+    assert told["ratios"] == {"small, fast": 2.0, "small, slow": 50.0, "small, stopped": 60.0}
+    assert told["spread"] == {"small, fast": [1.5, 2.5]}
+    assert told["larger"] == ["small, stopped"]
+
+
+@pytest.mark.parametrize(
+    ("theirs", "share"),
+    [
+        ([(1000, 0, 1), (3000, 1, -1)], 1.0),
+        ([(1000, 0, 1), (2000, 1, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 0, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 1, 1)], 0.5),
+        ([(1000, 0, 1)], 1.0),
+        ([(3000, 1, -1)], 0.5),
+        ([(1000, 0, 1), (3000, 1, -1), (3000, 0, 1), (3000, 0, 1)], 0.5),
+    ],
+)
+def test_spikes_are_equal_in_time_train_and_value(theirs: list[tuple[int, ...]], share: float) -> None:
+    """Ours may go on after the last of the NumPy version, and must not have others before."""
+    ours = SpikeTrains.from_lists([[1.0], [3.0]], stop=4.0, values=[[1.0], [-1.0]])
+    assert _touch.shared(ours, theirs) == share
+
+
+def test_latencies_of_rounds_are_summed_where_they_count_and_else_the_median() -> None:
+    rounds = [{"found": n, "lost": {"queue": 1}, "late": {"p50": p}} for n, p in ((3, 1.0), (4, 9.0), (5, 2.0))]
+    assert latency.together(rounds) == {
+        "found": 12,
+        "lost": {"queue": 3},
+        "late": {"p50": 2.0, "p50 quartiles": [1.5, 5.5]},
+    }
+
+
+def test_a_touch_is_answered_once() -> None:
+    """The neuron of the latency does not fire again for one touch, and does for the next."""
+    neuron, weights, *_ = latency.readout(Array(8, 8))[0].neurons["contact"]
+    spikes = SpikeTrains.from_lists([[10.0, 10.0 + latency.EACH_US * 0.75e-3], []], stop=60.0)
+    assert len(neuron.run(weights, spikes)) == 2
+
+
+def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:
+    ends = {(ours.rpartition(", ")[2], peer.rpartition(", ")[2]) for ours, peer in wire_decode.pairs().values()}
+    assert ends == {("warm", "warm"), ("fresh", "fresh"), ("file", "EVT2")}
+    for ours, peer in wire_decode.pairs().values():
+        assert ours.split(", ")[1] in ("clean", peer.split(", ")[1])
+
+
+@pytest.mark.parametrize("into", ["given", "new"])
+def test_the_c_loop_decodes_what_ours_does(tmp_path: Path, into: str) -> None:
+    loop = wire_decode.compiled(tmp_path)
+    if loop is None:
+        pytest.skip("no C compiler")
+    for name, stream in wire_decode.streams(1000).items():
+        ours = wire.decode(stream)
+        columns = wire.Columns(1002) if into == "given" else None
+        assert wire_decode.by_loop(loop, stream, columns, values=name == "pairs") == len(ours)
+        if columns is not None:
+            assert np.array_equal(columns.t[: len(ours)], ours.t)
+            assert name != "pairs" or np.array_equal(columns.intensity[: len(ours)], ours.intensity)
+
+
+def judged(**of_peer: Any) -> dict[str, bool]:
+    """Return the goals of a solved and an infeasible case of the memory task, with one peer in both."""
+    ours = {"verdict": "solved", "objective": 1.0}, {"verdict": "infeasible", "certificate checked": True}
+    name = next(iter(learn_cone_x.PEERS))
+    peer = {"verdict": "solved", "objective, relative difference": 1e-9} | of_peer
+    cases = {"1/1": {"ConeX": ours[0], name: peer}, "2/2": {"ConeX": ours[1], name: {"verdict": "infeasible"}}}
+    return {goal.what: goal.reached for goal in learn_cone_x.goals({"cases": cases}) if "times" not in goal.what}
+
+
+def test_conex_must_agree_with_its_peers() -> None:
+    agree, apart = "1/1, share of peers with ConeX's verdict", "1/1, objectives differ by at most"
+    for of_peer, lacks in (
+        ({}, set()),
+        ({"verdict": "infeasible"}, {agree}),
+        ({"objective, relative difference": -1e-4}, {apart}),
+    ):
+        found = {what: reached for what, reached in judged(**of_peer).items() if what.startswith(("1/1, ", "2/2, "))}
+        assert {what for what, reached in found.items() if not reached} == lacks
+        assert found["2/2, certificate of infeasibility checked"]
+
+
+def test_a_peer_with_rows_on_demand_gets_those_that_its_solution_breaks() -> None:
+    """The rows that it ends with are enough: the verdict and the least weights are those of all rows."""
+    n, p, held = 20, 3, [np.empty((0, 20))]
+    equal = _memory.equalities(n, p)
+
+    def solve(rows: Any, limits: Any) -> tuple[str, Any, float]:
+        held[0] = np.concatenate([held[0], rows])
+        most.extend(limits)
+        return answer(held[0], np.array(most))
+
+    def answer(rows: Any, limits: Any) -> tuple[str, Any, float]:
+        found = minimize(
+            lambda w: 0.5 * w @ w,
+            np.zeros(n),
+            jac=lambda w: w,
+            bounds=[(-_memory.BOUND, _memory.BOUND)] * n,
+            constraints=[
+                {"type": "eq", "fun": lambda w: equal @ w - _memory.THETA_0, "jac": lambda w: equal},
+                *([{"type": "ineq", "fun": lambda w: limits - rows @ w, "jac": lambda w: -rows}] if len(rows) else []),
+            ],
+            tol=1e-12,
+        )
+        return "solved", found.x, float(found.fun)
+
+    most: list[float] = []
+    verdict, objective = _memory.on_demand(n, p, solve)
+    rows, limits = _memory.every_row(n, p)
+    _, w, least = answer(rows, limits)
+    assert verdict == "solved"
+    assert 0 < len(held[0]) < len(rows) / 4
+    assert (rows @ w <= limits + 1e-7).all()
+    assert objective == pytest.approx(least, rel=1e-6)

@@ -1,0 +1,89 @@
+"""What is saved as a file of JSON: the base of a tare, a calibration, a readout and a plain rule."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+from typing import ClassVar, Self, TypeVar
+
+from taxel._base.arguments import path as checked_path
+from taxel._base.documents import text_of_json
+from taxel._base.files import write_whole
+from taxel._core import Error, FormatError
+
+__all__ = ["Saved", "read"]
+
+_S = TypeVar("_S")
+
+
+class Saved(ABC):
+    """Has a text of JSON, by which two are equal and which a file holds."""
+
+    #: What it is, in errors.
+    _WHAT: ClassVar[str]
+
+    @abstractmethod
+    def to_json(self) -> str:
+        """Return the text of its file."""
+
+    @classmethod
+    @abstractmethod
+    def from_json(cls, text: str) -> Self:
+        """Return the one that `to_json` wrote."""
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write it to a JSON file, whole or not at all, and return its path.
+
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        """
+        text = self.to_json().removesuffix("\n") + "\n"
+        return write_whole(path, lambda file: file.write(text.encode()), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read the file that `save` wrote: the same to the last bit.
+
+        Parameters
+        ----------
+        path : path
+
+        Raises
+        ------
+        FormatError : another kind of file, or invalid parts (names the file)
+        FileNotFoundError : no such file
+        """
+        return read(path, cls._WHAT, cls.from_json)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return self.to_json() == other.to_json()
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def read(path: str | os.PathLike[str], what: str, of_text: Callable[[str], _S]) -> _S:
+    """Return what the text of a file stands for; errors name the file."""
+    place = Path(checked_path("path", path))
+    try:
+        text = text_of_json(place)
+    except FormatError as error:
+        raise FormatError(f"{error}; must be a {what} as taxel writes it") from None
+    try:
+        return of_text(text)
+    except Error as error:
+        raise FormatError(f"{place}: {error}") from None

@@ -1,0 +1,109 @@
+"""Requests about the board: its serial line, and the source that receives its datagrams."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import socket
+import struct
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from taxel._core import ProblemError
+from taxel.device import Cable
+from taxel.live._requests.reasons import reasons
+from taxel.wire import Command
+
+__all__ = ["BoardRequests"]
+
+#: SIOCGIFADDR of Linux (netdevice(7)).
+_ADDRESS_OF = 0x8915
+
+
+class BoardRequests:
+    """Write the board's registers, and choose where and how it is received.
+
+    Parameters
+    ----------
+    listen : function of host and port
+        Receives the board's datagrams on another address.
+    delta_intensity : function of a bool
+        Interprets intensities as differences, or as values.
+    read_out : function of a path
+        Reads the board out with another readout.
+    cable : Cable or None
+        The board's serial line, which `close` closes.
+    """
+
+    def __init__(
+        self,
+        listen: Callable[[str, int], None],
+        delta_intensity: Callable[[bool], None],
+        read_out: Callable[[Path], None],
+        cable: Cable | None,
+    ) -> None:
+        self._listen, self._delta_intensity, self._read_out = listen, delta_intensity, read_out
+        self._cable, self._lock = cable, threading.Lock()
+
+    def close(self) -> None:
+        """Close the serial line."""
+        with self._lock:
+            if self._cable is not None:
+                self._cable.close()
+                self._cable = None
+
+    def _connected(self) -> Cable:
+        if self._cable is None:
+            raise ProblemError("the board's serial line is not connected")
+        return self._cable
+
+    def command(self, register: int, value: int) -> int:
+        """Write a register; return the value that the board reports."""
+        with reasons(), self._lock:
+            return self._connected().command(Command(register, value))
+
+    def channels(self) -> int:
+        """Return the number of converter channels in the board's greeting."""
+        with reasons(), self._lock:
+            return self._connected().greeting().channels
+
+    def board_lines(self) -> tuple[list[str], int]:
+        """Return the board's lines since the last call, and how often it was reset."""
+        with reasons(), self._lock:
+            return ([], 0) if self._cable is None else (self._cable.said(), self._cable.resets)
+
+    def connect(self, place: str | None) -> None:
+        """Connect the serial line to another place, or disconnect it."""
+        self.close()
+        if place is not None:
+            with reasons():
+                cable = Cable(place)
+            with self._lock:
+                self._cable = cable
+
+    def listen(self, host: str, port: int) -> None:
+        """Receive the board's datagrams on another address."""
+        with reasons():
+            self._listen(host, port)
+
+    def set_differences(self, on: bool) -> None:
+        """Interpret intensities as differences, or as values."""
+        with reasons():
+            self._delta_intensity(on)
+
+    def addresses(self) -> list[tuple[str, str]]:
+        """Return the IPv4 addresses of this machine, each with the name of its network interface."""
+        addresses = []
+        with reasons(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
+            for _, name in socket.if_nameindex():
+                # An interface that is down has none. struct ifreq: the name, then the address from byte 20 on.
+                with contextlib.suppress(OSError):
+                    answer = fcntl.ioctl(any_socket, _ADDRESS_OF, struct.pack("256s", name.encode()[:15]))
+                    addresses.append((socket.inet_ntoa(answer[20:24]), name))
+        return addresses
+
+    def read_out(self, readout: Path) -> None:
+        """Read the board out with another readout."""
+        with reasons():
+            self._read_out(readout)

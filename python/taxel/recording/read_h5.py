@@ -1,0 +1,71 @@
+"""Reads events or pictures of a .h5 that taxel wrote (`taxel.recording.write_h5`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from taxel._base.files import open_file
+from taxel._base.h5_file import H5File
+from taxel._core import FormatError
+from taxel.array import Array
+from taxel.recording.contents import Source
+from taxel.recording.read_npz import DTYPES, chosen, source_of_columns
+from taxel.recording.write_h5 import MARK, VERSION
+from taxel.recording.write_npz import TEXTS
+
+__all__ = ["is_ours", "read_h5"]
+
+#: Bytes of a file that are searched at once.
+_PIECE_BYTES = 1 << 20
+
+
+def is_ours(path: Path) -> bool:
+    """Return whether a .h5 has the layout that `taxel convert` writes; false for a file that is not HDF5."""
+    try:
+        # The name of an attribute is in the file as it is: without it the library, which begins slowly, is not asked.
+        with open_file(path) as file:
+            if not _holds(file, MARK.encode()):
+                return False
+        with H5File(path) as h5:
+            return h5.attribute(MARK) is not None
+    except (FormatError, OSError):
+        return False
+
+
+def _holds(file: BinaryIO, word: bytes) -> bool:
+    """Return whether a word is in a file."""
+    before = b""
+    while piece := file.read(_PIECE_BYTES):
+        if word in before + piece:
+            return True
+        before = piece[1 - len(word) :]
+    return False
+
+
+def read_h5(path: Path, array: Array | None) -> Source:
+    """Read a .h5 that taxel wrote.
+
+    Raises
+    ------
+    FormatError : not an HDF5 file, or one of another layout
+    """
+    with H5File(path) as h5:
+        version = h5.attribute(MARK)
+        if version is None:
+            raise FormatError(
+                f"{path}: HDF5, but without the attribute taxel of what taxel convert writes; other people's files are "
+                "read by taxel.open and taxel.formats.trials"
+            )
+        if version != VERSION:
+            number = "no whole number" if isinstance(version, str) else version
+            raise FormatError(f"{path}: its attribute taxel is {number}; this version of taxel reads {VERSION}")
+        names = chosen(path, {name: entry.shape for name, entry in h5.entries.items()})
+        h5.check_size(names, DTYPES)
+        columns = {
+            name: np.array(h5.text(name, TEXTS[name])) if name in TEXTS else h5.numbers(name, DTYPES.get(name))
+            for name in names
+        } or {name: np.empty(0) for name in list(h5.entries)[:8]}
+    return source_of_columns(path, "h5", columns, array)

@@ -1,0 +1,368 @@
+"""A half disc pressed on a block of silicone along a straight path: its parameters, and the stress at the base."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import FormatError, ProblemError
+from taxel.report import write_whole
+from taxel_studies.fem.contact import Contact
+from taxel_studies.fem.interruptible import interruptible
+from taxel_studies.fem.material import DRAGON_SKIN_10, Yeoh
+from taxel_studies.fem.mesh import Mesh, block, half_disc
+from taxel_studies.fem.solids import Solids
+from taxel_studies.fem.solver import State, Stopped, march
+
+__all__ = ["Course", "Indentation", "bodies", "press"]
+
+#: Depths of the shapes that a course keeps, in mm; and its end.
+_SHAPES_MM = (0.5, 1.0, 1.5, 2.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Indentation:
+    """Describe a half disc pressed on a block (thesis 5.4.1). What the thesis does not state is marked (o).
+
+    Parameters
+    ----------
+    diameter_mm : float, mm, above 0
+    modulus_kpa : float, kPa, above 0
+        Of the half disc, at small strain; neo-Hookean and incompressible (o).
+    angle_deg : float, degrees, -60 to 60
+        The path's, off the block's normal; the half disc is not turned.
+    depth_mm : float, mm, above 0
+        How far the half disc's flat top is moved along the path (o); at most the diameter, as the half disc has
+        corners.
+    silicone : Yeoh
+        Table 5.2.
+    friction : float, 0 or more
+    width_mm, height_mm : float, mm, above 0
+        Of the block (o). Its height matters most of all that is not stated.
+    mesh_mm, base_mesh_mm : float, mm, above 0
+        Length of elements where it is touched, and their height at the base, `mesh_mm` at least (o).
+    step_um : float, um, above 0
+        Of the path (o). Steps that do not converge are halved.
+    penalty : float, above 0
+        Contact pressure by overlap, in units of the silicone's modulus by `mesh_mm` (o).
+
+    Raises
+    ------
+    ProblemError : a parameter that is invalid
+
+    Examples
+    --------
+    >>> Indentation(diameter_mm=2, modulus_kpa=150, angle_deg=20).height_mm
+    5.0
+    """
+
+    diameter_mm: float = 2.0
+    modulus_kpa: float = 150.0
+    angle_deg: float = 0.0
+    depth_mm: float = 2.0
+    silicone: Yeoh = DRAGON_SKIN_10
+    friction: float = 0.7
+    width_mm: float = 16.0
+    height_mm: float = 5.0
+    mesh_mm: float = 0.1
+    base_mesh_mm: float = 0.2
+    step_um: float = 8.0
+    penalty: float = 50.0
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            if one.name != "silicone":
+                value = float(getattr(self, one.name))
+                object.__setattr__(self, one.name, value)
+                if not math.isfinite(value):
+                    raise ProblemError(f"{one.name} is {value:g}: must be finite")
+                if one.name not in ("angle_deg", "friction") and value <= 0:
+                    raise ProblemError(f"{one.name} is {value:g}: must be above 0")
+        diameter, height = f"the diameter, {self.diameter_mm:g} mm", f"the height, {self.height_mm:g} mm"
+        finest, coarsest = min(self.mesh_mm, self.base_mesh_mm), max(self.mesh_mm, self.base_mesh_mm)
+        for wrong, message in (
+            (self.friction < 0, f"friction is {self.friction:g}: must be 0 or more"),
+            (abs(self.angle_deg) > 60, f"angle_deg is {self.angle_deg:g}: must be -60 to 60"),
+            (
+                self.depth_mm > self.diameter_mm,
+                f"depth_mm is {self.depth_mm:g}: at most {diameter}, or the half disc touches with its corners",
+            ),
+            (self.depth_mm >= self.height_mm, f"depth_mm is {self.depth_mm:g}: must be less than {height}"),
+            (self.width_mm < 2 * self.diameter_mm, f"width_mm is {self.width_mm:g}: at least twice {diameter}"),
+            (
+                max(self.width_mm, self.height_mm) > 100 * self.diameter_mm,
+                f"width_mm is {self.width_mm:g}, height_mm {self.height_mm:g}: at most 100 times {diameter}",
+            ),
+            (self.mesh_mm > self.diameter_mm / 4, f"mesh_mm is {self.mesh_mm:g}: at most a quarter of {diameter}"),
+            (coarsest > self.height_mm / 4, f"a mesh of {coarsest:g} mm: at most a quarter of {height}"),
+            (finest < self.diameter_mm / 500, f"a mesh of {finest:g} mm: at least a 500th of {diameter}"),
+            (
+                self.step_um < self.depth_mm / 100,
+                f"step_um is {self.step_um:g}: at most 100 000 steps to a depth of {self.depth_mm:g} mm",
+            ),
+        ):
+            if wrong:
+                raise ProblemError(message)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, as JSON holds them."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Indentation:
+        """Build an indentation from the values that `to_dict` returned."""
+        return cls(**{**values, "silicone": Yeoh(**values["silicone"])})
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Hold the results along an indentation's path; forces are by mm of thickness.
+
+    Attributes
+    ----------
+    indentation : Indentation
+    path_mm : float64, shape (n,)
+        From 0 on, in steps of ``step_um``.
+    reaction : float64, shape (n, 2), mN/mm
+        The force that moves the half disc: along x, and down.
+    base : float64, shape (n, 2), mN/mm
+        The reaction of the base along the same axes: the sum over its nodes.
+    x_mm : float64, shape (base nodes,)
+    pressure_kpa, shear_kpa : float64, shape (n, base nodes)
+        Normal traction on the base, force by length at rest: a node's reaction by the length that belongs to it.
+    stretch : float64, shape (n, base nodes)
+        How much the silicone is stretched upwards at the base.
+    contact_mm, contact_kpa : float64, shape (top nodes,)
+        Places at rest on the block's top, and the contact's normal traction there at the end.
+    shapes : dict of path in mm to float64, shape (nodes, 2), mm
+        Where the nodes of both bodies were.
+    fault : str
+        Why it ended before its depth; empty where it did not.
+    factorisations, cuts : int
+        Matrices that were solved; steps that were halved.
+    """
+
+    indentation: Indentation
+    path_mm: NDArray[np.float64]
+    reaction: NDArray[np.float64]
+    base: NDArray[np.float64]
+    x_mm: NDArray[np.float64]
+    pressure_kpa: NDArray[np.float64]
+    shear_kpa: NDArray[np.float64]
+    stretch: NDArray[np.float64]
+    contact_mm: NDArray[np.float64]
+    contact_kpa: NDArray[np.float64]
+    shapes: dict[float, NDArray[np.float64]] = field(repr=False)
+    fault: str = ""
+    factorisations: int = 0
+    cuts: int = 0
+
+    def sensed_kpa(self, quantity: str = "nominal") -> NDArray[np.float64]:
+        """Return the pressure at the base by step and node, by one of three readings of "pressure".
+
+        Parameters
+        ----------
+        quantity : {"nominal", "cauchy", "mean"}
+            Normal traction by the area at rest; the true stress, by the area as the silicone thins or thickens; or
+            minus a third of the stress' trace, about half of it at a bonded base.
+
+        Raises
+        ------
+        ProblemError : another quantity
+        """
+        if quantity == "nominal":
+            return self.pressure_kpa
+        true = self.pressure_kpa * self.stretch
+        if quantity == "cauchy":
+            return true
+        if quantity == "mean":
+            # At the bonded base F = (1, a; 0, b), so stress along it is W' 2 (1 - 1/b^2 + a^2) and W' from that across.
+            return (true - self._along()) / 3
+        raise ProblemError(f'quantity is {quantity!r}: must be "nominal", "cauchy" or "mean"')
+
+    def _along(self) -> NDArray[np.float64]:
+        """Return the true stress along the base, kPa (tension above 0)."""
+        law, b = self.indentation.silicone, self.stretch
+        shear = np.zeros_like(b)
+        # sigma_xy = 2 W' a b, and W' itself moves with a: two iterations are exact to rounding at these strains.
+        for _ in range(20):
+            slope = law.slope(shear**2 + b**2 + b**-2 - 2)
+            shear = self.shear_kpa / (2 * slope)
+        return np.asarray(2 * law.slope(shear**2 + b**2 + b**-2 - 2) * (1 + shear**2 - b**-2))
+
+    def save(self, path: Path, *, made_by: str = "", overwrite: bool = False) -> Path:
+        """Write one ``.npz`` file, whole or not at all."""
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
+        description = {
+            "indentation": self.indentation.to_dict(),
+            "fault": self.fault,
+            "factorisations": self.factorisations,
+            "cuts": self.cuts,
+            "made_by": made_by,
+        }
+        shapes: dict[str, Any] = {f"shape_{at:.6f}": x.astype(np.float32) for at, x in self.shapes.items()}
+
+        def write(file: BinaryIO) -> None:
+            np.savez_compressed(file, told=np.array(json.dumps(description)), **arrays, **shapes)
+
+        return write_whole(path, write, overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: Path) -> Course:
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        FormatError : no such file
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                description = json.loads(str(file["told"]))
+                shapes = {float(n[6:]): file[n].astype(float) for n in file.files if n.startswith("shape_")}
+                arrays = {name: file[name] for name in _ARRAYS}
+            return cls(
+                indentation=Indentation.from_dict(description["indentation"]),
+                shapes=shapes,
+                **arrays,
+                **{name: description[name] for name in ("fault", "factorisations", "cuts")},
+            )
+        except FileNotFoundError:
+            raise
+        except Exception as error:
+            raise FormatError(
+                f"{path}: holds no course of an indentation ({error}); remove it, and run it again"
+            ) from None
+
+
+_ARRAYS = ("path_mm", "reaction", "base", "x_mm", "pressure_kpa", "shear_kpa", "stretch", "contact_mm", "contact_kpa")
+
+
+def bodies(indentation: Indentation) -> tuple[Mesh, Mesh]:
+    """Return the meshes of the block and of the half disc, which just touch."""
+    i = indentation
+    radius = i.diameter_mm / 2
+    return (
+        block(i.width_mm, i.height_mm, radius + 1, i.mesh_mm, i.base_mesh_mm),
+        half_disc(radius, i.mesh_mm, i.height_mm + radius),
+    )
+
+
+def press(indentation: Indentation, *, progress: Callable[[float, float], object] | None = None) -> Course:
+    """Press the half disc, step by step, in equilibrium at each (quasi-static).
+
+    Parameters
+    ----------
+    indentation : Indentation
+    progress : function of (path, depth), mm, optional
+        What it raises ends the work.
+
+    Returns
+    -------
+    Course
+        Where no equilibrium was found from some path on it ends there, and `fault` is the reason: nothing is filled in.
+
+    Raises
+    ------
+    ProblemError : the silicone or the half disc is stretched to where its law loses stability
+
+    Notes
+    -----
+    Plane stress, bilinear quadrilaterals, contact by penalty with Coulomb's friction, finite strain and sliding. The
+    block's base is fixed, its sides are free. Shear waves cross the block in about 2 ms, so that what happens within
+    1 or 2 ms is the inertia's as well, which is left out, as in the thesis.
+
+    Examples
+    --------
+    >>> course = press(Indentation(depth_mm=0.2, mesh_mm=0.4, step_um=50))
+    >>> bool(abs(course.reaction[-1] - course.base[-1]).max() < 1e-6)
+    True
+    """
+    i = indentation
+    ground, indenter = bodies(i)
+    solids = interruptible(lambda: Solids([(ground, i.silicone), (indenter, Yeoh.of_modulus(i.modulus_kpa))]))
+    top, arc = indenter.held + solids.first[1], indenter.touching + solids.first[1]
+    contact = Contact(solids.nodes, ground.touching, arc, i.penalty * i.silicone.modulus_kpa / i.mesh_mm, i.friction)
+    held = np.concatenate([_both(ground.held), _both(top)])
+    way = np.array([math.sin(math.radians(i.angle_deg)), -math.cos(math.radians(i.angle_deg))])
+
+    def displacement(path: float) -> NDArray[np.float64]:
+        return np.concatenate([np.zeros(2 * len(ground.held)), np.tile(path * way, len(top))])
+
+    count = max(1, round(i.depth_mm / (i.step_um / 1000)))
+    paths = np.linspace(0, i.depth_mm, count + 1)
+    shape_steps = {int(np.abs(paths - at).argmin()) for at in _SHAPES_MM if at <= i.depth_mm} | {count}
+    base = _Base(ground, top)
+    shapes: dict[float, NDArray[np.float64]] = {}
+    fault, state = "", None
+    try:
+        for k, equilibrium in enumerate(march(solids, contact, held, displacement, paths)):
+            state = equilibrium
+            base.add(state)
+            if k in shape_steps:
+                shapes[state.path] = solids.nodes + state.u.reshape(-1, 2)
+            if progress is not None:
+                progress(state.path, i.depth_mm)
+    except Stopped as stopped:
+        fault = str(stopped)
+    assert state is not None  # the first is at rest
+    return Course(
+        indentation=i,
+        path_mm=paths[: len(base.reaction)],
+        **base.columns(),
+        contact_mm=ground.nodes[ground.touching, 0],
+        contact_kpa=state.contact[2 * ground.touching + 1] / _belonging(ground.nodes[ground.touching, 0]),
+        shapes=shapes,
+        fault=fault,
+        factorisations=state.factorisations,
+        cuts=state.cuts,
+    )
+
+
+class _Base:
+    """Collect forces on the half disc's top and at the block's base, step by step."""
+
+    def __init__(self, ground: Mesh, top: NDArray[np.int64]) -> None:
+        self._held, self._top = ground.held, top
+        self._x = ground.nodes[ground.held, 0]
+        self._length = _belonging(self._x)
+        above = ground.held + len(ground.held)
+        self._above, self._rest = above, ground.nodes[above, 1]
+        self.reaction: list[NDArray[np.float64]] = []
+        self._base: list[NDArray[np.float64]] = []
+        self._tractions: list[NDArray[np.float64]] = []
+        self._stretch: list[NDArray[np.float64]] = []
+
+    def add(self, state: State) -> None:
+        force = state.force.reshape(-1, 2)
+        self.reaction.append(force[self._top].sum(0) * [1, -1])
+        self._base.append(force[self._held].sum(0) * [-1, 1])
+        self._tractions.append(force[self._held] / self._length[:, None])
+        self._stretch.append(1 + state.u.reshape(-1, 2)[self._above, 1] / self._rest)
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        tractions = np.array(self._tractions)
+        return {
+            "x_mm": self._x,
+            "reaction": np.array(self.reaction),
+            "base": np.array(self._base),
+            "pressure_kpa": tractions[..., 1],
+            "shear_kpa": -tractions[..., 0],
+            "stretch": np.array(self._stretch),
+        }
+
+
+def _both(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
+
+
+def _belonging(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the length that belongs to each node of a line."""
+    half = np.diff(x) / 2
+    return np.asarray(np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half]))

@@ -1,0 +1,146 @@
+"""What a function does with a field follows from the type of its part: it is carried, changed, or said to be lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Note
+from taxel.recording.between import between
+from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, parts_of
+from taxel.recording.cut import region
+from taxel.recording.merge import merged
+from taxel.recording.on_clock import on_clock
+from taxel.recording.once import known
+from taxel.recording.parts import Lines, Timing
+from taxel.recording.pictures import calibrated, pictures
+from taxel.recording.raw import Samples
+from taxel.recording.recording import with_notes
+from taxel.recording.stored import stored
+
+from .parts import flat, holds, unsaid
+from .test_chains import ARRAY, KINDS, write
+
+
+def full(folder: Path, kind: type[Source]) -> Contents:
+    """Return contents of a type of source with something in every field, beside another source."""
+    (folder / "calibration.json").write_text(taxel.Calibration.law(ARRAY, date="2026-11-21").to_json())
+    one = taxel.open(write(folder / "full.mcap"))._contents.one
+    assert isinstance(one, Board)
+    losses = replace(
+        one.losses,
+        remarks=("by another's times",),
+        truncated=True,
+        rebuilt=known({"gaps": 1}),
+        lost=known(("something",)),
+    )
+    wire = replace(
+        one.wire,
+        payload=np.arange(5, dtype=np.uint8),
+        differences=True,
+        origin_us=7,
+        unmarked=(1,),
+        version_2=known(True),
+    )
+    one = replace(one, sensor=replace(one.sensor, side="left", heel="top"), losses=losses, wire=wire)
+    header = {name: getattr(one, name) for name in ("origin", "sensor", "settings", "marks", "timing", "losses")}
+    drawn = pictures(one, 100)
+    readings, five = replace(drawn.readings, untimed=True, turned=0.0), np.arange(5)
+    samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
+    every: dict[type[Source], Source] = {
+        Board: one,
+        Drawn: Drawn(readings=readings, wire=wire, **header),
+        Pictures: Pictures(readings=readings, **header),
+        Stream: Stream(readings=readings, lines=Lines(tuple(f"c{k}" for k in range(10)), known(samples)), **header),
+    }
+    own = every[kind]
+    return Contents(own, {"board": own, "other": replace(own, origin=replace(own.origin, label="other"))})
+
+
+def marked(of: Contents) -> Contents:
+    """Return contents that are a part by time on another clock."""
+    timing = Timing(of.one.timing.clock, "other", known((0, 300_000)))
+    return Contents(replace(of.one, timing=timing), of.sources)
+
+
+#: The functions: from the contents before to those after, and the fields that they set anew, which other tests check.
+TABLE, TIMED = {"changes.events", "readings.frames"}, {"marks.notes", "marks.detections", "marks.zeroings"}
+NAMED = {"origin.path", "origin.name", "origin.kind", "origin.label", "origin.source"}
+FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
+    "between": (
+        lambda of, _: between(of, 1000.0, 200_000.0),
+        {*TABLE, *TIMED, "settings.held", "timing.stretch", "lines.samples", "losses.verdict"},
+    ),
+    "region": (
+        lambda of, _: region(marked(of), slice(1, 5), slice(None)),
+        {*TABLE, "sensor.array", "sensor.calibration", "settings.held", "marks.zeroings", "lines.columns"},
+    ),
+    "merge": (
+        lambda of, _: merged([marked(of), marked(of)], gap=0 if isinstance(of.one, Pictures) else None),
+        {*TABLE, *TIMED, *NAMED, "losses.verdict", "timing.stretch"},
+    ),
+    "on_clock": (
+        lambda of, _: on_clock(of, "other"),
+        {*TABLE, *TIMED, "marks.board_changes", "timing.clock", "timing.clock_of", "losses.verdict"},
+    ),
+    "with_notes": (lambda of, _: with_notes(marked(of), (Note("more", 5, 0),)), {"marks.notes"}),
+    "pictures": (lambda of, _: replace(marked(of), one=pictures(marked(of).one)), {*TABLE, "settings.held"}),
+    "calibrated": (
+        lambda of, _: replace(marked(of), one=calibrated(marked(of).one)),
+        {*TABLE, "settings.held", "sensor.calibration"},
+    ),
+    **{
+        kind: (
+            lambda of, folder, kind=kind: stored(marked(of), folder / f"new{kind}"),
+            {
+                *TABLE,
+                *NAMED,
+                "timing.stretch",
+                "sensor.calibration",
+                "wire.version_2",
+                "wire.origin_us",
+                "wire.unmarked",
+            },
+        )
+        for kind in KINDS
+    },
+}
+
+
+@pytest.mark.parametrize("kind", [Board, Pictures, Drawn, Stream])
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
+    tmp_path: Path, function: str, kind: type[Source]
+) -> None:
+    of = full(tmp_path, kind)
+    for name, value in flat(of.one).items():
+        assert holds(value) or name in ("timing.stretch", "timing.clock_of", "readings.turned"), f"fill {name} too"
+    work, anew = FUNCTIONS[function]
+    if function == ".lsa" and kind is not Board:
+        return
+    after = work(of, tmp_path)
+    said = after.one.losses.lost()
+    assert "something" in said
+    assert unsaid(of.one, after.one, said, {*anew, "losses.lost"}) == []
+    if function not in ("between", "on_clock", "with_notes", "pictures", "calibrated"):
+        assert "the source other" in said
+
+
+@dataclass(frozen=True, eq=False)
+class Coloured(Board):
+    """A board with a part that no function has a rule for."""
+
+    colour: str = field(default="red", kw_only=True)
+
+
+@pytest.mark.parametrize("function", ["between", "region", "on_clock", *KINDS])
+def test_a_part_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
+    of = full(tmp_path, Board)
+    one = Coloured(**parts_of(of.one))
+    with pytest.raises((AssertionError, AttributeError), match=r"'red'|'str' object has no attribute 'lines'"):
+        FUNCTIONS[function][0](Contents(one, {"board": one, "other": of.sources["other"]}), tmp_path)

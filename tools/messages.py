@@ -1,0 +1,265 @@
+"""Make the types and the tables of the panel's messages from the structs in Rust (`make messages`).
+
+Usage: python tools/messages.py [--check]. The built extension gives their schemas (crates/taxel-panel/src/messages.rs and
+request.rs). With --check no file is written, and the status is 1 where one differs (`make lint`).
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from taxel import _core
+
+ROOT = Path(__file__).resolve().parents[1]
+HEAD = "Made from the structs of crates/taxel-panel by tools/messages.py (`make messages`): edit those."
+PAGE, CLIENT = "crates/taxel-panel/web/messages.d.ts", "python/taxel/live/_messages.py"
+DOCS = "docs/panel-protocol.md"
+#: The keys of messages, and of their parts, that the Python client reads; it ignores others.
+READS = {
+    "ArrayInfo": ("rows", "columns", "name"),
+    "FoundDetection": ("label", "t_us", "known_us"),
+    "Label": ("label", "t_us"),
+    "RecordedNote": ("text", "t_us"),
+    "hello": ("array",),
+    "registers": ("values",),
+    "detection": ("label", "t_us", "known_us", "slope_mv_per_ms", "said_us"),
+    "spikes": ("encoder", "t_ms", "train", "value", "left_out"),
+    "opened": ("array", "name", "registers", "detections", "notes"),
+    "transport": ("state",),
+    "labels": ("labels",),
+    "done": ("id",),
+    "refused": ("id", "reason"),
+    "warning": ("text",),
+}
+#: The requests that it makes.
+ASKS = ("credit", "encode", "open", "overview", "play")
+
+Schema = dict[str, Any]
+
+
+class Language:
+    """Types of a language: the words for those of JSON, and how they are combined."""
+
+    def __init__(
+        self,
+        words: dict[str, str],
+        either: str,
+        listed: Callable[[str], str],
+        pair: Callable[[list[str]], str],
+        by_name: Callable[[str], str],
+        literals: Callable[[list[str]], str],
+    ) -> None:
+        self.words, self.either, self.listed, self.pair = words, either, listed, pair
+        self.by_name, self.literals = by_name, literals
+
+    def type(self, schema: Schema | bool) -> str:  # noqa: PLR0911  a line for each kind of schema
+        """Return the type of a schema."""
+        if isinstance(schema, bool):
+            return self.words["anything"]
+        match schema:
+            case {"$ref": name}:
+                return self.words["reference"].format(name.rpartition("/")[2])
+            case {"const": word}:
+                return self.literals([word])
+            case {"enum": words}:
+                kinds = [self.literals([word for word in words if word is not None])]
+                return self.either.join(kinds + [self.words["null"]] * (None in words))
+            case {"oneOf": schemas} if not any("type" in one and one["type"] == "object" for one in schemas):
+                return self.literals([word for one in schemas for word in one.get("enum", [one.get("const")])])
+            case {"anyOf": schemas}:
+                return self.either.join(dict.fromkeys(self.type(one) for one in schemas))
+            case {"type": [*kinds]}:
+                return self.either.join(dict.fromkeys(self.type(schema | {"type": kind}) for kind in kinds))
+            case {"type": "array", "prefixItems": items}:
+                return self.pair([self.type(item) for item in items])
+            case {"type": "array", "items": items}:
+                return self.listed(self.type(items))
+            case {"type": "object", "additionalProperties": dict() | True as values}:
+                return self.by_name(self.type(values))
+            case {"type": kind}:
+                return self.words[kind]
+        return self.words["anything"]
+
+
+TYPESCRIPT = Language(
+    {"integer": "number", "number": "number", "string": "string", "boolean": "boolean", "null": "null"}
+    | {"anything": "unknown", "reference": "{}"},
+    " | ",
+    lambda item: f"({item})[]" if "|" in item else f"{item}[]",
+    lambda items: f"[{', '.join(items)}]",
+    lambda value: f"Record<string, {value}>",
+    lambda words: " | ".join(json.dumps(word) for word in words),
+)
+PYTHON = Language(
+    {"integer": "int", "number": "float", "string": "str", "boolean": "bool", "null": "None"}
+    | {"anything": "Any", "reference": "{}"},
+    " | ",
+    lambda item: f"list[{item}]",
+    lambda items: f"list[{' | '.join(dict.fromkeys(items))}]",
+    lambda value: f"dict[str, {value}]",
+    lambda words: f"Literal[{', '.join(json.dumps(word) for word in words)}]",
+)
+WORDS = Language(
+    {"integer": "whole number", "number": "number", "string": "text", "boolean": "true or false", "null": "null"}
+    | {"anything": "anything", "reference": "`{}`"},
+    " or ",
+    lambda item: f"list of {item}",
+    lambda items: f"[{', '.join(items)}]",
+    lambda value: f"object of {value}",
+    lambda words: ", ".join(f"`{word}`" for word in words),
+)
+
+
+def named(word: str) -> str:
+    """Return the name of a message's type."""
+    return "".join(part.capitalize() for part in word.split("_"))
+
+
+def variants(schema: Schema) -> dict[str, Schema]:
+    """Return the schemas of requests or messages by their `type`."""
+    return {one["properties"]["type"]["const"]: one for one in schema["oneOf"]}
+
+
+def keys(schema: Schema) -> Iterator[tuple[str, Schema, bool]]:
+    """Yield name, schema, and whether it is required, of each key but `type`; those that are required first."""
+    required = [name for name in schema.get("required", ()) if name != "type"]
+    others = [name for name in schema["properties"] if name != "type" and name not in required]
+    for name in (*required, *others):
+        yield name, schema["properties"][name], name in required
+
+
+def comment(schema: Schema) -> str:
+    """Return what a schema says of itself, in one line."""
+    return " ".join(schema.get("description", "").split())
+
+
+def interface(name: str, schema: Schema) -> str:
+    """Write an object as an interface of TypeScript."""
+    kind = schema["properties"].get("type", {}).get("const")
+    lines = [f'  type: "{kind}";'] if kind else []
+    if name.endswith("Request"):
+        lines.append("  id?: number;")
+    for key, one, required in keys(schema):
+        text = f"  /** {comment(one)} */\n" if comment(one) else ""
+        lines.append(f"{text}  {key}{'' if required else '?'}: {TYPESCRIPT.type(one)};")
+    about = f"/** {comment(schema)} */\n" if comment(schema) else ""
+    return f"{about}export interface {name} {{\n" + "\n".join(lines) + "\n}\n"
+
+
+def page(requests: Schema, messages: Schema) -> str:
+    """Write the types of the page."""
+    parts = requests["$defs"] | messages["$defs"]
+    written = [interface(name, one) for name, one in parts.items()]
+    written += [interface(named(kind), one) for kind, one in variants(messages).items()]
+    written += [interface(named(kind) + "Request", one) for kind, one in variants(requests).items()]
+    every = [
+        f"export type {union} =\n  | " + "\n  | ".join(named(kind) + ending for kind in variants(schema)) + ";\n"
+        for union, ending, schema in (("Message", "", messages), ("Request", "Request", requests))
+    ]
+    return f"// {HEAD}\n\n" + "\n".join(written + every)
+
+
+def typed_dict(name: str, schema: Schema, read: Sequence[str] | None = None) -> str:
+    """Write an object, or the keys of it that are read, as a class of Python."""
+    kind = schema["properties"].get("type", {}).get("const")
+    lines = [f'    type: Literal["{kind}"]'] if kind else []
+    if name.endswith("Request"):
+        lines.append("    id: NotRequired[int]")
+    for key, one, required in keys(schema):
+        if read is None or key in read:
+            kind = PYTHON.type(one)
+            lines.append(f"    {key}: {kind if required else f'NotRequired[{kind}]'}")
+    return f"class {name}(TypedDict):\n" + "\n".join(lines) + "\n"
+
+
+def client(requests: Schema, messages: Schema) -> str:
+    """Write the types of the Python client."""
+    sent, parts, asked = variants(messages), messages["$defs"], variants(requests)
+    kinds = [kind for kind in READS if kind in sent]
+    written = [typed_dict(name, parts[name], READS[name]) for name in READS if name in parts]
+    written += [typed_dict(named(kind) + "Message", sent[kind], READS[kind]) for kind in kinds]
+    written += [typed_dict(named(kind) + "Request", asked[kind]) for kind in ASKS]
+    every = "\n    | ".join(named(kind) + "Message" for kind in kinds)
+    unions = [
+        f"Message = (\n    {every}\n)\n",
+        f"Request = {' | '.join(named(kind) + 'Request' for kind in ASKS)}\n",
+    ]
+    head = f'"""Types of the panel\'s messages: what the client reads and asks.\n\n{HEAD}\n"""\n\n'
+    imports = "from __future__ import annotations\n\nfrom typing import Any, Literal, NotRequired, TypedDict\n"
+    return "\n\n".join([head + imports, *written, "".join(unions)])
+
+
+def cell(text: str) -> str:
+    """Return a text for a cell of a table."""
+    return text.replace("|", "\\|")
+
+
+def requested(schema: Schema) -> str:
+    """Return the keys of a request, with their limits."""
+    written = []
+    for key, one, required in keys(schema):
+        least, most, letters = one.get("minimum"), one.get("maximum"), one.get("maxLength")
+        limits = f" of 1 to {letters} characters" if letters else ""
+        if most and most <= 1e8:
+            limits = f", {least:g} to {most:g}"
+        kind = WORDS.type(one) if required else WORDS.type(one).removesuffix(" or null")
+        written.append(f"`{key}`: {kind}{limits}{'' if required else ' (may be left out)'}")
+    return "; ".join(written)
+
+
+def table_of_requests(requests: Schema, _messages: Schema) -> str:
+    """Write the table of requests."""
+    every = [*variants(requests).items(), *requests["$defs"].items()]
+    rows = [f"| `{name}` | {cell(requested(one))} | {cell(comment(one))} |" for name, one in every]
+    return "\n".join(["| `type` | keys | |", "|---|---|---|", *rows])
+
+
+def tables_of_messages(_requests: Schema, messages: Schema) -> str:
+    """Write a table for each message, and for each part of several."""
+    written = []
+    for name, one in [*variants(messages).items(), *messages["$defs"].items()]:
+        rows = [f"| `{key}` | {cell(WORDS.type(value))} | {cell(comment(value))} |" for key, value, _ in keys(one)]
+        table = "\n\n" + "\n".join(["| key | | |", "|---|---|---|", *rows]) if rows else ""
+        written.append(f"**{name}**: {comment(one)}{table}")
+    return "\n\n".join(written)
+
+
+#: The parts of the page of the docs that are made, by the marks around them.
+TABLES = {"requests": table_of_requests, "messages": tables_of_messages}
+
+
+def docs(requests: Schema, messages: Schema) -> str:
+    """Return the page of the docs with its tables made anew."""
+    text = (ROOT / DOCS).read_text("utf-8")
+    for name, make in TABLES.items():
+        begin, end = f"<!-- {name}: made by tools/messages.py -->\n", f"<!-- end of {name} -->"
+        before, _, rest = text.partition(begin)
+        text = f"{before}{begin}\n{make(requests, messages)}\n\n{end}{rest.partition(end)[2]}"
+    return text
+
+
+MADE = {PAGE: page, CLIENT: client, DOCS: docs}
+
+
+def main() -> int:
+    """Write every file, or compare."""
+    schemas = json.loads(_core.message_schemas())
+    made = {ROOT / name: make(schemas["requests"], schemas["messages"]) for name, make in MADE.items()}
+    if "--check" not in sys.argv[1:]:
+        for path, text in made.items():
+            path.write_text(text, "utf-8")
+        return 0
+    old = [
+        path.relative_to(ROOT) for path, text in made.items() if not path.exists() or path.read_text("utf-8") != text
+    ]
+    for path in old:
+        print(f"{path}: is not what the structs of the panel's messages give; run make messages")
+    return int(bool(old))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
