@@ -2,19 +2,41 @@
 
 import os
 import signal
+import sys
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import settings
+from hypothesis import is_hypothesis_test, settings
 
-settings.register_profile("taxel", deadline=None, derandomize=True)
-settings.load_profile("taxel")
+settings.register_profile("slow", deadline=None, derandomize=True)
+settings.register_profile("quick", settings.get_profile("slow"), max_examples=30)
 
 # Before NumPy and scikit-learn load: their threads wait for each other by computing, and each worker has one core.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 # A shell that starts the tests in the background makes them ignore Ctrl-C, which some tests send.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# So does nohup with SIGHUP: processes that tests start do not inherit a handler.
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)
+
+# Tests start taxel a thousand times: each start would compile all of it where nothing compiled may be stored.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose how many random examples a property test runs."""
+    settings.load_profile("slow" if config.option.markexpr == "slow" else "quick")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Run property tests with the slow tests too, which have more random examples then."""
+    if config.option.markexpr == "slow":
+        for item in items:
+            if is_hypothesis_test(getattr(item, "obj", None)):
+                item.add_marker("slow")
 
 
 @pytest.fixture(autouse=True, scope="session")

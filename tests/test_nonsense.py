@@ -4,6 +4,7 @@ Each public callable has a sound call in `tests/sound`, by room; each argument i
 nonsense. A callable without a sound call fails the first test, so that nothing public stays untried.
 """
 
+import functools
 import inspect
 import json
 import math
@@ -109,6 +110,7 @@ def modules() -> list[Any]:
     return [taxel, *rooms, taxel.simulate.circuit]
 
 
+@functools.cache
 def public() -> dict[str, Any]:
     """Every public callable once, by its shortest name: functions, classes, methods of these and of private bases."""
     names: dict[int, str] = {}
@@ -204,7 +206,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def somewhere(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of that folder as the current one."""
-    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(made, tmp_path, copy_function=shutil.copyfile, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -1,5 +1,6 @@
 """Shell commands of README and docs: those of the README work in order; of all others command and options exist."""
 
+import functools
 import os
 import re
 import shlex
@@ -42,6 +43,11 @@ WAY = [
 CASES = [(page, line) for page in PAGES for line in [*shell_lines(page), *inline(page)]]
 
 
+@functools.cache
+def commands() -> TyperGroup | TyperCommand:
+    return typer.main.get_command(app)
+
+
 @pytest.mark.parametrize(("page", "line"), CASES, ids=[f"{page.stem}: {line}" for page, line in CASES])
 def test_a_line_to_type_names_a_command_and_options_that_exist(page: Path, line: str) -> None:
     program, *arguments = shlex.split(line.split(" | ", maxsplit=1)[0])
@@ -49,7 +55,7 @@ def test_a_line_to_type_names_a_command_and_options_that_exist(page: Path, line:
         targets = re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
         assert {argument for argument in arguments if "=" not in argument} <= set(targets), page
     elif program.endswith("taxel"):
-        check(typer.main.get_command(app), arguments, in_full=line in shell_lines(page))
+        check(commands(), arguments, in_full=line in shell_lines(page))
 
 
 def check(command: TyperGroup | TyperCommand, arguments: list[str], *, in_full: bool) -> None:
@@ -76,7 +82,9 @@ class Shell:
         self.folder, self.port = folder, free_port()
 
     def arguments(self, line: str) -> list[str]:
-        words = shlex.split(line.replace("--port 5208", f"--port {self.port}"), comments=True)[1:]
+        # Ctrl-C ends what listens: a busy machine may need longer than a page says.
+        line = line.replace("--port 5208", f"--port {self.port}").replace("--seconds 20", "--seconds 600")
+        words = shlex.split(line, comments=True)[1:]
         here = ["--host", LOOPBACK] if words[0] in ("record", "live") else []
         return [sys.executable, "-m", "taxel", *words, *here]
 

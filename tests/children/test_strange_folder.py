@@ -96,7 +96,7 @@ def commands(folder: Path) -> dict[str, list[list[object]]]:
     return {
         "demo": [["--scenes", 1, "--seed", 1, "--noise", 1, "--folder", "report"]],
         "emulate": [["--port", port, "--scenes", 1, "--seed", 1]],
-        "simulate": [[folder / "scene.toml", "-o", "touch.mcap", "--movie", "touch.gif"]],
+        "simulate": [[folder / "scene.toml", "-o", "touch.mcap", "--movie", "touch.gif", "--slower", 1]],
         "device": [["ports"]],
         "record": [["walk.mcap", *live]],
         "live": [["--panel", *live]],

@@ -72,7 +72,7 @@ def test_kinds_are_told_at_1000_hz_held_out() -> None:
     """A kernel of .05 ms told 9 of 16 and 122 falsely: it fires between the points of its grid that are silent."""
     frames, labels = touched(2, 1000)
     example = Example(frames, labels, Tare.take(frames, stop_us=1_200_000))
-    result = judge([example], Recipe.load("touch", labels=KINDS, noise_floor=0.012), 4).together
+    result = judge([example], Recipe.load("touch", labels=KINDS, noise_floor=0.012), 2).together
     assert result.missed + result.false <= 1, result
 
 
@@ -100,7 +100,7 @@ def test_a_recipe_whose_later_age_was_chosen_is_sound_and_its_search_is_as_it_wa
     assert made.neurons["large"] == recipe.neurons["large"]
 
 
-@settings(max_examples=10)
+@settings(max_examples=settings.default.max_examples // 6)
 @given(st.floats(0.3, 200.0))
 def test_each_delay_has_one_picture(picture_ms: float) -> None:
     recipe = Recipe.load("touch", labels=KINDS)

@@ -48,8 +48,17 @@ def response(graph, branch: str, neuron: int, train: int, t_s: np.ndarray, area:
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
-@pytest.mark.parametrize("delays_ms", [(0.0,), (0.0, 5.0), (2.0,)])
-@pytest.mark.parametrize("spike_ms", [None, 0.1])
+@pytest.mark.parametrize(
+    ("delays_ms", "spike_ms"),
+    [
+        *(((0.0, 5.0), spike_ms) for spike_ms in (None, 0.1)),
+        ((2.0,), None),
+        *(
+            pytest.param(delays_ms, spike_ms, marks=pytest.mark.slow)
+            for delays_ms, spike_ms in (((0.0,), None), ((0.0,), 0.1), ((2.0,), 0.1))
+        ),
+    ],
+)
 def test_a_readout_comes_back_as_it_was(tmp_path: Path, kernel: dict, delays_ms: tuple, spike_ms: float | None) -> None:
     one = readout(kernel, delays_ms, run_threshold=0.9)
     one.to_nir(tmp_path / "one.nir", spike_ms=spike_ms)

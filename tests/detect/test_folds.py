@@ -287,7 +287,7 @@ def presses(seed: int, rare: int, recordings: int) -> list[Example]:
     return made
 
 
-@settings(max_examples=6, phases=[Phase.explicit, Phase.generate])
+@settings(max_examples=settings.default.max_examples // 10, phases=[Phase.explicit, Phase.generate])
 @given(st.integers(0, 10_000), st.integers(2, 12), st.integers(1, 4))
 def test_a_search_scores_held_out_data_wherever_the_events_of_a_label_lie(seed: int, rare: int, recordings: int):
     data = presses(seed, rare, recordings)

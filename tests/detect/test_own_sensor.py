@@ -415,7 +415,9 @@ def test_a_plain_rule_is_written_and_detects_what_the_training_says(
     assert (code, "known (ms)" in out, "nan" in out, "slope" in out) == (0, True, False, False)
 
 
-@pytest.mark.parametrize("unit", ["N", "kPa", "mN", "Pa", "N/cm2"])
+@pytest.mark.parametrize(
+    "unit", ["N", "kPa", *(pytest.param(one, marks=pytest.mark.slow) for one in ("mN", "Pa", "N/cm2"))]
+)
 def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
     tmp_path: Path, capsys, unit: str
 ) -> None:
@@ -468,7 +470,7 @@ def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.* out of reach")
-@settings(max_examples=10)
+@settings(max_examples=settings.default.max_examples // 6)
 @given(st.integers(0, 1000))
 def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed: int) -> None:
     frames, labels = squares([4, 3, 5, 4] * 3)

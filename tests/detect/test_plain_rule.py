@@ -197,7 +197,7 @@ def expected(rule, source, frame_us, version=1):
     return [one for one in found if one[2] <= last]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(deadline=None)
 @given(events(), st.one_of(rules, kinds), clocks)
 def test_events_give_what_a_loop_over_frames_gives(source, rule, clock):
     frame_us, version = clock

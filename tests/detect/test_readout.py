@@ -163,7 +163,7 @@ def together(parts: list[taxel.Detections]) -> taxel.Detections:
     return taxel.Detections(*columns)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
 @given(cuts=st.lists(st.integers(0, 10**6), max_size=12), which=st.integers(0, 3), data=st.data())
 def test_cuts_and_moves_of_time_change_nothing_whatever_the_encoder(cuts: list[int], which: int, data) -> None:
     events, _ = touches(5, count=2)

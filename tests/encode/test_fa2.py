@@ -25,7 +25,7 @@ def trains_of(encoder, taxels, of):
     return taxels
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), period=st.sampled_from([0.05, 0.1, 0.2]))
 def test_fa2_is_its_filter_under_its_threshold(seed, period):
     rng = np.random.default_rng(seed)

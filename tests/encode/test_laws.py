@@ -87,7 +87,7 @@ def in_pieces(encoder, pieces, moves):
 
 
 @each_encoder
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=settings.default.max_examples // 3, deadline=None)
 @given(
     seed=seeds,
     cuts=st.sets(st.integers(1, 299), max_size=12),
@@ -111,7 +111,7 @@ def test_events_in_pieces_give_the_spikes_of_the_whole(encoder, seed, cuts, late
 
 
 @each_encoder
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(
     seed=seeds,
     cuts=st.sets(st.integers(1, 299), max_size=8),
@@ -215,7 +215,7 @@ def test_time_moved_on_makes_what_comes_behind_it_late():
 
 
 @each_encoder
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(seed=seeds, cuts=st.sets(st.integers(1, 199), max_size=12))
 def test_frames_in_pieces_give_the_spikes_of_the_whole(encoder, seed, cuts):
     rng = np.random.default_rng(seed)
@@ -247,7 +247,7 @@ def test_a_stream_speaks_in_order_and_never_of_what_it_called_over(encoder, seed
 
 
 @each_encoder
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=settings.default.max_examples // 6, deadline=None)
 @given(seed=seeds, shift=st.sampled_from([-(10**12), -7, 1, 193, 10**9]))
 def test_a_shift_in_time_shifts_the_spikes(encoder, seed, shift):
     events = touch(np.random.default_rng(seed), ARRAY)

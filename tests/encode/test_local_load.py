@@ -128,7 +128,7 @@ def some_tare(rng, array, noise, holes):
     return Tare.from_json(json.dumps(tare))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     shape=st.sampled_from([(1, 1), (1, 7), (9, 1), (2, 2), (5, 7), (3, 66)]),

@@ -65,7 +65,7 @@ def some_rest(rng, array, unknown=0.1):
     return Tare.from_json(json.dumps(json.loads(tare.to_json()) | {"rest": values}))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     levels=st.integers(1, 7),
@@ -93,7 +93,7 @@ def test_moments_are_those_of_numpy_and_scipy(seed, levels, left_out, floor, ton
     assert wanted
 
 
-@settings(max_examples=60, deadline=None)
+@settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     levels=st.sampled_from([0, 1, 3]),

@@ -62,7 +62,7 @@ def apart(ours, theirs, period):
     return max(float(np.mean(one > 1.5 * period)) for one in near)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(seed=seeds, period=st.sampled_from([0.1, 0.25, 0.5, 1.0]))
 def test_sa1_is_its_filter_under_its_threshold(seed, period):
     rng = np.random.default_rng(seed)

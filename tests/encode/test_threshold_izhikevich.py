@@ -26,7 +26,7 @@ def trains_of(encoder, taxels, of):
     return (taxels[:, None] * len(encoder.levels) + np.arange(len(encoder.levels))).ravel()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4, deadline=None)
 @given(
     seed=seeds,
     published=st.sampled_from(["3.4.3", "6.5.1"]),

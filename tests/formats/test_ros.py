@@ -96,7 +96,7 @@ def test_topics_are_listed_with_fields_shapes_and_rates(tmp_path: Path) -> None:
     ("mono8", np.uint8), ("8UC1", np.uint8), ("8SC1", np.int8), ("mono16", np.uint16), ("16UC1", np.uint16),
     ("16SC1", np.int16), ("32SC1", np.int32), ("32FC1", np.float32), ("64FC1", np.float64),
 ])  # fmt: skip
-@settings(max_examples=10)
+@settings(max_examples=settings.default.max_examples // 7)
 @given(data=st.data())
 def test_an_image_of_any_encoding_of_one_channel_reads_as_it_was_made(encoding, dtype, data, tmp_path_factory) -> None:
     rows, columns = data.draw(st.tuples(st.integers(1, 9), st.integers(2, 9)))
@@ -485,7 +485,7 @@ def test_without_rosbags_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.mark.parametrize("name", KINDS[:3])
-@settings(max_examples=30)
+@settings(max_examples=settings.default.max_examples // 3)
 @given(data=st.data())
 def test_a_damaged_bag_never_crashes(name: str, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
     bag = bags.write(tmp_path_factory.mktemp("damaged") / name, palms(2))

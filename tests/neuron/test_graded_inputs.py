@@ -47,7 +47,7 @@ def problems(draw, decades=6):
     return neuron, weights, trains
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(problems())
 def test_potentials_are_sums_of_weight_times_value_times_kernel(problem):
     neuron, weights, trains = problem

@@ -215,7 +215,7 @@ def test_a_finer_grid_comes_to_the_exact_crossings():
     first=st.sampled_from(["theta_0", "printed"]),
     time=st.sampled_from([{}, {"time": "grid", "step_ms": 0.1}, {"time": "grid", "step_ms": 1.0}]),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=3 * settings.default.max_examples, deadline=None)
 def test_a_shift_in_time_shifts_the_spikes(seed, shift, tau, refractory, after, first, time):
     weights, trains = random_trains(seed)
     # In 1024ths of a ms inputs move without rounding, a year from time 0 too.

@@ -39,7 +39,7 @@ def problems(draw: st.DrawFn) -> tuple[Neuron, np.ndarray, SpikeTrains, float]:
     return neuron, weights, trains, draw(st.sampled_from([1.0, 0.6]))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(problems())
 def test_each_neuron_fires_as_it_does_by_itself(problem: tuple[Neuron, np.ndarray, SpikeTrains, float]) -> None:
     neuron, weights, trains, threshold = problem

@@ -89,7 +89,7 @@ def problems(draw: st.DrawFn) -> tuple[Neuron, np.ndarray, SpikeTrains, float]:
     return neuron, weights, trains, draw(st.sampled_from([1.0, 0.5]))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(problems())
 def test_a_neuron_fires_as_the_simulator_does(problem: tuple[Neuron, np.ndarray, SpikeTrains, float]) -> None:
     neuron, weights, trains, threshold = problem

@@ -72,7 +72,7 @@ def test_neo_trains_of_other_units_and_windows_are_read_in_ms() -> None:
     assert trains[1].tolist() == [20.0]
 
 
-@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=settings.default.max_examples // 7, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(some())
 def test_nwb_takes_our_trains_and_gives_them_back(tmp_path: Path, trains: SpikeTrains) -> None:
     pytest.importorskip("pynwb")

@@ -194,7 +194,7 @@ def settle(pages, name, acknowledged):
 
 @pytest.mark.parametrize("older", [False, True])
 def test_what_windows_were_told_is_done_is_in_the_table_or_in_conflict(older, tmp_path):
-    attack(tmp_path, servers=2, clients=2, tables=2, seconds=4, older=older)
+    attack(tmp_path, servers=2, clients=2, tables=2, seconds=2, older=older)
 
 
 @pytest.mark.slow

@@ -221,7 +221,7 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
         at = np.array([float(re.findall(r"([\d.]+) s", row)[0]) for row in rows])
         assert names[::-1] == [name for _, name in printed()]
         assert np.diff(at[::-1]) == pytest.approx(np.diff([float(time) for time, _ in printed()]), abs=0.0021)
-        assert page.locator("#detection-marks span").count() > 0
+        until(lambda: page.locator("#detection-marks span").count() > 0, "detections are marked")
         until(lambda: page.locator("#latency").inner_text() != "–", "latency is counted")
         page.locator("#detection-list button").last.click()
         shows(page, "state-word", "^Held$")

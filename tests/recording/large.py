@@ -1,6 +1,7 @@
 """Writes large recordings of every kind, of about so many bytes of arrays, without holding them; measures an opening.
 
-As a program it opens a path and prints what the arrays take and the most memory that the process took, bytes.
+As a program it opens what each line of its input says, each in a child of its own, and prints for each what the arrays
+take and the most memory that the child took, bytes. To load taxel takes longer than most openings: children have it.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import gzip
 import json
 import os
+import resource
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -269,14 +271,28 @@ def peak() -> int:
     return 1024 * int(status.partition("VmHWM:")[2].split()[0])
 
 
-if __name__ == "__main__":
+def answer(path: str, at_most: int, how: dict[str, Any]) -> None:
+    """Open a recording within so many bytes of addresses, and print what it took."""
     import taxel
 
-    given = json.loads(sys.argv[2]) if len(sys.argv) > 2 else {}
+    if at_most:
+        resource.setrlimit(resource.RLIMIT_AS, (at_most, at_most))
     try:
-        every = taxel.open_all(sys.argv[1], **given)
-        print(json.dumps({"arrays": arrays_of(every), "peak": peak()}))
+        said = {"arrays": arrays_of(taxel.open_all(path, **how)), "peak": peak()}
     except taxel.Error as error:
-        print(json.dumps({"refused": str(error), "peak": peak()}))
-    sys.stdout.flush()
-    os._exit(0)
+        said = {"refused": str(error), "peak": peak()}
+    print(json.dumps(said), flush=True)
+
+
+if __name__ == "__main__":
+    import h5py  # noqa: F401  # as taxel loads it with the first file of its kind
+
+    import taxel.recording  # noqa: F401
+
+    for line in sys.stdin:
+        child = os.fork()
+        if not child:
+            answer(*json.loads(line))
+            os._exit(0)
+        if code := os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]):
+            print(json.dumps({"ended": code}), flush=True)

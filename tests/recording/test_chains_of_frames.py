@@ -314,3 +314,11 @@ def test_of_a_board_beside_a_stream_each_has_its_own_clock_until_they_share_one(
             assert {"the source imu"} <= set(lost)
             assert taxel.open(tmp_path / f"{seed}.npz").events.intensity.tolist() == [60 + k for k in expected]
             (tmp_path / f"{seed}.npz").unlink()
+
+
+def test_frames_of_both_feet_are_written_at_the_rate_that_is_asked_for(tmp_path: Path) -> None:
+    feet, models = two_feet(tmp_path)
+    assert taxel.convert(feet, tmp_path / "slow.mcap", frames_hz=20) == list(feet.lost)
+    for name, one in taxel.open(tmp_path / "slow.mcap").sources.items():
+        assert one.frames() == feet.sources[name].frames(20)
+        assert len(one.frames()) == 8 < len(models[name].t)

@@ -40,9 +40,12 @@ def killed(folder: Path, compression: str, after_s: float) -> tuple[Path, int, i
     return recording, *progress(shared)
 
 
+@pytest.mark.parametrize("kills", [1, pytest.param(4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
-def test_a_writer_killed_at_full_rate_loses_at_most_its_last_100_ms(tmp_path: Path, compression: str) -> None:
-    for after_s in np.random.default_rng(3).uniform(0.1, 0.6, 3):
+def test_a_writer_killed_at_full_rate_loses_at_most_its_last_100_ms(
+    tmp_path: Path, compression: str, kills: int
+) -> None:
+    for after_s in np.random.default_rng(3).uniform(0.1, 0.6, kills):
         path, handed_over, last_ns = killed(tmp_path, compression, float(after_s))
         rec = taxel.open(path)
         kept = rec.datagrams()

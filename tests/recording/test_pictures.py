@@ -53,7 +53,7 @@ def bits(frames: Frames) -> np.ndarray:
     return frames.values.view(np.uint32)
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(frames=pictures())
 def test_a_mcap_gives_pictures_back_to_the_last_bit(tmp_path: Path, frames: Frames) -> None:
     place = tmp_path / "a.mcap"

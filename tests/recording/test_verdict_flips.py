@@ -110,7 +110,7 @@ def assert_told(path: Path, data: bytes, of: dict[str, list[Any]], where: str) -
     return verdict
 
 
-@pytest.mark.parametrize("step", [67, pytest.param(1, marks=(pytest.mark.slow, pytest.mark.timeout(3600)))])
+@pytest.mark.parametrize("step", [131, pytest.param(1, marks=(pytest.mark.slow, pytest.mark.timeout(3600)))])
 @pytest.mark.parametrize("end", ["finished", "unfinished"])
 def test_a_flipped_bit_anywhere_is_told_exactly(whole: Path, tmp_path: Path, end: str, step: int) -> None:
     data = whole.read_bytes() if end == "finished" else without_end(whole.read_bytes())

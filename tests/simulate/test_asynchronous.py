@@ -147,8 +147,11 @@ def test_a_board_alone_and_in_a_play_read_through_the_circuit():
     with pytest.raises(taxel.ProblemError, match="frame of 7 trip times"):
         Board(circuit=Circuit()).frame(np.zeros(7, np.uint16))
 
-    acts = [Silence(60.0), Scene.draw(seed=2)]
-    plays = [play(acts, seed=2, circuit=circuit) for circuit in (None, ideal, Circuit())]
+    press = {"pressed": {"peak_n": 3.0, "speed_mm_s": 60.0, "hold_ms": 10.0}}
+    ball = {"shape": {"sphere": {"radius_mm": 8.0}}, "x_mm": 20.0, "y_mm": 22.0, "mass_g": 30.0, "motion": press}
+    acts, array = [Silence(60.0), Scene({"bodies": [ball]})], taxel.Array(16, 16, pitch_mm=2.67)
+    plays = [play(acts, seed=2, array=array, circuit=circuit) for circuit in (None, ideal, Circuit())]
+    assert len(plays[0].events) > 100
     assert plays[0].events == plays[1].events
     assert plays[0].events != plays[2].events
     with pytest.raises(taxel.ProblemError, match=r"v_trans is 0.5: must be the sensor's, 1.3"):

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -122,10 +123,10 @@ def test_a_taxel_feels_the_mean_of_its_cells_at_the_face_and_at_the_base():
 
 def sharp(cells, y_mm):
     """Return a scene: an edge lies along a row, pressed so little that it is a quarter of a taxel wide."""
-    motion = {"pressed": {"depth_mm": 0.3, "speed_mm_s": 50.0, "hold_ms": 30.0}}
-    shape = {"edge": {"slope_deg": 45.0, "length_mm": 40.0}}
+    motion = {"pressed": {"depth_mm": 0.3, "speed_mm_s": 50.0, "hold_ms": 5.0}}
+    shape = {"edge": {"slope_deg": 45.0, "length_mm": 20.0}}
     return Scene({
-        "bodies": [{"shape": shape, "x_mm": 80.0, "y_mm": y_mm, "motion": motion}],
+        "bodies": [{"shape": shape, "x_mm": 32.0, "y_mm": y_mm, "motion": motion}],
         "foam": {"modulus_kpa": 6000.0}, "cells_per_pitch": cells,
     })  # fmt: skip
 
@@ -135,10 +136,11 @@ def test_an_edge_between_two_rows_is_felt_as_one_on_a_row():
     quiet = {"noise_ticks": 0.0, "gain_spread": 0.0, "offset_mv": 0.0}
 
     def felt(cells, y_mm):
-        return len(play([Silence(60.0), sharp(cells, y_mm)], seed=1, sensor=quiet).events)
+        acts = [Silence(60.0), sharp(cells, y_mm)]
+        return len(play(acts, seed=1, sensor=quiet, array=Array(24, 24, pitch_mm=PITCH)).events)
 
-    assert felt(1, 30.5 * PITCH) == 0
-    on, between = felt(7, 30 * PITCH), felt(7, 30.5 * PITCH)
+    assert felt(1, 12.5 * PITCH) == 0
+    on, between = felt(7, 12 * PITCH), felt(7, 12.5 * PITCH)
     assert on > 50
     assert between > 0.5 * on
 
@@ -191,7 +193,8 @@ SAID = (
 
 def test_a_scene_whose_cells_are_too_few_says_so_once(tmp_path):
     place = tmp_path / "scene.toml"
-    place.write_text(NARROW)
+    narrow = NARROW.replace("= 80", "= 32").replace("\n", "\narray = { rows = 24, columns = 24 }\n", 1)
+    place.write_text(narrow)
     run = [sys.executable, "-c", "from taxel.cli import main; main()"]
     command = [*run, "simulate", str(place), "--truth", str(tmp_path / "truth.csv"), "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -200,13 +203,13 @@ def test_a_scene_whose_cells_are_too_few_says_so_once(tmp_path):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         file = SceneFile.open(place)
-        truth(file.acts())
-        play(file.acts(), seed=1)
+        truth(file.acts(), array=file.array)
+        play(file.acts(), seed=1, **file.options)
     assert [str(warning.message) for warning in caught] == [SAID]
-    for one in (truth, lambda acts: play(acts, seed=1)):
+    for one in (partial(truth, array=file.array), partial(play, seed=1, **file.options)):
         with pytest.warns(UserWarning, match=re.escape(SAID)):
             one([Silence(60.0), Scene(file.scene.parameters)])
-    place.write_text(NARROW.replace("cells_per_pitch = 1", "cells_per_pitch = 4"))
+    place.write_text(narrow.replace("cells_per_pitch = 1", "cells_per_pitch = 4"))
     done = subprocess.run([*run, "simulate", str(place)], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == ""
 

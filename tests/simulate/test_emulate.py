@@ -16,7 +16,7 @@ from shell import run
 
 import taxel
 from taxel import ProblemError, wire
-from taxel.cli.emulate import _TruthTable
+from taxel.cli.emulate import _HELD_S, _TruthTable
 from taxel.demo.script import endless, script
 from taxel.device import Device
 from taxel.simulate import Board, Faults, Flaws, Pipe, Replay, Silence, Version2, emulate, play, truth
@@ -104,14 +104,15 @@ def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
     thread.start()
     labels = tmp_path / "labels.csv"
     arguments = ["emulate", "--port", str(port), "--scenes", "1", "--seed", "3", "--truth", str(labels)]
+    command = [sys.executable, "-m", "taxel", *arguments, "--json"]
     began = time.time_ns()
-    process = subprocess.Popen([sys.executable, "-m", "taxel", *arguments], stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     while process.poll() is None:
         if labels.exists() and labels.read_text().count("\n") > 1:
             break
         time.sleep(0.01)
     assert process.poll() is None, "a line is there before the end"
-    process.wait(timeout=60)
+    report = json.loads(process.communicate(timeout=60)[0])
     ended = time.time_ns()
     thread.join()
     contacts, _ = truth(script(3, 1))
@@ -121,7 +122,9 @@ def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
     assert {row.label for row in rows} == {"contact", "lift"}
     host = [row.host_ns for row in rows]
     assert began < host[0] < host[-1] < ended
-    np.testing.assert_allclose(np.diff(host), 1000 * np.diff(times), atol=2000)
+    # On a machine that is too slow the board is late, and the truth by the host with it, as the test below says.
+    if report["late_us"]["max"] < 1e6 * _HELD_S:
+        np.testing.assert_allclose(np.diff(host), 1000 * np.diff(times), atol=2000)
     again = run(*arguments)
     assert (again.returncode, again.stdout) == (2, "")
     assert str(labels) in again.stderr

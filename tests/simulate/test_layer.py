@@ -102,7 +102,7 @@ def test_a_ball_on_a_thick_layer_presses_as_hertz_says(nu, thickness):
     assert wrong < (0.015 if thickness == 200.0 else 0.04)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
 @given(
     nu=st.floats(0, 0.49),
     modulus=st.floats(1, 1e5),

@@ -196,7 +196,7 @@ def test_an_empty_file_is_told_what_is_missing(tmp_path):
 def test_the_command_line_writes_recording_truth_and_film_and_replaces_none(tmp_path):
     scene = write(tmp_path, BALL)
     out, labels, film = tmp_path / "touch.npz", tmp_path / "touch.csv", tmp_path / "touch.gif"
-    wanted = (scene, "-o", out, "--truth", labels, "--movie", film, "--slower", 2)
+    wanted = (scene, "-o", out, "--truth", labels, "--movie", film, "--slower", 0.5)
     done = run("simulate", *wanted, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     about = json.loads(done.stdout)

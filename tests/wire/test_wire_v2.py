@@ -134,7 +134,7 @@ def test_any_bytes_are_survived_and_counted(data, sealed):
 
 
 @given(seed=st.integers(0, 2**32 - 1), sessions=st.integers(1, 6), plain=st.booleans())
-@settings(max_examples=300)
+@settings(max_examples=3 * settings.default.max_examples)
 def test_any_order_of_any_sessions_reads_as_the_slow_reader_does(seed, sessions, plain):
     """Late datagrams of earlier sessions, states, first values of 0, and bodies that break the page's rules."""
     draw, sent = random.Random(seed), []

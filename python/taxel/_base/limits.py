@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -123,7 +124,10 @@ def keep(size: int) -> None:
 
 def memory(limit: int | None) -> int:
     """Return how many bytes may be read now, within a limit that a caller gave."""
-    return min(UNPACKED, _most()) if limit is None else limit
+    if limit is not None:
+        return limit
+    room = _room.get()
+    return min(UNPACKED, _most() if room is None else room.most)
 
 
 def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
@@ -203,10 +207,22 @@ _GROUPS = {
 
 def _of_groups(root: Path) -> Iterator[int]:
     """Yield what the limit of each control group leaves that this process is in."""
+    for folder, limit, usage, files in _groups(root):
+        with suppress(OSError, ValueError):
+            # Most groups have no limit: "max" is no number.
+            most = int((folder / limit).read_text())
+            stat = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
+            yield most - int((folder / usage).read_text()) + int(stat.get(files, 0))
+
+
+@cache
+def _groups(root: Path) -> list[tuple[Path, str, str, str]]:
+    """Return the folder of each control group that this process is in and that can have a limit, with its names."""
+    found = []
     try:
         lines = (root / "proc/self/cgroup").read_text().splitlines()
     except OSError:
-        return
+        return []
     for line in lines:
         _, _, rest = line.partition(":")
         controllers, _, path = rest.partition(":")
@@ -218,10 +234,8 @@ def _of_groups(root: Path) -> Iterator[int]:
         # Within a container the path is that of the machine, of which only the top is there.
         group = top / path.lstrip("/")
         for folder in (group, *group.parents):
-            with suppress(OSError, ValueError):
-                # Most groups have no limit: "max" is no number.
-                most = int((folder / limit).read_text())
-                stat = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
-                yield most - int((folder / usage).read_text()) + int(stat.get(files, 0))
+            if (folder / limit).exists():
+                found.append((folder, limit, usage, files))
             if folder == top:
                 break
+    return found

@@ -19,7 +19,7 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, Source, Stream, source_from
+from taxel.recording.contents import Board, Contents, Source, Stream, alone, source_from, together
 from taxel.recording.kinds import ENDINGS
 from taxel.recording.opening import open_recording
 from taxel.recording.parts import Wire
@@ -95,7 +95,10 @@ def convert(
     if frames_hz is not None:
         if isinstance(source, Frames):
             raise ProblemError("frames_hz: pictures keep their own times; open the file and ask it for frames(rate_hz)")
-        whole = Contents(pictures(whole.one, frames_hz, name="frames_hz"), whole.sources)
+        if whole.is_several and together(whole.sources):
+            whole = alone({name: pictures(one, frames_hz, name="frames_hz") for name, one in whole.sources.items()})
+        else:
+            whole = Contents(pictures(whole.one, frames_hz, name="frames_hz"), whole.sources)
     written = stored(whole, place)
     one, lost = written.one, list(written.one.losses.lost())
     match kind:

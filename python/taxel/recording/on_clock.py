@@ -66,8 +66,8 @@ def on_clock(of: Contents, name: str) -> Contents:
 
 
 def _clock(of: Source) -> Clock:
-    clock = of.timing.clock()
-    if clock is None or not len(clock.board_us):
+    clock = of.timing.usable()
+    if clock is None:
         raise ProblemError(
             f"{of.origin.path}: source {of.origin.label!r} has no arrival times, so its clock is not known"
         )

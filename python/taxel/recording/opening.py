@@ -424,7 +424,7 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
 
 def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
-    clock = of.timing.clock() if of.timing.clock.holds() else None
+    clock = of.timing.usable()
     times = labels._of(name, lambda: clock, of.origin.label)
     which, replaced, there = labels_of(of.origin), set[int | None](), set[object]()
     if beside(of.origin.path).is_file():

@@ -147,6 +147,11 @@ class Timing:
     clock_of: str | None = None
     stretch: Once[tuple[int, int]] | None = None
 
+    def usable(self) -> Clock | None:
+        """Return the clock, if any datagram holds a time."""
+        clock = self.clock()
+        return clock if clock is not None and len(clock.board_us) else None
+
     def lines(self) -> list[str]:
         """Return what is lost without it, but for arrival times."""
         return [f"by whose clock times are ({self.clock_of})"] * (self.clock_of is not None)

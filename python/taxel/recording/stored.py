@@ -203,7 +203,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     converted = [f"converted from {of.origin.name}"] if is_file and of.origin.kind != "merged" else []
     samples = of.lines.samples() if isinstance(of, Stream) else None
     events = None if isinstance(of, Pictures) else known(_board(of, place).table)
-    clock = of.timing.clock() if of.timing.clock.holds() else None
+    clock = of.timing.usable()
     wire = _wire(of, clock, lines) if isinstance(of, Board) else parts.Wire()
     if samples is not None:
         bad = of.losses.counts().get("lines_that_could_not_be_read", 0)

@@ -238,7 +238,7 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
 
 
 def _add_remarks(writer: Any, events: Events, of: Source) -> None:
-    clock = of.timing.clock() if of.timing.clock.holds() else None
+    clock = of.timing.usable()
 
     def at_ns(t: int) -> int:
         return max(0, t * 1000 if clock is None else int(clock.host_ns(t)))

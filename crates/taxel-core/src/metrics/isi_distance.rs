@@ -6,8 +6,8 @@ use super::edges::{Window, Within, begun, distinct, interval};
 use super::law::{Law, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
-use crate::parameters::Described;
 use crate::Result;
+use crate::parameters::Described;
 
 /// The mean over the window of `|x - y| / max(x, y)`, where x and y are the two trains' interspike intervals at each
 /// time.

@@ -7,8 +7,8 @@ use super::isi_distance::mean;
 use super::law::{Law, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
-use crate::parameters::Described;
 use crate::Result;
+use crate::parameters::Described;
 
 /// The mean over the window of the distance between the spikes around each time and their nearest ones in the other
 /// train.
