@@ -62,13 +62,13 @@ def test_the_first_stretch_counts_wherever_it_is_and_nothing_before_it_is_left_o
 
 def test_the_page_takes_the_same_rest_also_where_a_touch_begins_the_recording(tmp_path: Path) -> None:
     values = np.full((300, 4, 4), 50.0)
-    for begin in (2, 100, 200):
+    for begin in (2, 120, 220):
         values[begin : begin + 12, 1:3, 1:3] = 250
     taxel.convert(Frames(values, 10_000 * np.arange(300), unit="counts", array=Array(4, 4)), tmp_path / "a.npz")
     rule = PlainRule("area", 2, noise_floor=40.0)
     rule.save(tmp_path / "rule.json")
     found = detect(rule, taxel.open(tmp_path / "a.npz")).outcomes[0].found
-    assert found.t.tolist()[-4:] == [1_000_000, 1_120_000, 2_000_000, 2_120_000]
+    assert found.t.tolist()[-4:] == [1_200_000, 1_320_000, 2_200_000, 2_320_000]
     page = TrainingRequests(Opening(), ShownFiles()).detect(tmp_path / "a.npz", None, tmp_path / "rule.json")
     assert [t for _, t, _ in page[1]] == found.t.tolist()
 
