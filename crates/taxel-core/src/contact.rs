@@ -1,6 +1,6 @@
 //! Simulated touch: the effect of a ball on foam on the taxels beneath, frame by frame.
 //!
-//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], `trajectory`, [`track`]); the
+//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], `trajectory`); the
 //! reaction force follows a law that is tabulated once ([`push`]). The scene chooses one of two models of the foam:
 //! `layer`, foam bonded to the board, for any bodies ([`bonded`]); or `columns`, independent columns whose pressure the
 //! layer smooths, for one ball that moves vertically on foam with a Poisson ratio of up to 0.1. Within these limits
