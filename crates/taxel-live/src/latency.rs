@@ -14,7 +14,7 @@ pub struct Latencies {
     max_ns: u64,
 }
 
-/// Quantiles of [`Latencies`], us; none if nothing was measured.
+/// Quantiles of measured latencies, us; none if nothing was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Quantiles {
