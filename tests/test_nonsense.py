@@ -24,6 +24,8 @@ from sound.things import EVENTS, FOUND, TARE, TICKS, TRAINS
 
 import taxel
 from taxel import _core
+from taxel._base.saved import Saved
+from taxel.learn._learner import SpikeLearner
 
 mpl.use("Agg")
 
@@ -124,12 +126,17 @@ def public() -> dict[str, Any]:
             names[id(value)] = full
             found[full] = value
             if inspect.isclass(value) and not issubclass(value, BaseException):
-                own = [base for base in reversed(value.__mro__) if base is value or base.__name__.startswith("_")]
+                own = [base for base in reversed(value.__mro__) if base is value or is_private(base)]
                 for part, member in {part: member for base in own for part, member in vars(base).items()}.items():
                     held = member.__func__ if isinstance(member, classmethod | staticmethod) else member
                     if not part.startswith("_") and part != "plot" and inspect.isfunction(held):
                         found[f"{full}.{part}"] = held
     return {name: value for name, value in found.items() if takes(value) or name in SOUND}
+
+
+def is_private(base: type) -> bool:
+    """Whether a class is a base of public ones alone, so that its methods are theirs."""
+    return base.__name__.startswith("_") or base in (Saved, SpikeLearner)
 
 
 def takes(value: Any) -> set[str]:

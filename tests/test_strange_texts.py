@@ -327,7 +327,7 @@ def test_a_label_of_any_character_is_read_as_it_was_written(tmp_path: Path) -> N
     table = tmp_path / "labels.csv"
     with table.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([("label", "t_us"), *((f"a{one}b", 10 * k) for k, one in enumerate(controls))])
-    assert [row.label for row in taxel.Labels(table).rows] == [f"a{one}b" for one in controls]
+    assert [row.text for row in taxel.Labels(table).rows] == [f"a{one}b" for one in controls]
     found = taxel.Detections([f"a{one}b" for one in controls], range(len(controls)), range(len(controls)))
     assert taxel.Detections.from_csv(found.to_csv(tmp_path / "found.csv")) == found
 
@@ -390,6 +390,7 @@ OWN_WORDS = {
     "Source",
     "SpikeTrains",
     "Spread",
+    "Training",
 }
 
 

@@ -68,7 +68,7 @@ def test_a_slow_change_shows_only_against_the_last_sent_value():
         (lambda: ChangeEvents(bits=2.5), "bits is 2.5: must be a whole number"),
         (lambda: ChangeEvents(bits=-1), "bits is -1: must be a whole number, 0 or more"),
         (lambda: ChangeEvents(previous="last"), 'previous is "last": must be "last_sent" or'),
-        (lambda: ChangeEvents(rounding=None), "rounding is None: must be a name"),
+        (lambda: ChangeEvents(rounding=None), 'rounding is None: must be "truncate" or "floor"'),
         (lambda: ChangeEvents(period_ms=0), "period_ms is 0"),
         (lambda: ChangeEvents(period_ms=0.00025), "period_ms is 2.5e-4 ms: must be a whole number of us"),
         (lambda: ChangeEvents(period_ms=1e300), "period_ms is "),

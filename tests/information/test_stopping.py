@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import taxel
 from taxel.cli import main
 
 from .touches import folder
@@ -130,7 +129,7 @@ def test_ctrl_c_before_any_setting_is_done_says_so(
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(taxel.information, "answer", stop)
+    monkeypatch.setattr(importlib.import_module("taxel.tasks.information"), "answer", stop)
     with pytest.raises(SystemExit) as ended:
         main(["information", str(recording), "--labels", str(labels), "--window-ms", "60"])
     assert ended.value.code == 130

@@ -405,7 +405,7 @@ def test_progress_is_told_round_by_round():
         ({"tolerance": 0}, "tolerance is 0: must be from 1e-12 to 0.1"),
         ({"max_seconds": 0}, "max_seconds is 0 s: must be above 0"),
         ({"norm": "max"}, 'norm is "max": must be "norm" or "square"'),
-        ({"norm": 2}, "norm is 2: must be a name$"),
+        ({"norm": 2}, 'norm is 2: must be "norm" or "square"$'),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):

@@ -93,7 +93,7 @@ def test_a_limit_refuses_what_is_larger_and_names_both_sizes(kind: str, tmp_path
     path = SMALL[kind](tmp_path)
 
     def read(limit: int) -> int:
-        return large.arrays_of(taxel.open(path, limit=limit))
+        return large.arrays_of(taxel.open_all(path, limit=limit))
 
     with refused(r"\d{2,} bytes.* at most 10 .*: --limit BYTES \(limit=\) says how many may be", FormatError):
         read(10)
@@ -111,9 +111,9 @@ def test_the_recordings_of_a_folder_count_together(tmp_path: Path) -> None:
     size = 0
     for k in range(4):
         taxel.convert(some_events(), tmp_path / f"{k}.npz")
-        size = large.arrays_of(taxel.open(tmp_path / f"{k}.npz"))
+        size = large.arrays_of(taxel.open_all(tmp_path / f"{k}.npz"))
     with refused("--limit", FormatError):
-        taxel.open(tmp_path, limit=3 * size)
+        taxel.open_all(tmp_path, limit=3 * size)
     assert len(taxel.open_all(tmp_path, limit=100 * size)) == 4
 
 

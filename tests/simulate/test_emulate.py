@@ -118,9 +118,9 @@ def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
     contacts, _ = truth(script(3, 1))
     rows = taxel.Labels(labels).rows
     times = sorted([round(c.start_us) for c in contacts] + [round(c.stop_us) for c in contacts])
-    assert [row.t_us for row in rows] == times
-    assert {row.label for row in rows} == {"contact", "lift"}
-    host = [row.host_ns for row in rows]
+    assert [row.t for row in rows] == times
+    assert {row.text for row in rows} == {"contact", "lift"}
+    host = [row.at_ns for row in rows]
     assert began < host[0] < host[-1] < ended
     # On a machine that is too slow the board is late, and the truth by the host with it, as the test below says.
     if report["late_us"]["max"] < 1e6 * _HELD_S:
@@ -137,7 +137,7 @@ def test_the_truth_of_a_board_that_is_late_is_late_by_the_host(tmp_path):
         table.add(contacts)
         table.write(EmulatorReport(frames=10_000, began_ns=10**18, board_seconds=2.0, seconds=2.01, **nothing))
         table.write(EmulatorReport(frames=30_000, began_ns=10**18, board_seconds=6.0, seconds=14.0, **nothing))
-    host_s = [(row.host_ns - 10**18) / 1e9 for row in taxel.Labels(tmp_path / "labels.csv").rows]
+    host_s = [(row.at_ns - 10**18) / 1e9 for row in taxel.Labels(tmp_path / "labels.csv").rows]
     np.testing.assert_allclose(host_s, [1, 2, 13, 14])
 
 

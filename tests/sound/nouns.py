@@ -94,7 +94,6 @@ SOUND: dict[str, Sound] = {
         {"recording": "walk.mcap", "trial": "walk 1", "source": "left"},
     ),
     "taxel.Labels.of": lambda: (taxel.Labels("here_labels.csv").of, {"recording": taxel.open("here_events.npz")}),
-    "taxel.Verdict": plain(taxel.Verdict, line="nothing lost"),
     "taxel.Verdict.from_dict": plain(
         taxel.Verdict.from_dict, held={"status": "lost", "text": "LOST: 2 datagrams", "lost": {"lost_on_the_way": 2}}
     ),
@@ -106,6 +105,7 @@ SOUND: dict[str, Sound] = {
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.Clock": lambda: CLOCK,
     "taxel.Detection": lambda: FOUND[0],
+    "taxel.Verdict": lambda: taxel.Verdict.from_dict({"status": "complete", "text": "nothing lost"}),
 }
 
 #: Names that are not tested, and the reason.

@@ -160,8 +160,10 @@ def open_all(
     ----------
     path : path
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
-    array, layout, pairing, differences, topic, field, types, ros, limit
+    array, layout, pairing, differences, topic, field, types, ros
         As of `taxel.open`.
+    limit : int, bytes, 1 or more, optional
+        As of `taxel.open`, for all recordings together.
 
     Returns
     -------

@@ -453,7 +453,8 @@ class Recording:
         Examples
         --------
         >>> import pathlib, tempfile, taxel
-        >>> from taxel.recording.contents import Contents, Origin, source_from
+        >>> from taxel.recording.contents import Contents, source_from
+        >>> from taxel.recording.parts import Origin
         >>> frames = taxel.Frames([[[1.0]], [[2.0]]], [0, 1])
         >>> numbered = source_from(frames, Origin(pathlib.Path("grasp"), "grasp", "icub"), untimed=True)
         >>> taxel.Recording(Contents.of(numbered)).at_rate(50).frames().t
