@@ -126,17 +126,19 @@ def public() -> dict[str, Any]:
             names[id(value)] = full
             found[full] = value
             if inspect.isclass(value) and not issubclass(value, BaseException):
-                own = [base for base in reversed(value.__mro__) if base is value or is_private(base)]
-                for part, member in {part: member for base in own for part, member in vars(base).items()}.items():
+                own = [
+                    base
+                    for base in reversed(value.__mro__)
+                    if base is value or base.__name__.startswith("_") or base is Saved
+                ]
+                members = {part: member for base in own for part, member in vars(base).items()}
+                if issubclass(value, SpikeLearner):  # what all learners share is tried with some of them
+                    members |= {part: one for part, one in vars(SpikeLearner).items() if f"{full}.{part}" in SOUND}
+                for part, member in members.items():
                     held = member.__func__ if isinstance(member, classmethod | staticmethod) else member
                     if not part.startswith("_") and part != "plot" and inspect.isfunction(held):
                         found[f"{full}.{part}"] = held
     return {name: value for name, value in found.items() if takes(value) or name in SOUND}
-
-
-def is_private(base: type) -> bool:
-    """Whether a class is a base of public ones alone, so that its methods are theirs."""
-    return base.__name__.startswith("_") or base in (Saved, SpikeLearner)
 
 
 def takes(value: Any) -> set[str]:
