@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, NoReturn, TypeVar
@@ -14,8 +15,22 @@ from taxel.recording.once import Once, known
 from taxel.recording.verdict import Verdict
 
 __all__ = [
-    "Board", "Contents", "Drawn", "Pictures", "S", "Several", "Source", "Stream", "alone", "applied", "named",
-    "parts_of", "saying", "several", "source_from", "together",
+    "Board",
+    "Contents",
+    "Drawn",
+    "Pictures",
+    "S",
+    "Several",
+    "Source",
+    "Stream",
+    "alone",
+    "applied",
+    "named",
+    "parts_of",
+    "several",
+    "source_from",
+    "together",
+    "with_losses",
 ]  # fmt: skip
 
 P = TypeVar("P", parts.Wire, parts.Lines)
@@ -23,7 +38,7 @@ S = TypeVar("S", bound="Source")
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class Source(ABC):
     """Hold what all sources have: the header of a board, of frames, and of a stream of numbers."""
 
     origin: parts.Origin
@@ -39,9 +54,9 @@ class Source:
         return isinstance(self, Board)
 
     @property
+    @abstractmethod
     def table(self) -> Events | Frames:
         """The events or the frames."""
-        raise NotImplementedError
 
     def part(self, kind: type[P]) -> P:
         """Return its part of a type, of which there need not be one; else an empty one."""
@@ -143,10 +158,10 @@ def applied(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Calla
     # Only a part whose fields have defaults may be lost.
     none: Callable[[str], Any] = lambda name: type(before[name])()  # type: ignore[call-arg]  # noqa: E731
     kept: dict[str, Any] = {name: none(name) if part is None else part for name, part in after.items()}
-    return saying(replace(of, **kept), lambda: [*(line for part in gone for line in part.lines()), *lines()])
+    return with_losses(replace(of, **kept), lambda: [*(line for part in gone for line in part.lines()), *lines()])
 
 
-def saying(of: S, lines: Callable[[], Iterable[str]]) -> S:
+def with_losses(of: S, lines: Callable[[], Iterable[str]]) -> S:
     """Return a source with further lines of what is lost, without duplicates."""
     lost = Once(lambda: tuple(dict.fromkeys((*of.losses.lost(), *lines()))))
     return replace(of, losses=replace(of.losses, lost=lost))

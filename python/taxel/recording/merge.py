@@ -23,7 +23,7 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, named, saying
+from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, named, with_losses
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
@@ -101,7 +101,7 @@ def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: 
         lost += [*source.part(parts.Wire).lines(), *source.part(parts.Lines).received(), *recording.others()]
     both = merging.source()
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
-    return Contents.of(saying(both, known((*lost, *merging.lost))))
+    return Contents.of(with_losses(both, known((*lost, *merging.lost))))
 
 
 @dataclass

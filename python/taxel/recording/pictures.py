@@ -15,7 +15,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
-from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, saying, several
+from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, several, with_losses
 from taxel.recording.once import UNKNOWN, Once, known
 from taxel.tare import Tare
 
@@ -166,4 +166,4 @@ def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = Non
     )
     if not isinstance(made, Stream):
         return made
-    return saying(replace(made, lines=parts.Lines(made.lines.columns)), made.lines.received)
+    return with_losses(replace(made, lines=parts.Lines(made.lines.columns)), made.lines.received)

@@ -27,10 +27,10 @@ from taxel.recording.contents import (
     Stream,
     applied,
     parts_of,
-    saying,
     several,
     source_from,
     together,
+    with_losses,
 )
 from taxel.recording.kinds import ENDINGS, verdict_of
 from taxel.recording.once import known
@@ -69,7 +69,7 @@ def stored(of: Contents, place: Path) -> Contents:
     kept = _stored(one, ending, place)
     if not isinstance(one, Pictures) or ending != ".mcap":
         kept = _named(kept, place.name, "board")
-    return Contents.of(saying(kept, of.others))
+    return Contents.of(with_losses(kept, of.others))
 
 
 def _named(of: Source, name: str, label: str) -> Source:
@@ -88,7 +88,7 @@ def _stored(of: Source, ending: str, place: Path) -> Source:
         timing=replace(kept.timing, stretch=None),
     )
     alone = of.sensor.calibration.holds() and not beside.holds()
-    return saying(
+    return with_losses(
         kept, lambda: [*lines, *["the calibration, a file of its own: lay a copy beside the new one"] * alone]
     )
 
