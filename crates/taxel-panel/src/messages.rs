@@ -82,7 +82,7 @@ pub(super) enum Message {
         /// The file of the user's: a table a preset, which can be edited by hand.
         path: String,
     },
-    /// Of the live source, 4 times a second; what is not known is null.
+    /// Counts of the live source, 4 times a second; what is not known is null.
     Counters {
         at_ns: i64,
         /// Since the source began.
@@ -110,7 +110,7 @@ pub(super) enum Message {
         reach_us: Option<(i64, i64)>,
         reach_bytes: usize,
         viewers: usize,
-        /// Of this client.
+        /// Pictures sent to this client.
         pictures_per_s: f64,
         /// Whether the source has ended, by an error or its owner.
         ended: bool,
@@ -123,7 +123,7 @@ pub(super) enum Message {
         said_us: i64,
         /// From known to reported, us.
         latency_us: i64,
-        /// Of the potential as it comes to the threshold; null for a rule.
+        /// How steeply the potential crosses the threshold; null for a rule.
         slope_mv_per_ms: Option<f64>,
     },
     /// At most 60 times a second, after `encode`: the spikes since the last message; after a seek those of the stretch that is
@@ -139,7 +139,7 @@ pub(super) enum Message {
         /// Number of the others, where there are more than the 4096 newest.
         left_out: usize,
     },
-    /// Of the live source, when it has changed: all taxels that were zeroed, each as it was last.
+    /// All taxels of the live source that were zeroed, each as it was last; sent when that has changed.
     Zeroed { taxels: Vec<Zeroing> },
     /// A line from the board's serial line.
     BoardLine { at_ns: i64, text: String },
@@ -208,7 +208,7 @@ pub(super) enum Message {
         unfinished: bool,
         /// Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of pictures.
         on: String,
-        /// Of the recorded arrivals, where it holds them.
+        /// The pace of the recorded arrivals, where the recording holds them.
         pace: Option<Pace>,
         #[cfg_attr(feature = "development", schemars(with = "Option<shapes::Registers>"))]
         registers: Option<Registers>,

@@ -25,7 +25,7 @@ pub(super) enum Request {
     /// Send this taxel's history; `null` for none.
     Watch { taxel: Option<Taxel> },
     /// The held values are the rest from now on (`now`, "reset intensity"), or find it again (`lowest`): that of the next quiet
-    /// half second, tracked from there. Of the live source, for all clients.
+    /// half second, tracked from there. The live source changes for all clients.
     Rest { how: RestHow },
     /// The values that these taxels hold now are their rest from now on, for the readout's encoder, the pictures of the
     /// recording and this panel; all or none. The recording notes the time and the rests before and after. Refused for a taxel
@@ -96,7 +96,7 @@ pub(super) enum Request {
     Rename { label_id: Id, label: Text<200> },
     /// Another time, as for `mark`.
     Move { label_id: Id, t_us: BoardTime },
-    /// Of one that replaces a note, the note counts no more either, until a `mark` with the same `replaces_us`.
+    /// If the label replaces a note, that note no longer counts either, until a `mark` with the same `replaces_us`.
     Delete { label_id: Id },
     /// End the conflict of `labels`: with `acknowledged` the table gets the labels that it lacks, and loses those that returned;
     /// with `file` it stays as it is. Refused where the conflict is another by now, or is over.

@@ -198,7 +198,7 @@ export interface Port {
   usb: [number, number] | null;
 }
 
-/** Quantiles of [`Latencies`], us; none if nothing was measured. */
+/** Quantiles of measured latencies, us; none if nothing was measured. */
 export interface Quantiles {
   /** Number of measured durations. */
   count: number;
@@ -301,7 +301,7 @@ export interface Presets {
   path: string;
 }
 
-/** Of the live source, 4 times a second; what is not known is null. */
+/** Counts of the live source, 4 times a second; what is not known is null. */
 export interface Counters {
   type: "counters";
   at_ns: number;
@@ -330,7 +330,7 @@ export interface Counters {
   reach_us: [number, number] | null;
   reach_bytes: number;
   viewers: number;
-  /** Of this client. */
+  /** Pictures sent to this client. */
   pictures_per_s: number;
   /** Whether the source has ended, by an error or its owner. */
   ended: boolean;
@@ -345,7 +345,7 @@ export interface Detection {
   said_us: number;
   /** From known to reported, us. */
   latency_us: number;
-  /** Of the potential as it comes to the threshold; null for a rule. */
+  /** How steeply the potential crosses the threshold; null for a rule. */
   slope_mv_per_ms: number | null;
 }
 
@@ -363,7 +363,7 @@ export interface Spikes {
   left_out: number;
 }
 
-/** Of the live source, when it has changed: all taxels that were zeroed, each as it was last. */
+/** All taxels of the live source that were zeroed, each as it was last; sent when that has changed. */
 export interface Zeroed {
   type: "zeroed";
   taxels: Zeroing[];
@@ -460,7 +460,7 @@ export interface Opened {
   unfinished: boolean;
   /** Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of pictures. */
   on: string;
-  /** Of the recorded arrivals, where it holds them. */
+  /** The pace of the recorded arrivals, where the recording holds them. */
   pace: Pace | null;
   registers: Record<string, boolean | number> | null;
   /** How long a frame takes, where the recording holds the registers. */
@@ -575,7 +575,7 @@ export interface WatchRequest {
   taxel?: [number, number] | null;
 }
 
-/** The held values are the rest from now on (`now`, "reset intensity"), or find it again (`lowest`): that of the next quiet half second, tracked from there. Of the live source, for all clients. */
+/** The held values are the rest from now on (`now`, "reset intensity"), or find it again (`lowest`): that of the next quiet half second, tracked from there. The live source changes for all clients. */
 export interface RestRequest {
   type: "rest";
   id?: number;
@@ -757,7 +757,7 @@ export interface MoveRequest {
   t_us: number;
 }
 
-/** Of one that replaces a note, the note counts no more either, until a `mark` with the same `replaces_us`. */
+/** If the label replaces a note, that note no longer counts either, until a `mark` with the same `replaces_us`. */
 export interface DeleteRequest {
   type: "delete";
   id?: number;
