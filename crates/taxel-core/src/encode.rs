@@ -240,6 +240,10 @@ pub struct Composite {
 }
 
 impl Composite {
+    fn described() -> Described {
+        Described::by(&Self { parts: BTreeMap::new() }, &["parts"], &[])
+    }
+
     /// The parts with these names, in the order of all parts; no name stands for all of them.
     ///
     /// # Errors
@@ -278,10 +282,6 @@ fn inputs(part: &Encoder, array: &Array) -> usize {
 }
 
 impl Law for Composite {
-    fn described() -> Described {
-        Described::by(&Self { parts: BTreeMap::new() }, &["parts"], &[])
-    }
-
     fn check(&self) -> Result<()> {
         if self.parts.is_empty() {
             return Err(problem!("composite: parts is empty: must be encoders by name, one or more"));

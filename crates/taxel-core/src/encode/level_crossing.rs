@@ -60,6 +60,12 @@ impl LevelCrossing {
         period_ms: "ms", Range::WHOLE_US;
     }
 
+    /// The parameters with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
+    }
+
     /// An encoder with these levels, without hysteresis.
     #[must_use]
     pub fn at(levels: Vec<f64>) -> Self {
@@ -85,10 +91,6 @@ impl LevelCrossing {
 }
 
 impl Law for LevelCrossing {
-    fn described() -> Described {
-        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
-    }
-
     fn check(&self) -> Result<()> {
         check_levels(&self.levels)?;
         self.check_ranges()?;

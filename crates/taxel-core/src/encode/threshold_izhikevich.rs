@@ -79,6 +79,12 @@ impl ThresholdIzhikevich {
         period_ms: "ms", Range::WHOLE_US;
     }
 
+    /// The parameters with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
+    }
+
     /// An encoder with the neurons of 6.5.1 and these levels.
     #[must_use]
     pub fn at(levels: Vec<f64>) -> Self {
@@ -88,10 +94,6 @@ impl ThresholdIzhikevich {
 }
 
 impl Law for ThresholdIzhikevich {
-    fn described() -> Described {
-        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
-    }
-
     fn check(&self) -> Result<()> {
         check_levels(&self.levels)?;
         self.check_ranges()

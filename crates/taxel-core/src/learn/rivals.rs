@@ -48,7 +48,7 @@ macro_rules! batches {
             #[must_use]
             pub fn described(name: &str) -> Option<Described> {
                 $(if name == stringify!($module) {
-                    return Some(<$Kind as BatchRule>::described());
+                    return Some($Kind::described());
                 })*
                 None
             }

@@ -110,9 +110,7 @@ pub struct VanRossumSpatial {
 
 impl Law for VanRossumSpatial {
     fn described() -> Described {
-        let mut described = Smoothing::described();
-        described.defaults.insert("normalisation".into(), serde_json::json!(Normalisation::default()));
-        described
+        Smoothing::described().or("normalisation", serde_json::json!(Normalisation::default()))
     }
 
     fn check(&self) -> Result<()> {

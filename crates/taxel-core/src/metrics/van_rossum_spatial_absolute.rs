@@ -1,6 +1,7 @@
 //! 5.12 with the formula printed in 5.10: absolute differences summed over taxels and time.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::law::{Law, One, Ready};
 use super::patterns::Patterns;
@@ -31,8 +32,8 @@ pub struct VanRossumSpatialAbsolute {
 impl Law for VanRossumSpatialAbsolute {
     fn described() -> Described {
         Described { ranges: [Smoothing::RANGES, Self::RANGES].concat(), ..Smoothing::described() }
-            .or_nothing("window")
-            .or_nothing("step_ms")
+            .or("window", Value::Null)
+            .or("step_ms", Value::Null)
     }
 
     fn check(&self) -> Result<()> {
