@@ -141,9 +141,8 @@ impl Metric {
     pub fn pairwise(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let ready = self.prepare(a, b)?;
         let matrix = Matrix::new(a.count, b.map(|b| b.count));
-        match ready.fill(&matrix, a, b, work) {
-            Some(filled) => filled?,
-            None => matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?,
+        if !ready.fill(&matrix, a, b, work)? {
+            matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?;
         }
         Ok(matrix.finish())
     }

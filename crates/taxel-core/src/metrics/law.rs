@@ -26,15 +26,9 @@ pub(super) trait Ready: Sync {
     /// The distance between two patterns.
     fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64>;
 
-    /// Fills a whole matrix; metrics with a faster method than pair by pair override it.
-    fn fill(
-        &self,
-        _matrix: &Matrix,
-        _a: &Patterns<'_>,
-        _b: Option<&Patterns<'_>>,
-        _work: &mut Work<'_>,
-    ) -> Option<Result<()>> {
-        None
+    /// Fills a whole matrix if there is a faster way than pair by pair, and returns whether there is.
+    fn fill(&self, _: &Matrix, _: &Patterns<'_>, _: Option<&Patterns<'_>>, _: &mut Work<'_>) -> Result<bool> {
+        Ok(false)
     }
 }
 

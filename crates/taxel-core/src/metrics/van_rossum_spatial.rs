@@ -5,7 +5,6 @@ mod matrix;
 use serde::{Deserialize, Serialize};
 
 use super::law::{Law, One, Ready};
-use super::pairwise::{Matrix, Work};
 use super::patterns::Patterns;
 use super::van_rossum::Normalisation;
 use crate::allowed::{Range, ranges};
@@ -123,22 +122,6 @@ impl Law for VanRossumSpatial {
 }
 
 struct Smoothed<'m>(&'m VanRossumSpatial, Kernel);
-
-impl Ready for Smoothed<'_> {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
-        self.0.between(&self.1, a, b, stop)
-    }
-
-    fn fill(
-        &self,
-        matrix: &Matrix,
-        a: &Patterns<'_>,
-        b: Option<&Patterns<'_>>,
-        work: &mut Work<'_>,
-    ) -> Option<Result<()>> {
-        Some(self.0.fill(&self.1, matrix, a, b, work))
-    }
-}
 
 impl VanRossumSpatial {
     /// The distance between two patterns.

@@ -46,8 +46,7 @@ impl Law for VictorPurpuraMultiUnit {
         self.check_ranges()
     }
 
-    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        let _ = (a, b);
+    fn ready<'m>(&'m self, _: &Patterns<'_>, _: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
         Ok(Box::new(self))
     }
 }
