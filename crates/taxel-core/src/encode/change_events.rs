@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next};
-use super::law::Law;
+use super::blocks::{BLOCK, Block, NextPicture};
+use super::encoding::Encoding;
 use super::sampled::{Rule, Sampled};
 use super::stream::Stream;
 use crate::allowed::Range;
@@ -47,7 +47,7 @@ pub enum Rounding {
     Floor,
 }
 
-impl Law for ChangeEvents {
+impl Encoding for ChangeEvents {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         // Changes are compared in f32.
@@ -89,7 +89,7 @@ impl Rule for Changes {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         let floor = self.floor;
         for (block, (new, last)) in held.iter().zip(&mut self.last).enumerate().filter(|(b, _)| changed[*b]) {
             next.fetch();

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::Block;
 use super::by_stamp::{ByStamp, Measure};
-use super::law::Law;
+use super::encoding::Encoding;
 use super::loaded::Loaded;
 use super::stream::Stream;
 use super::tare::Tare;
@@ -35,7 +35,7 @@ parameters! {
     }
 }
 
-impl Law for ContactArea {
+impl Encoding for ContactArea {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.levels.is_empty() {

@@ -18,8 +18,8 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next};
-use super::law::Law;
+use super::blocks::{BLOCK, Block, NextPicture};
+use super::encoding::Encoding;
 use super::power::power;
 use super::sampled::{Rule, Sampled};
 use super::stream::Stream;
@@ -82,7 +82,7 @@ impl Fa1 {
     }
 }
 
-impl Law for Fa1 {
+impl Encoding for Fa1 {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.range.is_some() && self.theta_0.is_some() {
@@ -310,7 +310,7 @@ impl Rule for Afferents {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         /// Number of entries that are always written, needed or not: a branch on the count would cost more.
         const AT_ONCE: usize = 4;
         let (mut near, mut n) = (std::mem::take(&mut self.near), 0);
@@ -427,7 +427,7 @@ mod tests {
             afferents.begin(0, &pictures[..1], &mut out);
             for (t, picture) in (1..).zip(pictures[1..].chunks(1)) {
                 let changed = picture != &pictures[t as usize - 1..t as usize];
-                afferents.sample(t, picture, &[changed], &mut Next::unknown(), &mut out);
+                afferents.sample(t, picture, &[changed], &mut NextPicture::unknown(), &mut out);
             }
             assert!(out == plainly(&parameters, &pictures), "round {round}: {parameters:?}");
         }

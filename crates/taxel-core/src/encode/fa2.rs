@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::BLOCK;
 use super::channels::Channels;
-use super::law::Law;
+use super::encoding::Encoding;
 use super::receptor::{ByTaxel, Filter, Firing, Lanes, LowPass};
 use super::sampled::Sampled;
 use super::stream::Stream;
@@ -63,7 +63,7 @@ impl Fa2 {
     }
 }
 
-impl Law for Fa2 {
+impl Encoding for Fa2 {
     fn check(&self) -> Result<()> {
         self.check_ranges()
     }

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{Block, Next};
+use super::blocks::{Block, NextPicture};
 use super::by_stamp::{ByStamp, Measure};
-use super::law::Law;
+use super::encoding::Encoding;
 use super::loaded::{Loaded, given};
 use super::local_sums::{LocalSums, Sums, Values};
 use super::recent::{Recent, Window};
@@ -171,7 +171,7 @@ fn quantities(spikes: &[Spike]) -> Vec<f64> {
     spikes.iter().map(|spike| f64::from(spike.value)).collect()
 }
 
-impl Law for LocalLoad {
+impl Encoding for LocalLoad {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if let Some(k) = self.levels.windows(2).position(|pair| pair[0] >= pair[1]) {
@@ -327,7 +327,7 @@ impl Rule for Load {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], _changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], _changed: &[bool], _next: &mut NextPicture, out: &mut Vec<Spike>) {
         self.take(t, held, out);
     }
 

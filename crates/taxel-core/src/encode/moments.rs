@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{Block, Next};
-use super::law::Law;
+use super::blocks::{Block, NextPicture};
+use super::encoding::Encoding;
 use super::loaded::{Loaded, Sums};
 use super::periods::micros;
 use super::sampled::{Rule, Sampled};
@@ -122,7 +122,7 @@ impl Moments {
     }
 }
 
-impl Law for Moments {
+impl Encoding for Moments {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         let ranges = self.ranges();
@@ -355,7 +355,7 @@ impl Rule for Passing {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextPicture, out: &mut Vec<Spike>) {
         let changes = changed.contains(&true);
         if !changes && !self.at_every_sample() {
             return;

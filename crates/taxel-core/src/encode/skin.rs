@@ -4,12 +4,12 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next, blocks};
+use super::blocks::{BLOCK, Block, NextPicture, blocks};
 use super::channels::Channels;
+use super::encoding::Encoding;
 use super::fa1::{self, Decay, Fa1};
 use super::fa2::{Fa2, Fast};
 use super::fields::Fields;
-use super::law::Law;
 use super::receptor::ByTaxel;
 use super::sa1::Sa1;
 use super::sa2::Sa2;
@@ -141,7 +141,7 @@ impl Skin {
     pub fn afferents(&self, array: &Array) -> Result<Vec<Placed>> {
         self.check()?;
         let pitch = array.pitch("skin")?;
-        let count = Law::trains(self, array);
+        let count = Encoding::trains(self, array);
         if count > MOST {
             let (array, Pitch { rows, columns }) = (&array.name, pitch);
             return Err(problem!(
@@ -177,7 +177,7 @@ fn places(array: &Array) -> Vec<[f64; 2]> {
         .collect()
 }
 
-impl Law for Skin {
+impl Encoding for Skin {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         self.tare.as_ref().map_or(Ok(()), Tare::check)
@@ -275,7 +275,7 @@ impl<R: Rule> Type<R> {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         self.take(held, changed);
         let from = out.len();
         self.rule.sample(t, &self.held, &self.changed, next, out);
@@ -337,7 +337,7 @@ impl Rule for Afferents {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         let from = out.len();
         self.sa1.sample(t, held, changed, next, out);
         self.fa1.sample(t, held, changed, next, out);

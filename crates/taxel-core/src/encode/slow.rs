@@ -67,7 +67,7 @@ impl Filter for Slow {
 macro_rules! slowly_adapting {
     ($(#[$about:meta])* $Kind:ident, threshold: $threshold:expr, onset: $onset:expr, loss: $loss:expr) => {
         use super::channels::Channels;
-        use super::law::Law;
+        use super::encoding::Encoding;
         use super::receptor::{ByTaxel, Firing};
         use super::sampled::Sampled;
         use super::slow::Slow;
@@ -133,7 +133,7 @@ macro_rules! slowly_adapting {
             }
         }
 
-        impl Law for $Kind {
+        impl Encoding for $Kind {
             fn check(&self) -> Result<()> {
                 self.check_ranges()?;
                 self.tare.as_ref().map_or(Ok(()), Tare::check)

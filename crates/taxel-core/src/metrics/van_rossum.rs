@@ -4,7 +4,7 @@ mod matrix;
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{Law, Ready};
+use super::distance::{Distance, Ready};
 use super::merged::merged;
 use super::patterns::Patterns;
 use crate::Result;
@@ -51,7 +51,7 @@ impl Normalisation {
     }
 }
 
-impl Law for VanRossum {
+impl Distance for VanRossum {
     fn described() -> Described {
         Described::by(&Self { tau: 1.0, normalisation: Normalisation::default() }, &["tau"], Self::RANGES)
     }

@@ -4,7 +4,7 @@ mod lanes;
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{Law, One, Ready, number_or_name, summed};
+use super::distance::{Distance, Pattern, Ready, number_or_name, summed};
 use super::pairwise::{Matrix, Work};
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
@@ -26,7 +26,7 @@ pub struct VictorPurpura {
     pub q: f64,
 }
 
-impl Law for VictorPurpura {
+impl Distance for VictorPurpura {
     fn described() -> Described {
         Described::by(&Self { q: 0.0 }, &["q"], Self::RANGES)
     }
@@ -41,7 +41,7 @@ impl Law for VictorPurpura {
 }
 
 impl Ready for &VictorPurpura {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         summed(a, b, stop, |a, b| VictorPurpura::between(self, a, b, stop))
     }
 

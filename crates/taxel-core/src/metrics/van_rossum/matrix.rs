@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use super::{NEAR, VanRossum};
-use crate::metrics::law::{One, Ready, summed};
+use crate::metrics::distance::{Pattern, Ready, summed};
 use crate::metrics::pairwise::Matrix;
 use crate::metrics::stored::{Entries, Frame, Query};
 use crate::metrics::{Patterns, Work};
@@ -13,7 +13,7 @@ use crate::{Result, Stop};
 const ROWS: usize = 4;
 
 impl Ready for &VanRossum {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         summed(a, b, stop, |a, b| Ok(VanRossum::between(self, a, b)))
     }
 

@@ -5,7 +5,7 @@
 //! weights of taxel n; then each column's spikes at n are looked up once.
 
 use super::{Kernel, Smoothed, VanRossumSpatial};
-use crate::metrics::law::{One, Ready};
+use crate::metrics::distance::{Pattern, Ready};
 use crate::metrics::pairwise::Matrix;
 use crate::metrics::stored::{Entries, Frame, Query};
 use crate::metrics::van_rossum::NEAR;
@@ -19,7 +19,7 @@ const HELD: usize = 1 << 24;
 const LOOK_UP: usize = 8;
 
 impl Ready for Smoothed<'_> {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         self.0.between(&self.1, a, b, stop)
     }
 

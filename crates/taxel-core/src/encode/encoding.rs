@@ -6,7 +6,7 @@ use super::tare::Tare;
 use crate::{Array, Result, SpikeKind};
 
 /// An encoder's checks, stream and number of trains.
-pub(super) trait Law {
+pub(super) trait Encoding {
     /// Checks every parameter.
     fn check(&self) -> Result<()>;
 
