@@ -55,7 +55,9 @@ def calibrate(
         bool, typer.Option("--each", help="Fit a gain for each taxel (needs uniform kPa, or loads on single taxels).")
     ] = False,
     exponent: Annotated[float | None, typer.Option(help="The exponent, given instead of fitted.")] = None,
-    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: that of a quiet stretch.")] = None,
+    tare: Annotated[
+        str | None, typer.Option(metavar="SECONDS|FILE", help=f"{TARE_HELP} Default: that of a quiet stretch.")
+    ] = None,
     date: Annotated[str | None, typer.Option(help="Date of the calibration, as 2026-11-21. Default: today.")] = None,
     note: Annotated[str, typer.Option(help="A note: which sensor, which weights.")] = "",
     out: Annotated[

@@ -38,7 +38,11 @@ def detect(
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     files: FileOptions,
     tare: Annotated[
-        str | None, typer.Option(help=f"{TARE_HELP} Default: 0 of force and pressure, else the first quiet stretch.")
+        str | None,
+        typer.Option(
+            metavar="SECONDS|FILE",
+            help=f"{TARE_HELP} Default: 0 of force and pressure, else the first quiet stretch.",
+        ),
     ] = None,
     frame_us: Annotated[
         float | None,
@@ -50,9 +54,7 @@ def detect(
             help="Score against a CSV label,t_us or recording,label,t_us, or notes: the recordings' own notes."
         ),
     ] = None,
-    window_ms: Annotated[
-        float, typer.Option(min=0.0, help="Largest distance of a detection from its event, ms.")
-    ] = 50.0,
+    window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     csv: Annotated[Path | None, typer.Option(help="Write the detections to this .csv.")] = None,
     report: Annotated[
         Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")

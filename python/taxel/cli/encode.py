@@ -26,10 +26,10 @@ app = App()
 def encode(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
     out: Annotated[Path, typer.Argument(help="The new file, a .npz that SpikeTrains.load reads.")],
-    encoder: Annotated[str, typer.Option(help=f"One of {', '.join(encoder_names())}.")],
+    encoder: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(encoder_names())}.")],
     files: FileOptions,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
+    tare: Annotated[str | None, typer.Option(metavar="SECONDS|FILE", help=TARE_HELP)] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

@@ -53,7 +53,9 @@ def info(
         Path | None,
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
-    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: that of a quiet stretch.")] = None,
+    tare: Annotated[
+        str | None, typer.Option(metavar="SECONDS|FILE", help=f"{TARE_HELP} Default: that of a quiet stretch.")
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
     ] = False,
