@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 /// An error, in kinds that a caller can distinguish.
 ///
 /// Each text is one line: the place, the value there, and what is valid.
@@ -51,23 +53,23 @@ impl Error {
 
     /// The same error with a remedy, of which `argument` is the parameter that helps.
     #[must_use]
-    pub fn helped_by(mut self, argument: &str, hint: Hint) -> Self {
-        if let Self::Format(reason) | Self::Problem(reason) | Self::Device(reason) | Self::Scene(reason) = &mut self {
-            reason.argument = Some(argument.to_owned());
-            reason.hint = Some(hint);
-        }
-        self
+    pub fn helped_by(self, argument: &str, hint: Hint) -> Self {
+        self.with(|reason| Reason { argument: Some(argument.to_owned()), hint: Some(hint), ..reason })
     }
 
     /// The same error, with the name of the part that it is of in front of its text.
     #[must_use]
     pub fn of(self, part: &str) -> Self {
+        self.with(|reason| reason.of(part))
+    }
+
+    fn with(self, change: impl FnOnce(Reason) -> Reason) -> Self {
         match self {
-            Self::Format(reason) => Self::Format(reason.of(part)),
-            Self::Problem(reason) => Self::Problem(reason.of(part)),
-            Self::Device(reason) => Self::Device(reason.of(part)),
-            Self::Scene(reason) => Self::Scene(reason.of(part)),
-            Self::Interrupted => Self::Interrupted,
+            Self::Format(reason) => Self::Format(change(reason)),
+            Self::Problem(reason) => Self::Problem(change(reason)),
+            Self::Device(reason) => Self::Device(change(reason)),
+            Self::Scene(reason) => Self::Scene(change(reason)),
+            Self::Interrupted => self,
         }
     }
 }
@@ -132,7 +134,8 @@ impl From<String> for Reason {
 }
 
 /// What helps against an error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Hint {
     /// Give the parameter, which is left out.
     Give,
@@ -144,17 +147,6 @@ pub enum Hint {
     Pitch,
     /// See why nothing was felt of what was labelled.
     Unfelt,
-}
-
-impl Hint {
-    /// Each remedy and its name, as other languages read it.
-    pub const NAMES: [(Self, &'static str); 5] = [
-        (Self::Give, "give"),
-        (Self::Larger, "larger"),
-        (Self::LayOut, "lay_out"),
-        (Self::Pitch, "pitch"),
-        (Self::Unfelt, "unfelt"),
-    ];
 }
 
 /// Digits of a number that people read: more than that of any time in us or ns, or of a rounded fraction.

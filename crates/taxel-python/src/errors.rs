@@ -2,7 +2,7 @@
 
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError};
 use pyo3::prelude::*;
-use taxel_core::{Error as CoreError, Hint, Reason, problem};
+use taxel_core::{Error as CoreError, Reason, reading};
 use taxel_live::Error as LiveError;
 
 pyo3::create_exception!(taxel, Error, PyException, "Anything that taxel refuses; its kinds are its subclasses.");
@@ -28,15 +28,14 @@ pub(crate) fn core(error: CoreError) -> PyErr {
     }
 }
 
-/// The exception of a reason: its argument and its hint are attributes, from which `line` makes the text that is shown.
-fn with_help(raised: fn(String) -> PyErr, reason: Reason) -> PyErr {
-    let Reason { text, argument, hint } = reason;
+/// The exception of a reason: its argument and its hint are attributes, of which `error_line` makes what is shown.
+fn with_help(raised: fn(String) -> PyErr, Reason { text, argument, hint }: Reason) -> PyErr {
     let error = raised(text);
-    let name = |hint| Hint::NAMES.iter().find(|(one, _)| *one == hint).map(|(_, name)| *name);
+    let hint = hint.and_then(|hint| Some(serde_json::to_value(hint).ok()?.as_str()?.to_owned()));
     let set = Python::attach(|py| {
         let value = error.value(py);
-        argument.map_or(Ok(()), |argument| value.setattr("argument", argument))?;
-        hint.and_then(name).map_or(Ok(()), |hint| value.setattr("hint", hint))
+        value.setattr("argument", argument)?;
+        value.setattr("hint", hint)
     });
     set.err().unwrap_or(error)
 }
@@ -44,9 +43,7 @@ fn with_help(raised: fn(String) -> PyErr, reason: Reason) -> PyErr {
 /// The line of an error, in which its argument has the name that the reader knows it by.
 #[pyfunction]
 fn error_line(text: String, argument: &str, hint: Option<&str>) -> PyResult<String> {
-    let named = |name| Hint::NAMES.iter().find(|(_, one)| *one == name).map(|(hint, _)| *hint);
-    let unknown = |name| core(problem!("hint"; " is {name:?}: must be one of {:?}", Hint::NAMES.map(|(_, name)| name)));
-    let hint = hint.map(|name| named(name).ok_or_else(|| unknown(name))).transpose()?;
+    let hint = reading::from_value(hint.into()).map_err(|unfit| core(unfit.problem("hint")))?;
     Ok(Reason { text, argument: None, hint }.line(argument))
 }
 

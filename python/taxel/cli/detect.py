@@ -13,7 +13,7 @@ import typer
 from taxel._base.times import begun
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import READ_HELP, TARE_HELP, progress, say_warnings, try_report
+from taxel.cli._recordings import READ_HELP, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
 from taxel.spikes import to_ms
 
@@ -37,13 +37,7 @@ def detect(
     recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}, or a folder of them.")],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     files: FileOptions,
-    tare: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SECONDS|FILE",
-            help=f"{TARE_HELP} Default: 0 of force and pressure, else the first quiet stretch.",
-        ),
-    ] = None,
+    tare: Annotated[str | None, tare_option("Default: 0 of force and pressure, else the first quiet stretch.")] = None,
     frame_us: Annotated[
         float | None,
         typer.Option(help="Length of the board's frame, us. Default: by the registers or the frames, else 192."),

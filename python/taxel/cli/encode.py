@@ -12,7 +12,7 @@ from taxel._base.files import try_whole
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import App, with_out
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import SET_HELP, TARE_HELP, assignments, progress, say_warnings
+from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings, tare_option
 from taxel.cli._say import say
 
 __all__ = ["app", "encode"]
@@ -29,7 +29,7 @@ def encode(
     encoder: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(encoder_names())}.")],
     files: FileOptions,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    tare: Annotated[str | None, typer.Option(metavar="SECONDS|FILE", help=TARE_HELP)] = None,
+    tare: Annotated[str | None, tare_option()] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

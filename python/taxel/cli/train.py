@@ -15,7 +15,7 @@ from taxel._base.messages import collected
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import READ_HELP, SET_HELP, TARE_HELP, assignments, progress, say_warnings, try_report
+from taxel.cli._recordings import READ_HELP, SET_HELP, assignments, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
@@ -52,9 +52,7 @@ def train(
         str | None, typer.Option(metavar="NAME", help="The encoder's name; the same as --set encoder.name=NAME.")
     ] = None,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    tare: Annotated[
-        str | None, typer.Option(metavar="SECONDS|FILE", help=f"{TARE_HELP} Default: the time before the first label.")
-    ] = None,
+    tare: Annotated[str | None, tare_option("Default: the time before the first label.")] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
     ),
