@@ -11,7 +11,7 @@ use crate::enter::enter;
 use crate::errors::core;
 
 fn law(json: &str) -> Result<Sensor> {
-    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::Scene(unfit.of("law")))?;
+    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::scene(unfit.of("law")))?;
     sensor.check()?;
     Ok(sensor)
 }

@@ -10,10 +10,10 @@ use crate::errors::core;
 /// Reads `what` from its JSON, or reports which of its parameters makes no sense.
 pub(crate) fn parsed<T: DeserializeOwned>(what: &str, json: &str) -> PyResult<T> {
     // Groups of parameters are ours; whoever wrote the parameter knows its name alone.
-    reading::from_text(json).map_err(|unfit| core(Error::Problem(unfit.by_name().of(what))))
+    reading::from_text(json).map_err(|unfit| core(unfit.by_name().problem(what)))
 }
 
 /// What is handed to Python, as JSON.
 pub(crate) fn to_json<T: Serialize>(value: &T) -> PyResult<String> {
-    serde_json::to_string(value).map_err(|error| core(Error::Problem(error.to_string())))
+    serde_json::to_string(value).map_err(|error| core(Error::Problem(error.to_string().into())))
 }

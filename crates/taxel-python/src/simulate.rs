@@ -30,7 +30,7 @@ enum ActIn<'py> {
 }
 
 fn scene(json: &str) -> Result<Scene> {
-    reading::from_text(json).map_err(|unfit| Error::Scene(unfit.of("scene")))
+    reading::from_text(json).map_err(|unfit| Error::scene(unfit.of("scene")))
 }
 
 fn to_act(act: ActIn<'_>) -> PyResult<Act> {
@@ -48,7 +48,7 @@ fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
 }
 
 fn to_sensor(json: &str) -> PyResult<Sensor> {
-    reading::from_text(json).map_err(|unfit| core(Error::Scene(unfit.of("sensor"))))
+    reading::from_text(json).map_err(|unfit| core(Error::scene(unfit.of("sensor"))))
 }
 
 /// Touches as Python receives them: kind, start and stop in us, speed in m/s, peak force in N.
@@ -72,7 +72,7 @@ fn from_contacts(contacts: &[Contact]) -> ContactsOut {
 #[pyfunction]
 fn draw_scene(parts: ArrayParts, seed: u64, index: u32, left_to_rest: bool) -> PyResult<String> {
     let scene = Scene::draw(&to_array(parts)?, seed, index, left_to_rest).map_err(core)?;
-    serde_json::to_string(&scene).map_err(|error| core(Error::Scene(error.to_string())))
+    serde_json::to_string(&scene).map_err(|error| core(Error::scene(error.to_string())))
 }
 
 /// Refuses a scene or taxels that make no sense on an array, without computing the scene.
@@ -333,7 +333,7 @@ impl Layer {
     /// `foam` is JSON.
     #[new]
     fn new(py: Python<'_>, parts: ArrayParts, foam: &str, cells_per_pitch: u16, tolerance: f64) -> PyResult<Self> {
-        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::Scene(unfit.of("foam"))))?;
+        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::scene(unfit.of("foam"))))?;
         let array = to_array(parts)?;
         let layer =
             enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch, stop)?.to_within(tolerance)))?;
@@ -412,7 +412,7 @@ impl Source {
     /// The counts as JSON.
     fn counts(&self, py: Python<'_>) -> PyResult<String> {
         let counts = self.0.with(py, |(board, _)| *board.counts());
-        serde_json::to_string(&counts).map_err(|error| core(Error::Scene(error.to_string())))
+        serde_json::to_string(&counts).map_err(|error| core(Error::scene(error.to_string())))
     }
 }
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.progress import reporting
 from taxel._core import ProblemError
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
@@ -63,7 +64,7 @@ def off_by(examples: Sequence[Example], labels: Sequence[str], noise_floor: floa
         return {}
     early = [one if (tare := _early(one)) is None else one._replace(tare=tare) for one in examples]
     floor = measured_floor(early) or noise_floor
-    loads = Loads(early, [clock_of(one) for one in early], floor, lambda _: None, ("area",))
+    loads = Loads(early, [clock_of(one) for one in early], floor, reporting(None), ("area",))
     felt = [edge.t for edge in loads.edges("area", TOUCH, 1.0, 1)]
     found = {}
     for label in labels:

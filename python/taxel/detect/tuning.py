@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, number, several, text
-from taxel._core import ProblemError
+from taxel._base.arguments import number, several, text
+from taxel._base.errors import refused
+from taxel._base.progress import Progress, reporting
 from taxel.detect.examples import Example, checked
 from taxel.detect.loads import Found, Loads, Stretch, clock_of
 from taxel.detect.plain_rule import PlainRule
@@ -54,7 +55,7 @@ def tune(
     *,
     window_ms: float = 50.0,
     noise_floor: float = 3.0,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, PlainRule | None]:
     """Return for each label the plain rule with the fewest missed and false detections, and of these the nearest one.
 
@@ -77,8 +78,8 @@ def tune(
         How far a detection may lie from its label.
     noise_floor : float, 0 or more, in the sensor's unit (ticks)
         The board's.
-    progress : function of str, optional
-        Called with a line before each step.
+    progress : function of (step, done, all), optional
+        Called before each step; of folds with how many are done, else with 0 of 0.
 
     Returns
     -------
@@ -106,12 +107,12 @@ def tune(
     """
     clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
     sound = checked(examples)
-    report = (lambda _: None) if progress is None else callback("progress", progress)
+    report = reporting(progress)
     names = sorted({name for one in sound for name in one.labels}) if labels is None else several("labels", labels)
     names = [text("labels", name) for name in names]
     width_ms = number("window_ms", window_ms, "ms")
     if not 0.0 <= width_ms <= 3_600_000.0:
-        raise ProblemError(f"window_ms is {width_ms:g}: must lie between 0 and 3600000")
+        raise refused("window_ms", f" is {width_ms:g}: must be from 0 to 3600000")
     floor = number("noise_floor", noise_floor)
     if any(isinstance(one.source, SpikeTrains) for one in sound):
         return dict.fromkeys(names)

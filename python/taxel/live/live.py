@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import finite, flag, instance, number, numbers, parameters, several, shown, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped
 from taxel._base.options import with_fields_of
@@ -187,7 +188,7 @@ class Live:
         ProblemError : the board is another computer's
         """
         if self._remote is not None:
-            raise ProblemError(f"live: receives from {self.place}, and on no address of this computer")
+            raise refused("live", f": receives from {self.place}, and on no address of this computer")
         return self._core.address()
 
     @property
@@ -341,8 +342,8 @@ class Live:
         arrival = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
         given = numbers("values", values, np.float64).reshape(-1)
         for k in np.flatnonzero(np.abs(given) > VALUE)[:1]:
-            raise ProblemError(
-                f"values[{k}] is {shown(given[k].item())}: must fit 32 bits, or be NaN where it is missing"
+            raise refused(
+                "values", f"[{k}] is {shown(given[k].item())}: must fit 32 bits, or be NaN where it is missing"
             )
         self._core.sample(text("name", name), given.tolist(), arrival)
 
@@ -366,8 +367,8 @@ class Live:
         """
         columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
-            raise ProblemError(
-                f"x has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
+            raise refused(
+                "x", f" has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
             )
         for name, places in (("x", columns), ("y", rows)):
             if len(places) and (places.min() < 0 or places.max() > _MOST_PLACE):
@@ -485,7 +486,7 @@ def _given(inlet: LslInlet) -> str:
 def _stretch_us(seconds: float) -> int:
     stretch = number("tare", seconds)
     if not 1e-6 <= stretch <= 3600:
-        raise ProblemError(f"tare is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
+        raise refused("tare", f" is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
     return round(stretch * 1e6)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from taxel import _core
 from taxel._base import limits
 from taxel._base.arguments import flag, path, shown, text
+from taxel._base.errors import refused
 from taxel._base.files import whole_file, write_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -94,7 +95,7 @@ def convert(
     whole = _contents(source)
     if frames_hz is not None:
         if isinstance(source, Frames):
-            raise ProblemError("frames_hz: pictures keep their own times; open the file and ask it for frames(rate_hz)")
+            raise refused("frames_hz", ": pictures keep their own times; open the file and ask it for frames(rate_hz)")
         if whole.is_several and together(whole.sources):
             whole = alone({name: pictures(one, frames_hz, name="frames_hz") for name, one in whole.sources.items()})
         else:
@@ -142,7 +143,7 @@ def _contents(source: object) -> Contents:
     if isinstance(source, Recording):
         return source._contents
     if not isinstance(source, Events | Frames):
-        raise ProblemError(f"source is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
+        raise refused("source", f" is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
     return Contents.of(source_from(source))
 
 
