@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import select
@@ -98,8 +97,7 @@ def ports() -> list[Port]:
     >>> all(port.place for port in ports())
     True
     """
-    records = json.loads(_core.serial_ports())
-    return [Port(**{**port, "usb": None if port["usb"] is None else tuple(port["usb"])}) for port in records]
+    return [Port(**port) for port in _core.serial_ports()]
 
 
 @dataclass(frozen=True)

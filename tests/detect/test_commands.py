@@ -192,7 +192,7 @@ def write_noted(seed: int, path: Path, line_10ns: int) -> dict[str, list[int]]:
     events, truth = touches(seed)
     taxel.convert(events, path)
     array = {"rows": 8, "columns": 8, "pitch_mm": 2.67, "name": "small"}
-    registers = {**json.loads(_core.registers_preset("5.2 kHz")), "lines": 8, "line_period": line_10ns}
+    registers = {**_core.registers_preset("5.2 kHz"), "lines": 8, "line_period": line_10ns}
     header = {"array": array, "registers": registers, "source": "test", "started_ns": 0}
     writer = _core.RecordingWriter(path, json.dumps(header), "none", True)
     writer.datagram(0, 0, taxel.wire.encode(events))

@@ -11,7 +11,7 @@ use crate::errors::ProblemError;
 
 /// Does what `what` names without the GIL: returns an error of a kind, panics, or waits a minute for Ctrl-C.
 #[pyfunction]
-fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
+pub fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
     let error = match what {
         "format" => Error::format("file, byte 0: raised by a test hook").helped_by("limit", Hint::Larger),
         "problem" => Error::argument("tau", ": raised by a test hook"),
@@ -36,11 +36,6 @@ fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
 
 /// The JSON schemas of the panel's requests and messages.
 #[pyfunction]
-fn message_schemas() -> String {
+pub fn message_schemas() -> String {
     taxel_panel::message_schemas()
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(message_schemas, module)?)?;
-    module.add_function(wrap_pyfunction!(test_hook, module)?)
 }

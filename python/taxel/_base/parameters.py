@@ -26,7 +26,7 @@ def described(kind: str) -> dict[str, Any]:
     ``defaults`` by name, the names that are ``required``, and the ``ranges`` of numbers by name, with their ``unit``
     and the text of an error, ``must_be``.
     """
-    return dict(json.loads(_core.parameters(kind)))
+    return _core.parameters(kind)
 
 
 def defaults(kind: str) -> Any:

@@ -120,10 +120,10 @@ class Law:
         if self.ramp > 65_535:
             raise refused("ramp", f" is {self.ramp:g} ticks: must be 65535 or less")
         try:
-            self.text = _core.check_law(parameters(sensor))
+            self.sensor: dict[str, float] = _core.check_law(parameters(sensor))
         except _core.SceneError as error:
             raise ProblemError(str(error)) from None
-        self.sensor: dict[str, float] = json.loads(self.text)
+        self.text = json.dumps(self.sensor)
         # The law gives the force on a taxel's own face.
         self.share = 1.0 if unit == "N" else 1 / (N_PER_KPA_MM2 * self.sensor["side_mm"] ** 2)
 

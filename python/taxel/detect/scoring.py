@@ -66,7 +66,7 @@ class Spread(NamedTuple):
         given = finite_numbers("values", values)
         if given.ndim != 1:
             raise refused("values", f" has {given.ndim} dimensions: must have one")
-        spread = cls(*_core.spread(given))
+        spread = cls(**_core.spread(given))
         # The mean of equal values is rounded, so that they seem to vary by some 1e-17.
         return spread._replace(mean=float(given[0]), sd=0.0) if len(given) > 1 and np.ptp(given) == 0.0 else spread
 
@@ -228,8 +228,9 @@ def score(
     labels, times = _truth(found, truth)
     tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
     scores = {}
-    for label, detected, events, missed, false, near, errors, delays in tallies:
-        scores[label] = Score(label, np.column_stack([detected, events]), missed, false, near, errors, delays)
+    for one in tallies:
+        pairs, missed, false = np.column_stack([one.detected, one.events]), one.missed_events, one.false_detections
+        scores[one.label] = Score(one.label, pairs, missed, false, one.false_near, one.errors_ms, one.delays_ms)
     return Score(
         "all" if len(scores) != 1 else next(iter(scores)),
         np.concatenate([one.pairs for one in scores.values()] or [np.empty((0, 2), np.int64)]),

@@ -187,11 +187,11 @@ def _fit(found: Found, true: NDArray[np.int64], width_us: int, most: int = 2**62
     tallies = _core.score(parts, [""] * len(true), true, np.full(len(true), width_us, np.int64))
     if not tallies:
         return _Fit(0, np.inf, np.inf)
-    _, _, _, missed, false, _, errors, delays = tallies[0]
-    wrong = len(missed) + len(false)
-    if not len(delays):
+    tally = tallies[0]
+    wrong = len(tally.missed_events) + len(tally.false_detections)
+    if not len(tally.delays_ms):
         return _Fit(wrong, np.inf, np.inf)
-    return _Fit(wrong, float(np.median(np.abs(delays))), float(np.median(np.abs(errors))))
+    return _Fit(wrong, float(np.median(np.abs(tally.delays_ms))), float(np.median(np.abs(tally.errors_ms))))
 
 
 def _for_kinds(
@@ -210,7 +210,7 @@ def _for_kinds(
     for age, (t, known, areas) in touches.items():
         parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
         tallies = _core.score(parts, [""] * len(every), every[order], np.full(len(every), width_us, np.int64))
-        pairs = tallies[0][1:3] if tallies else (np.empty(0, np.int64), np.empty(0, np.int64))
+        pairs = (tallies[0].detected, tallies[0].events) if tallies else (np.empty(0, np.int64), np.empty(0, np.int64))
         second = is_second[pairs[1]]
         if second.all() or not second.any():
             continue

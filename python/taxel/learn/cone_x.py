@@ -363,29 +363,29 @@ class ConeX(SpikeLearner):
         problem = ConeXProblem(self, patterns, targets)
         multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
         first = [tuple(row) for row, _ in held]
-        result = problem._problem.fit(first, multipliers, progress)
-        (status, weights, objective, parts, gap, violation), rest, proof, signal = result
-        (margin, requested), engine, rounds, (rows, multipliers), certificate, reason = rest
-        self.weights_ = weights
-        self.status_ = status
-        self.objective_ = objective
-        self.parts_ = dict(zip(("l1", "l2", "B"), parts, strict=True))
-        self.gap_ = gap
-        self.multipliers_ = None if proof is None else _multipliers(proof)
-        self.violation_ = violation
-        self.margin_ = Margin(*margin)
-        self.reason_ = reason
-        self.engine_ = engine
-        self.rounds_ = rounds
-        self.held_ = list(zip(map(_row, rows), multipliers.tolist(), strict=True))
+        fit = problem._problem.fit(first, multipliers, progress)
+        self.weights_ = fit.weights
+        self.status_ = fit.status
+        self.objective_ = fit.objective
+        self.parts_ = dict(zip(("l1", "l2", "B"), fit.parts, strict=True))
+        self.gap_ = fit.gap
+        self.multipliers_ = None if fit.proof is None else _multipliers(fit.proof)
+        self.violation_ = fit.violation
+        self.margin_ = Margin(*fit.margin)
+        self.reason_ = fit.reason
+        self.engine_ = fit.engine
+        self.rounds_ = fit.rounds
+        rows, values = fit.held
+        self.held_ = list(zip(map(_row, rows), values.tolist(), strict=True))
         self.certificate_ = None
-        if certificate is not None:
-            (rows, multipliers), proven, at_all, text = certificate
-            self.certificate_ = Certificate([_row(row) for row in rows], multipliers, proven, at_all, text)
-        self.problem_ = problem._with_margin(requested)
+        if fit.certificate is not None:
+            found = fit.certificate
+            rows, values = found.rows
+            self.certificate_ = Certificate([_row(row) for row in rows], values, found.gap, found.at_all, found.text)
+        self.problem_ = problem._with_margin(fit.asked)
         self.neuron_ = neuron
-        if signal is not None:
-            raise signal
+        if fit.raised is not None:
+            raise fit.raised
         return self
 
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:

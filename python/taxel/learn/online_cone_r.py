@@ -202,10 +202,8 @@ class OnlineConeR(ConeR):
                 self._stream.add(*example)
 
     def _fit(self) -> Self:
-        result, signal = self._stream.fit()
-        _keep(self, result, self._stream.silent_rows, 0)
+        fit = self._stream.fit()
         self.patterns_ = self._stream.patterns
-        if signal is not None:
-            raise signal
+        _keep(self, fit, self._stream.silent_rows, 0, lambda values: values)
         _warn(self)
         return self

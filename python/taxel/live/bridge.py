@@ -181,7 +181,7 @@ def _refused(place: str) -> None:
 
 def _about(live: Live) -> str:
     """Return the description of the sensor that is published."""
-    registers = json.loads(live._core.registers())
+    registers = live._core.registers()
     return json.dumps(
         {"array": live.array._geometry(), "registers": registers, "differences": live._options.differences}
     )

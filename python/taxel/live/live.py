@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
@@ -164,7 +163,7 @@ class Live:
             None if readout is None else readout.to_json(),
             tare.to_json() if isinstance(tare, Tare) else None,
             None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
-            None if not receivers else lambda *values: [receive(Detection(*values)) for receive in receivers],
+            None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
             flag("lines", options.lines),
             feed,
         )
@@ -215,7 +214,7 @@ class Live:
         True
         """
         values = self._core.next(finite("timeout", timeout, "s", least=0.0, most=1e9))
-        return None if values is None else Detection(*values)
+        return None if values is None else Detection(**values)
 
     def __iter__(self) -> Iterator[Detection]:
         """Yield detections as they come, until `stop` is called."""
@@ -260,8 +259,7 @@ class Live:
         """
         if self._summary is not None:
             return self._summary.counters
-        counters: dict[str, Any] = json.loads(self._core.counters())
-        return counters
+        return self._core.counters()
 
     @property
     def picture(self) -> NDArray[np.uint16]:
@@ -374,12 +372,12 @@ class Live:
             if len(places) and (places.min() < 0 or places.max() > _MOST_PLACE):
                 wrong = places.min() if places.min() < 0 else places.max()
                 raise ProblemError(f"{name}: holds {wrong}, must be a taxel's")
-        return tuple(Zeroing(*one) for one in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True))))
+        return tuple(Zeroing(**one) for one in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True))))
 
     @property
     def zeroed(self) -> tuple[Zeroing, ...]:
         """The latest zeroing of each taxel that was zeroed, by `zero` or a panel."""
-        return tuple(Zeroing(*one) for one in self._core.zeroed())
+        return tuple(Zeroing(**one) for one in self._core.zeroed())
 
     def note(self, said: str) -> None:
         """Write a note into the recording, with the current time.

@@ -161,7 +161,7 @@ def _counts(of: Source, written: Source) -> dict[str, Any]:
     counts = of.losses.counts()
     known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
     decoder = counts.get("decoder")
-    damage = json.loads(_core.recording_damage(json.dumps(decoder))) if decoder else {}
+    damage = _core.recording_damage(json.dumps(decoder)) if decoder else {}
     return {**known, "decoder": damage}
 
 
@@ -171,7 +171,7 @@ def _read_otherwise(part: Path, of: Source) -> list[str]:
         return []
     events = of.table
     again = Events._from_parts(
-        _core.RecordingReader(part, limits.memory(None), False).decode("direct")[0], events.array
+        _core.RecordingReader(part, limits.memory(None), False).decode("direct").events, events.array
     )
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
         return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]

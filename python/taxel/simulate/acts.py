@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -191,7 +190,7 @@ class Scene:
         """
         parts = Array._of(array)._parts()
         seed, index = whole("seed", seed, 0), whole("index", index, 0, 1_000_000)
-        return cls(json.loads(_core.draw_scene(parts, seed, index, flag("left_to_rest", left_to_rest))))
+        return cls(_core.draw_scene(parts, seed, index, flag("left_to_rest", left_to_rest)))
 
     def replace(self, **changes: Any) -> Scene:
         """Return the scene with parameters changed; a mapping changes some of a part, as ``foam={"dashpot_ms": 0}``.
@@ -263,7 +262,7 @@ class Scene:
         step = number("step_us", step_us, "us")
         tracks, contacts, narrow = _core.motion(Array._of(array)._parts(), self._part(), step)
         self._warn(narrow)
-        return Motion(float(step_us), [Track(*track) for track in tracks], [Contact(*contact) for contact in contacts])
+        return Motion(float(step_us), [Track(**track) for track in tracks], [Contact(**touch) for touch in contacts])
 
     def _part(self) -> str:
         return parameters(self.parameters)

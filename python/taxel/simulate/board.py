@@ -94,7 +94,7 @@ def fitting(preset: str | None, array: Array) -> Registers:
         if max(array.shape) > _THESIS_LINES:
             return Registers(array=array)
         preset = "5.2 kHz"
-    held = json.loads(_core.registers_preset(text("preset", preset), array._parts()))
+    held = _core.registers_preset(text("preset", preset), array._parts())
     try:
         return Registers._of(held, array)
     except DeviceError as error:
@@ -264,12 +264,12 @@ class Board:
     @property
     def registers(self) -> Registers:
         """As written; the scan takes them over at the next frame's edge."""
-        return Registers._of(json.loads(self._core.registers()), self.array)
+        return Registers._of(self._core.registers(), self.array)
 
     @property
     def counts(self) -> dict[str, int]:
         """Frames, changes, words, datagrams, words sent, taxels dropped, comparators not returned."""
-        return dict(json.loads(self._core.counts()))
+        return self._core.counts()
 
     def __repr__(self) -> str:
         return escaped(f"Board({self.greeting.strip()}, {plain(self.time_us)} us after reset)")

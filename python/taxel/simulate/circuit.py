@@ -437,7 +437,7 @@ class Converter(Value):
         """
         lines = floats("line_v", line_v, "V").tolist()
         every, stop = number("every_us", every_us, "us"), number("stop_us", stop_us, "us")
-        return Trace(*_core.converter_trace(self._json(), lines, every, stop))
+        return Trace(**_core.converter_trace(self._json(), lines, every, stop))
 
 
 class Converted(NamedTuple):
@@ -525,9 +525,8 @@ class AdaptiveRamp(Value):
         frames = checked if checked.ndim == 3 else checked[None]
         shape: tuple[int, int] = frames.shape[1:]
         period = number("period_us", period_us, "us")
-        t_us, ramp, *read = _core.adaptive_convert(self._json(), shape, frames.ravel(), period)
-        ticks, read_v = (one.reshape(-1, *shape) for one in read)
-        return Converted(t_us, ramp, ticks, read_v)
+        read = _core.adaptive_convert(self._json(), shape, frames.ravel(), period)
+        return Converted(read.t_us, read.ramp, read.ticks.reshape(-1, *shape), read.volts.reshape(-1, *shape))
 
 
 @dataclass(kw_only=True, eq=False, repr=False)

@@ -24,7 +24,7 @@ PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
 QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
 
 #: The fields of registers.toml by name.
-_FIELDS: dict[str, Any] = {field["name"]: field for field in json.loads(_core.registers_fields())}
+_FIELDS: dict[str, Any] = {field["name"]: field for field in _core.registers_fields()}
 #: The fields that the registers hold in units of 10 ns; here they are in us.
 _TIMES = tuple(name for name, field in _FIELDS.items() if field["unit"] == "10 ns")
 _FLAGS = tuple(name for name, field in _FIELDS.items() if field["unit"] == "flag")
@@ -94,12 +94,12 @@ class Registers:
     def __init__(self, *, array: Array | None = None, **fields: float) -> None:
         sensor = Array._of(array)
         channels = whole("channels", fields.get("channels", 16), 0, 255)
-        self._set(json.loads(_core.registers_at_reset(sensor._parts(), channels)), fields, sensor)
+        self._set(_core.registers_at_reset(sensor._parts(), channels), fields, sensor)
 
     def _set(self, held: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
         self.array = Array._of(array)
         raw = [(name, _raw(name, value)) for name, value in fields.items()]
-        self._held = json.loads(_core.registers_with(json.dumps(held), raw, self.array._parts()))
+        self._held = _core.registers_with(json.dumps(held), raw, self.array._parts())
 
     @classmethod
     def preset(cls, name: str, *, array: Array | None = None) -> Registers:
@@ -126,7 +126,7 @@ class Registers:
         10
         """
         registers = cls.__new__(cls)
-        registers._set(json.loads(_core.registers_preset(text("preset", name))), {}, array)
+        registers._set(_core.registers_preset(text("preset", name)), {}, array)
         return registers
 
     @classmethod
@@ -140,7 +140,7 @@ class Registers:
     def _of_source(cls, array: Array, rate_hz: float, bits: int) -> tuple[Registers, int]:
         """Return the registers of a board that scans another sensor's frames, and how often it halves their values."""
         held, halved = _core.registers_of_source(array._parts(), rate_hz, bits)
-        return cls._of(json.loads(held), array), halved
+        return cls._of(held, array), halved
 
     @classmethod
     def from_words(cls, words: Sequence[int], *, array: Array | None = None, channels: int = 16) -> Registers:
@@ -173,7 +173,7 @@ class Registers:
         if len(eight) != 8:
             raise refused("words", f": {len(eight)}, must be 8")
         held = _core.registers_of_words(eight, whole("channels", channels, 0, 255))
-        return cls._of(json.loads(held), Array._of(array))
+        return cls._of(held, Array._of(array))
 
     def replace(self, **fields: float) -> Registers:
         """Return a set with some fields changed, by taxel's names or the manual's.
@@ -226,7 +226,7 @@ class Registers:
         (7.81, 10, 2)
         """
         preset = text("preset", name)
-        held = json.loads(_core.registers_with_preset(self._json(), preset, self.array._parts()))
+        held = _core.registers_with_preset(self._json(), preset, self.array._parts())
         return self._of(held, self.array)
 
     @property

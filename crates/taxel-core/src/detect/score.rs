@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::Serialize;
+
 use crate::detect::{Detection, Reference};
 use crate::metrics::matching::in_order;
 use crate::{Result, Stop, problem};
@@ -32,7 +34,7 @@ pub struct Tally {
 }
 
 /// Mean, spread and range of values.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// Arithmetic mean.
     pub mean: f64,
