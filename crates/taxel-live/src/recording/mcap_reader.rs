@@ -114,10 +114,6 @@ pub struct Decoded {
     pub version_2: wire::v2::Counts,
     /// Arrival time of each datagram, ns since 1970.
     pub arrived_ns: Vec<i64>,
-    /// Arrival number of each datagram.
-    pub number: Vec<u64>,
-    /// Index of the first event of each datagram; with pairing by taxel all events are decoded after the last datagram.
-    pub first: Vec<u64>,
     /// Earliest time at which each datagram could leave the board, us; `i64::MIN` if it is not known.
     pub left: Vec<i64>,
     /// What the decoder could not use, as a verdict states it.
@@ -132,8 +128,6 @@ impl Decoded {
             counts,
             version_2,
             arrived_ns: vec![],
-            number: vec![],
-            first: vec![],
             left: vec![],
             found: Found::default(),
         }
@@ -526,9 +520,7 @@ impl Reader {
                     .map_or(i64::MIN, |t| t + header.decoding.origin_us);
                 decoded.left.push(left);
                 decoded.arrived_ns.push(message.at_ns);
-                decoded.number.push(message.number);
-                decoded.first.push(before as u64);
-                self.fits("events", decoded.events.size() + 32 * decoded.first.len())?;
+                self.fits("events", decoded.events.size() + 16 * decoded.left.len())?;
             }
             if message.topic == Topic::Held {
                 begin_with(&mut sender, message.data);
