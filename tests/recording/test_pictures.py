@@ -306,7 +306,7 @@ def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest
     assert "that its pictures have no times" in taxel.convert(opened[0], tmp_path / "one.csv")
     one = taxel.open(tmp_path / "one.mcap")
     assert decoded(tmp_path / "one.mcap")[0][1]["clock"] == "false"
-    with pytest.raises(ProblemError, match="its pictures have no times; say how many there are a second: --rate-hz"):
+    with pytest.raises(ProblemError, match="its pictures have no times; give rate_hz"):
         LevelCrossing([100.0]).encode(one)
     with pytest.raises(ProblemError, match="have no rate"):
         one.frames(50)

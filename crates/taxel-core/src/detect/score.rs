@@ -182,7 +182,7 @@ mod tests {
     fn windows_that_make_no_sense_are_refused() {
         let never = Stop::never();
         let one = [Reference { label: "a".into(), t: 0 }];
-        assert!(score(&[], &one, &[-1], never).unwrap_err().to_string().contains("window of -1 us"));
+        assert!(score(&[], &one, &[-1], never).unwrap_err().to_string().contains("window_us is -1 us"));
         assert!(score(&[], &one, &[i64::MAX], never).is_err());
         assert!(score(&[], &[Reference { label: "a".into(), t: 0 }], &[], never).is_err());
     }
