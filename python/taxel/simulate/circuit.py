@@ -526,7 +526,7 @@ class AdaptiveRamp(Value):
         shape: tuple[int, int] = frames.shape[1:]
         period = number("period_us", period_us, "us")
         t_us, ramp, *read = _core.adaptive_convert(self._json(), shape, frames.ravel(), period)
-        ticks, read_v = (one.reshape(-1, *shape) for one in read)
+        ticks, read_v = (readings.reshape(-1, *shape) for readings in read)
         return Converted(t_us, ramp, ticks, read_v)
 
 
