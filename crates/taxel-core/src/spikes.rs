@@ -54,7 +54,7 @@ impl SpikeKind {
         Self::ALL
             .into_iter()
             .find(|kind| kind.name() == name)
-            .ok_or_else(|| problem!("kind is {name}: must be one of {names}"))
+            .ok_or_else(|| problem!("kind"; " is {name}: must be one of {names}"))
     }
 
     /// The number of inputs of a neuron for each train: two for signed trains.
@@ -226,7 +226,9 @@ impl SpikeTrains {
     /// `Problem` for graded trains, whose values are factors of the weight.
     pub fn split_by_sign(&self) -> Result<Self> {
         if self.kind == SpikeKind::Graded {
-            return Err(problem!("trains are graded: their values multiply the weight and are never split by sign"));
+            return Err(
+                problem!("trains"; " are graded: their values multiply the weight and are never split by sign"),
+            );
         }
         let Some(values) = &self.values else { return Ok(self.clone()) };
         let (mut times, mut offsets) = (Vec::with_capacity(self.times.len()), vec![0]);
@@ -335,15 +337,15 @@ fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Resul
         return Err(problem!("unsigned trains have no values: choose kind signed or graded, or leave the values out"));
     }
     if values.len() != spikes {
-        return Err(problem!("values: must be one a spike, {spikes}"));
+        return Err(problem!("values"; ": must be one a spike, {spikes}"));
     }
     if let Some(k) = values.iter().position(|value| !value.is_finite()) {
-        return Err(problem!("values[{k}] is {}: must be finite", format!("{}", values[k]).to_lowercase()));
+        return Err(problem!("values"; "[{k}] is {}: must be finite", format!("{}", values[k]).to_lowercase()));
     }
     if kind == SpikeKind::Graded
         && let Some(k) = values.iter().position(|&value| value == 0.0)
     {
-        return Err(problem!("values[{k}] is 0: a graded value of 0 is no spike, leave it out"));
+        return Err(problem!("values"; "[{k}] is 0: a graded value of 0 is no spike, leave it out"));
     }
     Ok(())
 }

@@ -415,12 +415,17 @@ export interface Recordings {
   readouts: string[];
 }
 
-/** A training has ended; `text` is what it printed. */
+/** A training has ended. */
 export interface Trained {
   type: "trained";
   name: string;
   readout: string;
+  /** How well the readout detects, in words. */
   text: string;
+  /** The command that detects by it in a shell. */
+  next: string;
+  /** Options of `taxel train` that may help. */
+  options: string[];
 }
 
 /** When asked: the last that the training that runs has said of its progress, first after 2 s; empty before, and where none runs. */

@@ -9,27 +9,28 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use taxel_core::detect::Detector;
+use taxel_core::detect::{Detection, Detector};
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
 use taxel_live::pipeline::{
-    Handle, Lines, Live as Pipeline, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Source,
+    Handle, Lines, Live as Pipeline, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Source, Summary,
 };
+use taxel_live::ports;
 
 use crate::bridge::{Copies, Feed};
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core, live};
-use crate::parameters::parsed;
+use crate::parameters::{Plain, parsed};
 use crate::thread_state;
 use crate::threaded::Threaded;
 
 /// The defaults of the options that Python's `LiveOptions` has too, as JSON.
 #[pyfunction]
-fn live_defaults() -> String {
+pub fn live_defaults() -> String {
     let LiveOptions { differences, guard_frames, gap_frames, record_later, name, .. } =
         LiveOptions::new(Array::thesis());
     json!({
@@ -71,23 +72,47 @@ impl Chosen {
     }
 }
 
-/// Label, t, known, slope, output \(us of the board's clock, ns of the host's clock\), repaired.
-type OutputParts = (String, i64, i64, f64, i64, i64, bool);
+/// A detection, by name: `said` is its output in us of the board's clock, `said_ns` in ns of the host's.
+#[derive(IntoPyObject)]
+pub(crate) struct DetectionOut {
+    label: String,
+    t: i64,
+    known: i64,
+    slope: f64,
+    said: i64,
+    said_ns: i64,
+    repaired: bool,
+}
 
-/// t (us), column, row, rest after, rest before.
-type ZeroingOut = (i64, u16, u16, f64, Option<f64>);
+/// How a pipeline, or one of its recordings, ended.
+#[pyclass(frozen, get_all)]
+pub struct Ended {
+    counters: Plain<Value>,
+    verdict: Plain<Value>,
+    /// The recording, where there is one.
+    path: Option<PathBuf>,
+    /// The fresh tare, as its file's text, where one was completed.
+    tare: Option<String>,
+}
 
-fn zeroing_out(one: Zeroing) -> ZeroingOut {
-    (one.t, one.x, one.y, one.rest, one.before)
+impl From<Summary> for Ended {
+    fn from(summary: Summary) -> Self {
+        Self {
+            counters: Plain(json!(summary.counters)),
+            verdict: Plain(json!(summary.verdict)),
+            path: summary.path,
+            tare: summary.tare.as_ref().map(Tare::to_json),
+        }
+    }
 }
 
 fn to_record(path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Record> {
     Ok(Record { path, compression: compression.parse().map_err(core)?, overwrite })
 }
 
-fn output_parts(output: OutputDetection) -> OutputParts {
-    let d = output.detection;
-    (d.label, d.t, d.known, d.slope, output.output_us, output.output_ns, d.repaired)
+fn detection_out(output: OutputDetection) -> DetectionOut {
+    let Detection { label, t, known, slope, repaired } = output.detection;
+    DetectionOut { label, t, known, slope, said: output.output_us, said_ns: output.output_ns, repaired }
 }
 
 thread_local! {
@@ -97,10 +122,10 @@ thread_local! {
 
 /// Datagrams to detections, as they come.
 #[pyclass(frozen)]
-pub(crate) struct Live {
+pub struct Live {
     pipeline: Threaded<Pipeline>,
-    /// How it ended, as JSON, once it has; locked while it is being ended.
-    summary: Mutex<Option<String>>,
+    /// How it ended, once it has; locked while it is being ended.
+    summary: Mutex<Option<Summary>>,
 }
 
 impl Live {
@@ -125,7 +150,6 @@ impl Live {
     /// `options`, `readout` and `tare` are JSON; `tare_us` takes a fresh tare. `say` is called with each detection in the
     /// thread that made it, `lines` writes it to the standard output as JSON. With a `feed` no socket is opened.
     #[new]
-    #[allow(clippy::too_many_arguments)]
     fn start(
         py: Python<'_>,
         host: &str,
@@ -178,7 +202,7 @@ impl Live {
             sinks.push(Box::new(move |output: &OutputDetection| {
                 thread_state::attach(|py| {
                     IN_CALLBACK.set(true);
-                    let outcome = say.call1(py, output_parts(output.clone()));
+                    let outcome = say.call1(py, (detection_out(output.clone()),));
                     IN_CALLBACK.set(false);
                     outcome.map(drop)
                 })
@@ -210,9 +234,9 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.place().to_string()))
     }
 
-    /// The board's registers, as far as they are known: JSON.
-    fn registers(&self, py: Python<'_>) -> PyResult<String> {
-        self.with(py, |pipeline| Ok(json!(pipeline.handle().registers()).to_string()))
+    /// The board's registers, as far as they are known.
+    fn registers(&self, py: Python<'_>) -> PyResult<Plain<Value>> {
+        self.with(py, |pipeline| Ok(Plain(json!(pipeline.handle().registers()))))
     }
 
     /// Copies for other computers, from the next batch on.
@@ -221,7 +245,7 @@ impl Live {
     }
 
     /// The next detection; None after `timeout` seconds without one, or when all is over.
-    fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<OutputParts>> {
+    fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<DetectionOut>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
         self.pipeline.check()?;
@@ -229,7 +253,7 @@ impl Live {
             Some(pipeline) => pipeline.wait(timeout, stop),
             None => Ok(None),
         })?;
-        Ok(output.map(output_parts))
+        Ok(output.map(detection_out))
     }
 
     /// Whether the pipeline has ended.
@@ -237,13 +261,13 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.is_over())).unwrap_or(true)
     }
 
-    /// Counts of what came and what became of it: JSON.
-    fn counters(&self, py: Python<'_>) -> PyResult<String> {
+    /// Counts of what came and what became of it.
+    fn counters(&self, py: Python<'_>) -> PyResult<Plain<Value>> {
         self.with(py, |pipeline| {
             let counters = pipeline.counters();
             let mut all = json!(counters);
             all["arrival"] = json!(counters.arrival(taxel_live::recording::now_ns()));
-            Ok(all.to_string())
+            Ok(Plain(all))
         })
     }
 
@@ -274,14 +298,14 @@ impl Live {
         self.with(py, |pipeline| pipeline.sample(name, arrived_ns, &values))
     }
 
-    /// Takes the values that taxels (column, row) hold for their rest from now on: t in us, column, row, rest after and before.
-    fn zero(&self, py: Python<'_>, taxels: Vec<(u16, u16)>) -> PyResult<Vec<ZeroingOut>> {
-        self.with(py, |pipeline| pipeline.handle().zero(&taxels)).map(|all| all.into_iter().map(zeroing_out).collect())
+    /// Takes the values that taxels (column, row) hold for their rest from now on.
+    fn zero(&self, py: Python<'_>, taxels: Vec<(u16, u16)>) -> PyResult<Plain<Vec<Zeroing>>> {
+        self.with(py, |pipeline| pipeline.handle().zero(&taxels).map(Plain))
     }
 
     /// The latest zeroing of each taxel that was zeroed.
-    fn zeroed(&self, py: Python<'_>) -> PyResult<Vec<ZeroingOut>> {
-        self.with(py, |pipeline| Ok(pipeline.handle().zeroed().0)).map(|all| all.into_iter().map(zeroing_out).collect())
+    fn zeroed(&self, py: Python<'_>) -> PyResult<Plain<Vec<Zeroing>>> {
+        self.with(py, |pipeline| Ok(Plain(pipeline.handle().zeroed().0)))
     }
 
     /// Writes a note into the recording.
@@ -289,11 +313,11 @@ impl Live {
         self.with(py, |pipeline| pipeline.note(text))
     }
 
-    /// Records what comes from here on; returns how a recording that ran ended, as JSON.
-    fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<String>> {
+    /// Records what comes from here on; returns how a recording that ran ended.
+    fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<Ended>> {
         let record = to_record(path, compression, overwrite)?;
         let ended = self.with(py, |pipeline| pipeline.record(&record))?;
-        Ok(ended.map(|summary| json!(summary).to_string()))
+        Ok(ended.map(Ended::from))
     }
 
     /// Lets the recording that runs begin anew where it holds nothing; returns whether it does.
@@ -301,9 +325,9 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.record_again()))
     }
 
-    /// Ends the recording that runs; returns how, as JSON.
-    fn end_recording(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(json!(self.with(py, Pipeline::end_recording)?).to_string())
+    /// Ends the recording that runs; returns how.
+    fn end_recording(&self, py: Python<'_>) -> PyResult<Ended> {
+        self.with(py, Pipeline::end_recording).map(Ended::from)
     }
 
     /// Whether a recording that `record` began runs.
@@ -316,8 +340,8 @@ impl Live {
         self.with(py, |pipeline| pipeline.expect_version(version))
     }
 
-    /// Ends; returns counters, verdict and path as JSON, the same at every call.
-    fn stop(&self, py: Python<'_>) -> PyResult<String> {
+    /// Ends; returns how, the same at every call.
+    fn stop(&self, py: Python<'_>) -> PyResult<Ended> {
         self.pipeline.check()?;
         if IN_CALLBACK.get() {
             let text =
@@ -329,25 +353,24 @@ impl Live {
             self.pipeline.read().iter().for_each(Pipeline::end);
             let mut summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(pipeline) = self.pipeline.take() {
-                *summary = Some(json!(pipeline.stop()?).to_string());
+                *summary = Some(pipeline.stop()?);
             }
             let ended = summary.clone();
             ended.ok_or_else(|| taxel_live::Error::from(problem!("live: ended by an error, which was raised then")))
         })
+        .map(Ended::from)
     }
 }
 
-/// The serial ports that the system knows, as JSON.
+/// The serial ports that the system knows.
 #[pyfunction]
-fn serial_ports(py: Python<'_>) -> PyResult<String> {
-    let ports = enter(py, |_| taxel_live::ports::ports())?;
-    Ok(json!(ports).to_string())
+pub fn serial_ports(py: Python<'_>) -> PyResult<Plain<Vec<ports::Port>>> {
+    enter(py, |_| ports::ports()).map(Plain)
 }
 
-/// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; returns the counts as JSON.
+/// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; returns the counts.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
-fn send(
+pub fn send(
     py: Python<'_>,
     host: &str,
     port: u16,
@@ -356,18 +379,10 @@ fn send(
     period_us: f64,
     seconds: f64,
     segment: bool,
-) -> PyResult<String> {
-    let counts = enter(py, |stop| {
+) -> PyResult<Plain<Value>> {
+    enter(py, |stop| {
         let mut sender = Sender::open(of_host(host, port)?, segment)?;
         sender.repeat(&datagrams, each, period_us, seconds, stop)?;
-        Ok::<_, taxel_live::Error>(sender.counts())
-    })?;
-    Ok(json!(counts).to_string())
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Live>()?;
-    module.add_function(wrap_pyfunction!(live_defaults, module)?)?;
-    module.add_function(wrap_pyfunction!(serial_ports, module)?)?;
-    module.add_function(wrap_pyfunction!(send, module)?)
+        Ok::<_, taxel_live::Error>(Plain(json!(sender.counts())))
+    })
 }

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, whole
 from taxel._base.arguments import text as checked_text
+from taxel._base.errors import refused
 from taxel._base.messages import warn
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -163,7 +164,7 @@ def gains(array: Array, curve: Curve, laid: Sequence[Laid], each: bool) -> tuple
     if not each:
         return every, common
     if not any(loading.alone for loading in laid):
-        raise ProblemError("each: no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
+        raise refused("each", ": no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
     share = np.array([loading.by_taxel(curve) / loading.load for loading in laid if loading.alone])
     squares = (share**2).sum(axis=0)
     np.divide(share.sum(axis=0), squares, out=every, where=squares > 0)

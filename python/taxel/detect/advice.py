@@ -47,10 +47,11 @@ _CHANCE = 0.05
 
 
 class Advice(NamedTuple):
-    """What may help a label, and how that is known."""
+    """What may help a label, how that is known, and the option of `taxel train` that it is."""
 
     helps: str
     because: str
+    option: str | None = None
 
 
 def advised(
@@ -178,7 +179,11 @@ def _other_recipe(made: Trained, examples: Sequence[Example]) -> Advice | None:
     if used is None or isinstance(source, SpikeTrains):
         return None
     fits, why = recipes.chosen(source, made.readout.labels)
-    return None if fits == used else Advice(f"--recipe {fits}", f"it is made for {why}; this training took {used}")
+    return (
+        None
+        if fits == used
+        else Advice(f"--recipe {fits}", f"it is made for {why}; this training took {used}", "--recipe")
+    )
 
 
 def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advice | None:
@@ -187,9 +192,11 @@ def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advic
     if times.held >= TOUCH:
         late_ms = 0.0 if alignment is None or alignment.train is None else -alignment.median_ms
         why = f", as labels lie {late_ms:.0f} ms after what was felt (median)" * (late_ms > to_ms(_BEFORE_US))
-        return Advice("another tare", f"it holds a touch of {times.held} taxels{why}; give --tare SECONDS or FILE")
+        return Advice(
+            "another tare", f"it holds a touch of {times.held} taxels{why}; give one of seconds, or a file", "--tare"
+        )
     if times.loaded >= TOUCH:
-        return Advice("another tare", f"{times.loaded} taxels read above theirs while nothing touches them")
+        return Advice("another tare", f"{times.loaded} taxels read above theirs while nothing touches them", "--tare")
     if alignment is None:
         return None
     # Where no input follows the labels none was moved.
@@ -229,16 +236,18 @@ def _advice(
         array = made.readout.array
         size = "ROWSxCOLUMNSxMM" if array is None else f"{array.rows}x{array.columns}xMM"
         because = "channels in a row at a known distance, MM mm, have neighbours; then the recipe touch fits"
-        return Advice(f"--array {size}", because)
+        return Advice(f"--array {size}", because, "--array")
     if chance and any(isinstance(encoder, Moments) for encoder in made.recipe.encoder._each()):
         return Advice(
             "other kinds",
             f"{chance}: the inputs of this recipe are moments of the picture, as area and load, and its centre, which "
             "is tried where these tell too few; where kinds differ otherwise, --recipe gait_plate, whose inputs are "
             "the taxels, may tell them, and taxel information says whether they differ; or labels are few or mixed up",
+            "--recipe",
         )
     if search_s is not None and 2 * learnt > wrong and points > 1:
-        return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
+        because = f"it tries {points} sets of parameters, in about {points * search_s:.0f} s"
+        return Advice("--search", because, "--search")
     return Advice("more labels", f"of those that it learnt {alone.missed} are missed, and {alone.false} are false")
 
 
@@ -277,8 +286,10 @@ def _by_rule(made: Trained, left: int, wrong: int) -> Advice:
     """Return the recipe that has the inputs of plain rules, if this one has not; else the rule itself."""
     because = f"leaves {left} missed and false on the same labels, the neuron {wrong}"
     if _for_touch(made) and not any(isinstance(encoder, ContactArea) for encoder in made.recipe.encoder._each()):
-        return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}")
-    return Advice("the plain rule", f"it {because}; taxel train --rule FILE writes it, and taxel detect runs it")
+        return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}", "--recipe")
+    return Advice(
+        "the plain rule", f"it {because}; taxel train --rule FILE writes it, and taxel detect runs it", "--rule"
+    )
 
 
 def fallen(examples: Sequence[Example]) -> str:

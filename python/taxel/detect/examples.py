@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taxel._base.arguments import column, instance, shown, text
+from taxel._base.errors import refused
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -112,7 +113,7 @@ def checked(examples: Sequence[Example]) -> list[Example]:
     ProblemError : no example at all, or one that is invalid (names its place)
     """
     if not isinstance(examples, Sequence) or not len(examples):
-        raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
+        raise refused("examples", f" is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
         whole = isinstance(example, tuple) and len(example) in (2, 3, 4, 5)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, number, shown
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5
 from taxel._core import FormatError, ProblemError
@@ -204,7 +205,7 @@ def _spike(spike_ms: object) -> float | None:
         return None
     length = number("spike_ms", spike_ms)
     if not 1e-6 <= length <= 1000.0:
-        raise ProblemError(f"spike_ms is {length:g}: must lie between 0.000001 and 1000")
+        raise refused("spike_ms", f" is {length:g}: must be from 1e-6 to 1000")
     return length
 
 

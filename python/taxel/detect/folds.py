@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import pairwise
@@ -14,8 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, finite, flag, instance, several, shown, whole, window
+from taxel._base.arguments import finite, flag, instance, several, shown, whole, window
+from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
+from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect.ages import in_pictures
 from taxel.detect.examples import Example, array_of, checked, unit_of
@@ -118,7 +120,7 @@ def judge(
     search: bool = False,
     window_ms: float = 50.0,
     frame_us: float | None = None,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> Judged:
     """Train once a fold, and score the detections in the data that the fold tests; and those of plain rules likewise.
 
@@ -135,8 +137,8 @@ def judge(
         Of the scores.
     frame_us : float, us, optional
         As in `taxel.detect.run`.
-    progress : function of str, optional
-        Called with a line before each step.
+    progress : function of (step, done, all), optional
+        Called before each step; of folds with how many are done, else with 0 of 0.
 
     Returns
     -------
@@ -156,7 +158,7 @@ def judge(
     1
     """
     examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
-    report = _reporting(progress)
+    report = reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
     whole = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
@@ -166,7 +168,7 @@ def judge(
     detections: dict[int, list[Detections]] = {}
     trained = []
     for n, fold in enumerate(ways):
-        report(f"fold {n + 1} of {len(ways)}")
+        report(f"fold {n + 1} of {len(ways)}", n, len(ways))
         plan = recipe
         if search:
             inner = fold.inner or INNER
@@ -205,7 +207,7 @@ def choose(
     k: int | Sequence[Fold] = INNER,
     window_ms: float = 50.0,
     frame_us: float | None = None,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> Recipe:
     """Return the recipe with, for each neuron, the point of those that it lists which is best on held-out data.
 
@@ -249,7 +251,7 @@ def choose(
     examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
     unit_of(examples)
     recipe = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
-    report = _reporting(progress)
+    report = reporting(progress)
     parts = [Part(n) for n in range(len(examples))]
     ways = whole("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
@@ -265,7 +267,7 @@ def _chosen(
     parts: Sequence[Part],
     window: float,
     clocks: Sequence[Clock],
-    report: Callable[[str], object],
+    report: Progress,
 ) -> Recipe:
     """Return the recipe with the best point of each neuron; `patterns` are the examples as spike trains.
 
@@ -300,7 +302,7 @@ def _marks(
     folds: Sequence[Fold],
     window: float,
     clocks: Sequence[Clock],
-    report: Callable[[str], object],
+    report: Progress,
 ) -> list[tuple[int, float]]:
     """Return the `Score.rank` over all folds of each of several recipes for one label.
 
@@ -317,12 +319,12 @@ def _marks(
         known: Known = {}
         for m in in_turn:
             plan = plans[m]
-            report(f"trying parameters {m + 1} of {len(plans)} for {label}, on part {n + 1} of {len(folds)}")
+            report(f"trying parameters {m + 1} of {len(plans)} for {label}, on part {n + 1} of {len(folds)}", 0, 0)
             if m in refused:
                 continue
             if rows is None or not rows.fits(plan):
                 try:
-                    rows = Fitting(training, plan, label, array, lambda _: None, known=known)
+                    rows = Fitting(training, plan, label, array, reporting(None), known=known)
                 except ProblemError:  # as where two labels lie within a longer refractory time
                     if m == 0:
                         raise
@@ -443,10 +445,6 @@ def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[
     return None
 
 
-def _reporting(progress: Callable[[str], object] | None) -> Callable[[str], object]:
-    return (lambda _: None) if progress is None else callback("progress", progress)
-
-
 def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequence[Fold], str]:
     """Return folds, made or given, and what they hold out."""
     if isinstance(k, Sequence) and not isinstance(k, str):
@@ -455,7 +453,7 @@ def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequen
     parts = [Part(n) for n in range(len(examples))]
     recordings = len(_grouped(examples, parts))
     if recordings > 1 and count > recordings:
-        raise ProblemError(f"folds is {count}: must be 2 to {recordings}, the number of recordings")
+        raise refused("folds", f" is {count}: must be 2 to {recordings}, the number of recordings")
     how = f"{count} blocks of time" if recordings == 1 else f"whole recordings, {count} folds"
     return _split(examples, parts, count), how
 
@@ -471,7 +469,7 @@ def _grouped(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Pa
 def _sound(folds: Sequence[Fold], examples: int) -> list[Fold]:
     """Return folds with the places of examples as whole numbers; refuse those that make no sense."""
     if not len(folds):
-        raise ProblemError("folds is empty: must be one Fold or more")
+        raise refused("folds", " is empty: must be one Fold or more")
     tested: dict[int, list[Part]] = {}
     sound = []
     for n, fold in enumerate(folds):
@@ -563,9 +561,10 @@ def _between_events(times: NDArray[np.int64], count: int) -> Iterator[float]:
     """Yield where a part is cut: in the longest pause near each share of its events, us."""
     reach = max(1, len(times) // (2 * count))
     if len(times) < 2 * count:
-        raise ProblemError(
-            f"folds is {count}: one recording with {counted(len(times), 'event')} has room for {len(times) // 2}, as "
-            "each holds two events or more"
+        raise refused(
+            "folds",
+            f" is {count}: one recording with {counted(len(times), 'event')} has room for {len(times) // 2}, as "
+            "each holds two events or more",
         )
     for n in range(1, count):
         near = np.arange(max(1, n * len(times) // count - reach + 1), min(len(times), n * len(times) // count + reach))

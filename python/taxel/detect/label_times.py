@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.progress import reporting
 from taxel._core import ProblemError
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
@@ -65,7 +66,7 @@ def off_by(examples: Sequence[Example], labels: Sequence[str], noise_floor: floa
         return {}
     early = [example if (tare := _early(example)) is None else example._replace(tare=tare) for example in examples]
     floor = measured_floor(early) or noise_floor
-    loads = Loads(early, [clock_of(example) for example in early], floor, lambda _: None, ("area",))
+    loads = Loads(early, [clock_of(example) for example in early], floor, reporting(None), ("area",))
     felt = [edge.t for edge in loads.edges("area", TOUCH, 1.0, 1)]
     found = {}
     for label in labels:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.progress import Progress
 from taxel.detect.detector import tare_text
 from taxel.detect.examples import Example, unit_of
 from taxel.detect.scoring import APART_US
@@ -58,7 +59,7 @@ class Loads:
         examples: Sequence[Example],
         clocks: Sequence[Clock],
         noise_floor: float,
-        report: Callable[[str], object],
+        report: Progress,
         quantities: Sequence[str] = ("area", "total", "local_load"),
     ) -> None:
         self.noise_floor, self.unit = noise_floor, unit_of(examples)
@@ -72,7 +73,7 @@ class Loads:
         self._edges: dict[tuple[str, float, float, int], tuple[FoundTimes, FoundTimes]] = {}
         self._ages: dict[float, FoundTimes] = {}
         for quantity in quantities:
-            report(f"measuring the {quantity.replace('_', ' ')} for plain rules")
+            report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
             self._curves[quantity] = [
                 _curve(quantity, noise_floor, example, *clock) for example, clock in zip(examples, clocks, strict=True)
             ]

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._base.saved import read
 from taxel._core import NotFittedError, ProblemError
@@ -109,11 +110,11 @@ class Readout(_Detector):
     ) -> None:
         instance("encoder", encoder, Encoder)
         if not isinstance(neurons, Mapping) or not neurons:
-            raise ProblemError(f"neurons is {shown(neurons)}: must be trained neurons by label, one or more")
+            raise refused("neurons", f" is {shown(neurons)}: must be trained neurons by label, one or more")
         named = {} if inputs is None else mapping("inputs", inputs)
         for label in named:
             if label not in neurons:
-                raise ProblemError(f"inputs: no neuron {shown(label)}: there are {', '.join(map(str, neurons))}")
+                raise refused("inputs", f": no neuron {shown(label)}: there are {', '.join(map(str, neurons))}")
         trained = {
             text("label", label): _trained(label, cell, delay_ms, named.get(label)) for label, cell in neurons.items()
         }
@@ -434,7 +435,7 @@ def run_counting(
         source = recorded(source)
     if isinstance(source, SpikeTrains):
         if not isinstance(readout, Readout):
-            raise ProblemError(f"source is {shown(source)}: a plain rule reads a recording, events or frames")
+            raise refused("source", f" is {shown(source)}: a plain rule reads a recording, events or frames")
         return _run_spikes(readout, source), None
     if isinstance(source, Events | Frames):
         readout._check_unit(unit_of(source))
@@ -446,8 +447,8 @@ def run_counting(
         columns, outside = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings, begin_us)
         return Detections._from_parts(columns), outside
     if not isinstance(source, Frames):
-        raise ProblemError(
-            f"source is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
+        raise refused(
+            "source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
     columns, outside = _core.readout_run_frames(text, source._parts(), period, rest, begin_us)
     return Detections._from_parts(columns), outside
@@ -487,7 +488,7 @@ def _trained(
     """Return a neuron with weights, delay and inputs, given a learner or a tuple."""
     if isinstance(delay_ms, Mapping):
         if label not in delay_ms:
-            raise ProblemError(f"delay_ms: there is none for {label!r}")
+            raise refused("delay_ms", f": there is none for {label!r}")
         delay_ms = delay_ms[label]
     delay, named = delay_ms, () if inputs is None else inputs
     if isinstance(cell, tuple) and len(cell) in (2, 3, 4):

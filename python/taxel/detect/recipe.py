@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from taxel._base.arguments import finite, flag, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.errors import helped, refused
 from taxel._core import ProblemError
 from taxel.detect import recipes
 from taxel.detect.examples import Example
@@ -80,12 +81,12 @@ class Recipe:
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
         if not finite("run_threshold", self.run_threshold) > 0:
-            raise ProblemError(f"run_threshold is {shown(self.run_threshold)}: must be above 0 and finite")
+            raise refused("run_threshold", f" is {shown(self.run_threshold)}: must be above 0 and finite")
         text("about", self.about)
         text("source", self.source)
         flag("align", self.align)
         if not isinstance(self.neurons, Mapping):
-            raise ProblemError(f"neurons is {shown(self.neurons)}: must be parameters by label")
+            raise refused("neurons", f" is {shown(self.neurons)}: must be parameters by label")
         learner_from("learner", self.learner)
         for label in self.neurons:
             self.learner_of(text("label", label))
@@ -138,7 +139,7 @@ class Recipe:
         if inputs is None:
             return self.encoder
         if not isinstance(self.encoder, Composite):
-            raise ProblemError(f"inputs is {shown(inputs)}: there is one encoder, so leave it out")
+            raise refused("inputs", f" is {shown(inputs)}: there is one encoder, so leave it out")
         return self.encoder.only(several("inputs", inputs))
 
     def inputs_of(self, label: str) -> tuple[str, ...]:
@@ -349,10 +350,9 @@ def _encoder_of(values: Mapping[str, Any]) -> Encoder:
     """Return the encoder of a recipe's plain values, or several as a composite."""
     single, each = values.get("encoder"), values.get("encoders")
     if isinstance(single, Mapping) == isinstance(each, Mapping):
-        wrong = "both encoder and encoders: name one of the two" if single is not None and each is not None else ""
-        raise ProblemError(
-            f"recipe: says {wrong or 'no encoder: name one, as --encoder contact_area or [encoder] in the recipe'}"
-        )
+        if single is not None and each is not None:
+            raise refused("recipe", ": says both encoder and encoders: name one of the two")
+        raise helped(ProblemError("the recipe says no encoder, as [encoder] does"), "encoder", "give")
 
     def stated(encoder: Mapping[str, Any]) -> Encoder:
         return Encoder.from_json(parameters({n: None if v == "none" else v for n, v in encoder.items()}))
@@ -392,7 +392,7 @@ def with_floor(values: Mapping[str, Any], noise_floor: float) -> dict[str, Any]:
 def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return values changed at dotted keys; a change for all neurons takes precedence over a neuron's own value."""
     if not isinstance(changes, Mapping):
-        raise ProblemError(f"changes is {shown(changes)}: must be values by dotted key")
+        raise refused("changes", f" is {shown(changes)}: must be values by dotted key")
     values = json.loads(json.dumps(values))
     for key in changes:
         table, _, name = text("key", key).partition(".")
@@ -425,7 +425,7 @@ def _check_age(place: str, delay_ms: float, encoder: Encoder) -> None:
 def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     """Return the learner that plain values describe, and the delay it is trained with (ms); `name` is for errors."""
     if not isinstance(values, Mapping):
-        raise ProblemError(f"{name} is {shown(values)}: must be parameters by name")
+        raise refused(name, f" is {shown(values)}: must be parameters by name")
     values = {key: value for key, value in values.items() if key != "inputs"}
     delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0), "ms")
     # In a recipe a neuron's parameters stand among the learner's, which is trained on a grid whatever its clock.
@@ -434,8 +434,8 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     neuron = [key for key in Neuron().get_params() if key != "time"]
     for key in values:
         if key not in learner + neuron:
-            raise ProblemError(
-                f"{name}: no parameter {shown(key)}: there are {', '.join(neuron + learner)}, delay_ms and inputs"
+            raise refused(
+                name, f": no parameter {shown(key)}: there are {', '.join(neuron + learner)}, delay_ms and inputs"
             )
     nested = {f"neuron__{key}" if key in neuron else key: value for key, value in values.items()} | {
         "neuron__time": "grid"

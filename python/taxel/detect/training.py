@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, instance, parameters, shown
+from taxel._base.arguments import instance, parameters, shown
+from taxel._base.errors import helped
 from taxel._base.messages import collected, counted, warn
+from taxel._base.progress import Progress, reporting
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -49,12 +51,6 @@ _FEWER = 3
 _FEWER_SHARE = 0.05
 #: Of fewer labels no two folds can be made.
 TWO_FOLDS = 4
-#: What may be the cause where nothing was felt.
-UNFELT = (
-    "; either the tare holds a touch, as it ends before the first label, which may be late (give --tare SECONDS), or "
-    "readings fall with pressure (falls = true in a layout file), or another source felt it (a column source in the "
-    "labels); taxel info shows what was touched"
-)
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
 
@@ -87,7 +83,7 @@ def fit(
     examples: Sequence[Example],
     recipe: Recipe,
     *,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> Readout:
     """Train a readout on labelled recordings.
 
@@ -96,8 +92,8 @@ def fit(
     examples : sequence of Example
         All of the same array. A label that an example lacks is not in it: that teaches silence.
     recipe : Recipe
-    progress : function of str, optional
-        Called with a line before each step.
+    progress : function of (step, done, all), optional
+        Called before each step; of folds with how many are done, else with 0 of 0.
 
     Returns
     -------
@@ -128,10 +124,10 @@ def fit(
     return trained(examples, recipe, progress).readout
 
 
-def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str], object] | None) -> Trained:
+def trained(examples: Sequence[Example], recipe: Recipe, progress: Progress | None) -> Trained:
     """Train a readout as `fit` does, and return how its labels were aligned as well."""
     sound, clocks = checked(examples), [clock_of(example) for example in examples]
-    report = (lambda _: None) if progress is None else callback("progress", progress)
+    report = reporting(progress)
     recipe = in_pictures(instance("recipe", recipe, Recipe), sound, clocks)
     possibly = possible(recipe, sound)
     unit = unit_of(sound)
@@ -156,9 +152,7 @@ class Encoded:
         Whether the points of a search are needed too; then all is encoded at once.
     """
 
-    def __init__(
-        self, examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object], *, search: bool = False
-    ) -> None:
+    def __init__(self, examples: Sequence[Example], recipe: Recipe, report: Progress, *, search: bool = False) -> None:
         labels = recipe._labels(examples)
         given = search or any(isinstance(example.source, SpikeTrains) for example in examples)
         #: The recipe with the parts of `patterns`.
@@ -189,14 +183,14 @@ class Encoded:
         return mine
 
 
-def encoded(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> list[Example]:
+def encoded(examples: Sequence[Example], recipe: Recipe, report: Progress) -> list[Example]:
     """Return (checked) examples with the spike trains of the recipe's encoder as their sources."""
     array_of(examples)
     results = []
     for k, example in enumerate(examples):
         trains = example.source
         if not isinstance(trains, SpikeTrains):
-            report(f"encoding {k + 1} of {len(examples)}")
+            report(f"encoding {k + 1} of {len(examples)}", 0, 0)
             encoder = recipe.encoder if example.tare is None else recipe.encoder.with_tare(example.tare)
             trains = encoder.encode(trains)
         results.append(example._replace(source=trains.split_by_sign() if trains.signed else trains))
@@ -218,7 +212,7 @@ def readout_of(
     return Readout(encoder, learners, array=array, delay_ms=delays_ms, run_threshold=threshold, inputs=inputs)
 
 
-def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
+def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Progress) -> Trained:
     """Fit the learner of each of a recipe's labels on encoded examples; see `fit`."""
     learners, delays, alignments, ranges = {}, {}, {}, {}
     points = dict(recipe.neurons)
@@ -242,7 +236,7 @@ class _Fit(NamedTuple):
     caught: list[str]
 
 
-def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, report: Callable[[str], object]) -> _Fit:
+def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, report: Progress) -> _Fit:
     """Return the first of the points to choose from, or a later one that leaves fewer events missed or false.
 
     They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
@@ -263,7 +257,7 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
     try:
         best = fitted(points[0], 0)
     except ProblemError as error:
-        if not str(error).endswith(UNFELT):
+        if error.hint != "unfelt":
             raise
         refused = error
     usual = max(_FEWER, _FEWER_SHARE * count)
@@ -293,7 +287,7 @@ def _fitted(
     plan: Recipe,
     label: str,
     array: Array | None,
-    report: Callable[[str], object],
+    report: Progress,
     point: Mapping[str, Any],
     place: int,
     known: Known,
@@ -336,7 +330,7 @@ class Fitting:
         recipe: Recipe,
         label: str,
         array: Array | None,
-        report: Callable[[str], object],
+        report: Progress,
         place: int = 0,
         known: Known | None = None,
     ) -> None:
@@ -387,7 +381,7 @@ class Fitting:
         self._check_felt(trains)
         silent = self._silent(followed, sources, whole, ages, learner._on_grid())
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
-        report(self._what)
+        report(self._what, 0, 0)
         try:
             self._rows = learner.prepare(trains, self._targets, silence=silent)
         except ProblemError as error:
@@ -427,10 +421,9 @@ class Fitting:
         for name, train, times in zip(self._names, trains, self._targets, strict=True):
             if len(times) and not len(train.times):
                 where = name if len(trains) > 1 else "the recording"
-                raise ProblemError(
-                    f"{self._label}: nothing was felt in {where} up to the last of its "
-                    f"{counted(len(times), 'event')}{UNFELT}"
-                )
+                events = counted(len(times), "event")
+                error = ProblemError(f"{self._label}: nothing was felt in {where} up to the last of its {events}")
+                raise helped(error, "tare", "unfelt")
 
     def fits(self, recipe: Recipe) -> bool:
         """Whether the learner that a recipe describes needs these rows."""
@@ -465,7 +458,7 @@ class Fitting:
                 cone,
                 start=self._before,
                 progress=lambda n, _rows, _objective, gap: self._report(
-                    f"{self._what}, round {n}: weights at most {gap:.2%} from the best"
+                    f"{self._what}, round {n}: weights at most {gap:.2%} from the best", 0, 0
                 ),
             )
         begins = [_begin_ms(source) for source in self._sources]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, number, several, text
-from taxel._core import ProblemError
+from taxel._base.arguments import number, several, text
+from taxel._base.errors import refused
+from taxel._base.progress import Progress, reporting
 from taxel.detect.examples import Example, checked
 from taxel.detect.loads import FoundTimes, Loads, Stretch, clock_of
 from taxel.detect.plain_rule import PlainRule
@@ -54,7 +55,7 @@ def tune(
     *,
     window_ms: float = 50.0,
     noise_floor: float = 3.0,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, PlainRule | None]:
     """Return for each label the plain rule with the fewest missed and false detections, and of these the nearest one.
 
@@ -77,8 +78,8 @@ def tune(
         How far a detection may lie from its label.
     noise_floor : float, 0 or more, in the sensor's unit (ticks)
         The board's.
-    progress : function of str, optional
-        Called with a line before each step.
+    progress : function of (step, done, all), optional
+        Called before each step; of folds with how many are done, else with 0 of 0.
 
     Returns
     -------
@@ -106,14 +107,14 @@ def tune(
     """
     clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
     sound = checked(examples)
-    report = (lambda _: None) if progress is None else callback("progress", progress)
+    report = reporting(progress)
     names = (
         sorted({name for example in sound for name in example.labels}) if labels is None else several("labels", labels)
     )
     names = [text("labels", name) for name in names]
     width_ms = number("window_ms", window_ms, "ms")
     if not 0.0 <= width_ms <= 3_600_000.0:
-        raise ProblemError(f"window_ms is {width_ms:g}: must lie between 0 and 3600000")
+        raise refused("window_ms", f" is {width_ms:g}: must be from 0 to 3600000")
     floor = number("noise_floor", noise_floor)
     if any(isinstance(example.source, SpikeTrains) for example in sound):
         return dict.fromkeys(names)
@@ -188,11 +189,11 @@ def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int, most: int = 
     tallies = _core.score(parts, [""] * len(true), true, np.full(len(true), width_us, np.int64))
     if not tallies:
         return _Fit(0, np.inf, np.inf)
-    _, _, _, missed, false, _, errors, delays = tallies[0]
-    wrong = len(missed) + len(false)
-    if not len(delays):
+    tally = tallies[0]
+    wrong = len(tally.missed_events) + len(tally.false_detections)
+    if not len(tally.delays_ms):
         return _Fit(wrong, np.inf, np.inf)
-    return _Fit(wrong, float(np.median(np.abs(delays))), float(np.median(np.abs(errors))))
+    return _Fit(wrong, float(np.median(np.abs(tally.delays_ms))), float(np.median(np.abs(tally.errors_ms))))
 
 
 def _for_kinds(
@@ -211,7 +212,7 @@ def _for_kinds(
     for age, (t, known, areas) in touches.items():
         parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
         tallies = _core.score(parts, [""] * len(every), every[order], np.full(len(every), width_us, np.int64))
-        pairs = tallies[0][1:3] if tallies else (np.empty(0, np.int64), np.empty(0, np.int64))
+        pairs = (tallies[0].detected, tallies[0].events) if tallies else (np.empty(0, np.int64), np.empty(0, np.int64))
         second = is_second[pairs[1]]
         if second.all() or not second.any():
             continue

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 from taxel import _core
 from taxel._base.arguments import instance, several, shown, whole
 from taxel._base.arguments import text as checked_text
+from taxel._base.errors import refused
 from taxel._base.parameters import Value
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -89,7 +90,7 @@ class Encoder(Value):
         2
         """
         if not isinstance(text, str):
-            raise ProblemError(f"encoder is {shown(text)}: must be JSON text")
+            raise refused("encoder", f" is {shown(text)}: must be JSON text")
         return Encoder._of(json.loads(_core.check_encoder(checked_text("encoder", text))))
 
     @staticmethod

@@ -16,6 +16,7 @@ from typing import Any
 
 from taxel._base.arguments import finite, flag, mapping, several, shown, text, whole
 from taxel._base.documents import read_toml
+from taxel._base.errors import refused
 from taxel._base.files import beside, named
 from taxel._base.limits import VALUE
 from taxel._base.messages import first_line
@@ -63,12 +64,12 @@ class Table:
 
     def __post_init__(self) -> None:
         if len(text("separator", self.separator)) != 1:
-            raise ProblemError(f"separator is {shown(self.separator)}: must be one character")
+            raise refused("separator", f" is {shown(self.separator)}: must be one character")
         whole("skip_lines", self.skip_lines, 0)
         if self.time_column is not None:
             _column("time_column", self.time_column)
         if isinstance(self.leave_out, str):
-            raise ProblemError(f"leave_out is {shown(self.leave_out)}: must be a list of columns")
+            raise refused("leave_out", f" is {shown(self.leave_out)}: must be a list of columns")
         for column in several("leave_out", self.leave_out):
             _column("leave_out", column)
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
@@ -172,7 +173,7 @@ class Layout:
             # Pictures have 32 bits.
             object.__setattr__(self, "falls", finite("falls", self.falls, least=-VALUE, most=VALUE))
         if self.unit is not None and not text("unit", self.unit):
-            raise ProblemError("unit is '': must say what the readings are in")
+            raise refused("unit", " is '': must say what the readings are in")
         if self.rate_hz is not None:
             finite("rate_hz", self.rate_hz, "Hz", least=1e-9, most=1e6)
         # Refuses a pitch beside places, and places of another number than rows x columns.
@@ -255,19 +256,19 @@ class Layout:
 
 
 def advice(path: Path, says: str) -> str:
-    """Return the end of an error: which layout file beside a recording, or by ``--layout``, says what is lacking.
+    """Return the end of an error: which layout file beside a recording, or given as `layout`, says what is lacking.
 
     Examples
     --------
     >>> advice(Path("data/walk.csv.gz"), "describes a table")
-    'a layout file beside it, walk.layout.toml, or one given by --layout, describes a table (docs/files.md)'
+    'a layout file beside it, walk.layout.toml, or one given as layout, describes a table (docs/files.md)'
     """
     return f"a layout file {or_given(path)}, {says} (docs/files.md)"
 
 
 def or_given(path: Path) -> str:
     """Return which layout file is read with a recording, as part of a sentence."""
-    return f"beside it, {_name(path)}, or one given by --layout"
+    return f"beside it, {_name(path)}, or one given as layout"
 
 
 def _name(path: Path) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import callback, instance, numbers, text, whole
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.information._estimator import labelled
 from taxel.information._labels import words
 from taxel.information._threads import threads
@@ -76,10 +76,10 @@ class FoldSums:
         self.classes, self._row = labelled(y, len(self._table))
         self.folds = numbers("folds", folds, np.int64)
         if self.folds.shape != (len(self._table),):
-            raise ProblemError(f"folds has shape {self.folds.shape}: must be ({len(self._table)},), one a trial")
+            raise refused("folds", f" has shape {self.folds.shape}: must be ({len(self._table)},), one a trial")
         self._names = np.unique(self.folds)
         if len(self._names) < 2:
-            raise ProblemError(f"folds names {len(self._names)}: must be two at least")
+            raise refused("folds", f" names {len(self._names)}: must be two at least")
         self._dtype = np.float32 if is_exact(self._table) else np.float64
         self._shift = None if self._dtype == np.float32 else self._table.mean(0, dtype=np.float64)
         self._sums: dict[int, ClassMoments] = {}
@@ -144,7 +144,7 @@ class FoldSums:
             merge = instance("merge", merge, dict)
             missing = [name for name in self.classes.tolist() if name not in merge]
             if missing:
-                raise ProblemError(f"merge says nothing of class {missing[0]!r}")
+                raise refused("merge", f" says nothing of class {missing[0]!r}")
             classes, into = np.unique(
                 words("merge", [merge[name] for name in self.classes.tolist()]), return_inverse=True
             )

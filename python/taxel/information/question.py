@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import number, several, shown, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
@@ -54,7 +55,7 @@ class Question:
 
     def __post_init__(self) -> None:
         if not self.trials:
-            raise ProblemError("trials is []: must hold one at least")
+            raise refused("trials", " is []: must hold one at least")
         shape = self.trials[0].array.shape
         differing = next((trial for trial in self.trials if trial.array.shape != shape), None)
         if differing is not None:
@@ -70,7 +71,7 @@ class Question:
         if self.encoder is None:
             self.encoder = ChangeEvents(noise_floor=floor_of(self.trials))
         if not isinstance(self.encoder, ChangeEvents | FA1):
-            raise ProblemError(f"encoder is {shown(self.encoder)}: must be ChangeEvents or FA1, one train a taxel")
+            raise refused("encoder", f" is {shown(self.encoder)}: must be ChangeEvents or FA1, one train a taxel")
         sources = {id(trial.source): trial.source for trial in self.trials}
         held = {key: HeldValues(source) for key, source in sources.items()}
         self.held = [held[id(trial.source)] for trial in self.trials]
@@ -83,8 +84,8 @@ class Question:
         else:
             reach = to_us(number("window_ms", self.window_ms))
             if not self.finest <= reach < 1e12:
-                raise ProblemError(
-                    f"window_ms is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least, and below 1e9"
+                raise refused(
+                    "window_ms", f" is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least, and below 1e9"
                 )
         self.contact = contacts(self.trials, self.held, self.encoder, self.finest, reach)
         if np.isnan(self.contact).all():
@@ -94,7 +95,7 @@ class Question:
                     f"{self.trials[0].name}: its pictures all lie within {lasts} us, so they have no times; "
                     "give them some (taxel.Frames)"
                 )
-            raise ProblemError(f"trials: no event in any of them by {self.encoder!r}; a lower noise_floor may help")
+            raise refused("trials", f": no event in any of them by {self.encoder!r}; a lower noise_floor may help")
         ends = np.array([np.inf if trial.stop_us is None else trial.stop_us for trial in self.trials])
         self.ended = bool(np.isfinite(ends).all())
         lengths = (ends - self.contact)[~np.isnan(self.contact)]
@@ -123,15 +124,15 @@ class Question:
         else:
             chosen = [to_us(number("periods_ms", p)) for p in several("periods_ms", periods_ms)]
             if any(not 0 < p <= window or abs(p - round(p)) > 1e-6 for p in chosen):
-                raise ProblemError(f"periods_ms is {shown(periods_ms)}: must be whole us, up to {to_ms(window):g} ms")
+                raise refused("periods_ms", f" is {shown(periods_ms)}: must be whole us, up to {to_ms(window):g} ms")
             self.periods = checked_periods([round(p) for p in chosen], self.finest)
         if windows_ms is None:
             self.windows = [*[float(w) for w in _series(max(window / 40, self.finest), window * 0.99)], window]
         else:
             chosen_windows = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
             if any(not self.finest <= w <= window for w in chosen_windows):
-                raise ProblemError(
-                    f"windows_ms is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
+                raise refused(
+                    "windows_ms", f" is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
                 )
             self.windows = sorted({*chosen_windows, window})
         self.taxels_at = self.periods[0]
@@ -140,18 +141,18 @@ class Question:
             self.taxels_at = next((p for p in self.periods if p == at), 0)
             if not self.taxels_at:
                 listed = ", ".join(f"{to_ms(p):g}" for p in self.periods)
-                raise ProblemError(f"taxels_at_ms is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
+                raise refused("taxels_at_ms", f" is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
         spikes = self.spikes(self.taxels_at, 0)
         self.active, self.events = np.unique(spikes.taxel), len(spikes.taxel)
         there = len(self.active)
         numbers = [whole("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
         if taxels is not None and any(n > there for n in numbers):
-            raise ProblemError(f"taxels is {shown(taxels)}: {there} of the array's ever send an event")
+            raise refused("taxels", f" is {shown(taxels)}: {there} of the array's ever send an event")
         self.random_taxels = [n for n in numbers if n < there]
         sides = [whole("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
         rows, columns = self.trials[0].array.shape
         if pools is not None and any(n > max(rows, columns) for n in sides):
-            raise ProblemError(f"pools is {shown(pools)}: the array is {rows} x {columns}")
+            raise refused("pools", f" is {shown(pools)}: the array is {rows} x {columns}")
         self.pools = [n for n in sides if n <= max(rows, columns)]
         self.columns = self._parameter_columns()
 
@@ -226,7 +227,7 @@ def floor_of(trials: Sequence[LabelledTrial]) -> float:
     sources = {id(trial.source): trial.source for trial in trials}.values()
     largest = max(float(np.abs(source.values).max(initial=0.0)) for source in sources if isinstance(source, Frames))
     if largest == 0:
-        raise ProblemError("trials: every picture is 0")
+        raise refused("trials", ": every picture is 0")
     return float(f"{largest / 40:.2g}")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import instance, number, several, shown, text
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.sampling import Spikes
 from taxel.learn import ConeR, Tempotron
@@ -123,7 +123,7 @@ class ConeRReadout(_NeuronPerClass):
     def _check(self) -> None:
         for name in ("tau", "bound", "max_seconds"):
             if not 0 < number(name, getattr(self, name)) < np.inf:
-                raise ProblemError(f"{name} is {shown(getattr(self, name))}: must be above 0, and finite")
+                raise refused(name, f" is {shown(getattr(self, name))}: must be above 0, and finite")
 
     def _trained(self, trains: list[SpikeTrains], is_of_class: NDArray[np.bool_]) -> ConeR:
         targets = [[train.stop] if mine else [] for train, mine in zip(trains, is_of_class, strict=True)]

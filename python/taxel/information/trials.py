@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base.arguments import instance, mapping, number, path, several, shown, text, whole
+from taxel._base.errors import helped, refused
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.number_text import float_of, int_of
 from taxel._core import FormatError, ProblemError
@@ -73,7 +74,7 @@ class LabelledTrial:
 
     def __post_init__(self) -> None:
         if not isinstance(self.source, Events | Frames):
-            raise ProblemError(f"source is {shown(self.source)}: must be taxel.Events or taxel.Frames")
+            raise refused("source", f" is {shown(self.source)}: must be taxel.Events or taxel.Frames")
         text("name", self.name)
         if not text("label", self.label):
             raise ProblemError(f"{self.name}: label is empty")
@@ -154,7 +155,8 @@ def read_trials(
         ahead = ahead_us(Note(row["label"], start, host_ns or 0), recording.path, clocks.get(id(recording)), place)
         start, stop = start - ahead, None if end is None else end - ahead
         if stop is None and window_ms is None:
-            raise ProblemError(f"{where}: has no stop_us; give it, or the trials' length by --window-ms")
+            error = ProblemError(f"{where}: has no stop_us, and the length of trials is not known")
+            raise helped(error, "window_ms", "give")
         if not row["label"]:
             raise FormatError(f"{where}: label is empty")
         if row["label"].lower() == "nan":
@@ -260,7 +262,7 @@ def _source(recording: Recording) -> Events | Frames:
 
 def _window_us(window_ms: float) -> int:
     if not 0 < number("window_ms", window_ms) < 1e9:
-        raise ProblemError(f"window_ms is {shown(window_ms)}: must be above 0 and below 1e9")
+        raise refused("window_ms", f" is {shown(window_ms)}: must be above 0 and below 1e9")
     return round(to_us(window_ms))
 
 
@@ -287,9 +289,10 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
             if apart == 0:
                 raise ProblemError(f"{after.name}: begins where {before} does; a touch must stand there once")
             if trial.stop_us is None and apart < window_us:
-                raise ProblemError(
-                    f"{after.name}: begins {to_ms(apart):g} ms after {before}, inside its window of "
-                    f"{to_ms(window_us):g} ms; give stop_us, or a shorter --window-ms"
+                raise refused(
+                    "window_ms",
+                    f" is {to_ms(window_us):g}: {after.name} begins {to_ms(apart):g} ms after {before}; must be "
+                    "shorter, or the trials must have stop_us",
                 )
             if trial.stop_us is not None and after.start_us < trial.stop_us:
                 raise ProblemError(

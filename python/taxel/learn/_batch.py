@@ -48,8 +48,7 @@ class BatchLearner(SpikeLearner):
         ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
-        self.weights_, learnt = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
-        self._said = json.loads(learnt)
+        self.weights_, self._said = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
         for name, value in self._said.items():
             setattr(self, f"{name}_", value)
         return self

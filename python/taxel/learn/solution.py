@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.learn._checked import checked_examples, fitted
 from taxel.learn._exact import ExactPotential
 from taxel.learn._statement import AT_EDGE, BLOCK, PatternRows, pattern_rows
@@ -115,7 +115,7 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
     """
     w = fitted(cone)
     if not np.isfinite(w).all():
-        raise ProblemError(f"cone: is {cone.status_} and has no weights to be checked")
+        raise refused("cone", f": is {cone.status_} and has no weights to be checked")
     trained, times, _ = checked_examples(cone, len(w), patterns, targets)
     all_rows = pattern_rows(cone, cone.neuron_, trained, times, margin=Margin(0.0, 0.0))
     missed, room, slope = 0.0, np.inf, np.inf

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, several
+from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel._core import ProblemError
 from taxel.learn._learner import SpikeLearner
 from taxel.spikes import SpikeTrains
 
@@ -116,7 +116,7 @@ class STDP(SpikeLearner):
         """
         trains = [instance(f"pattern {p}", train, SpikeTrains) for p, train in enumerate(several("patterns", patterns))]
         if not trains:
-            raise ProblemError("patterns: none, must be one or more")
+            raise refused("patterns", ": none, must be one or more")
         self._neuron = _core.STDP(self._json(), len(trains[0]))
         for train in trains:
             self._neuron.rest()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from taxel import _core
 from taxel._base.arguments import flag, instance, number, several, shown, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._base.options import option
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -107,7 +108,7 @@ class LiveOptions:
         elif readout is not None and readout.array is not None:
             readout.array._warn_apart(instance("array", array, Array), "live")
         if self.say is not None and not callable(self.say):
-            raise ProblemError(f"say is {shown(self.say)}: must be a function of a Detection")
+            raise refused("say", f" is {shown(self.say)}: must be a function of a Detection")
         if readout is None and self.tare is not None:
             raise ProblemError("tare without a readout: nothing would use it")
         array = Array._of(array)

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, number, several
+from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel._core import ProblemError
 
 __all__ = ["Matching", "f1", "matching"]
 
@@ -83,7 +83,7 @@ def matching(
     fired = [floats(f"spikes[{p}]", times, "ms") for p, times in enumerate(several("spikes", spikes))]
     target_times = [floats(f"targets[{p}]", times, "ms") for p, times in enumerate(several("targets", targets))]
     if len(fired) != len(target_times):
-        raise ProblemError(f"targets: {len(target_times)} lists for {len(fired)} patterns, must be one a pattern")
+        raise refused("targets", f": {len(target_times)} lists for {len(fired)} patterns, must be one a pattern")
     pairs = _core.match_spikes(fired, target_times, number("window_ms", window_ms, "ms"))
     errors = [fired[p][j] - target_times[p][i] for p, matched in enumerate(pairs) for j, i in matched]
     matched = len(errors)

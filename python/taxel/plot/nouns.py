@@ -9,6 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from taxel._base.arguments import finite, instance, shown
+from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.detections import Detections
@@ -26,7 +27,7 @@ def axes(ax: Axes | None, size: tuple[float, float]) -> Axes:
     if ax is None:
         return plt.subplots(figsize=size, layout="constrained")[1]
     if not isinstance(ax, Axes):
-        raise ProblemError(f"ax is {shown(ax)}: must be matplotlib's Axes")
+        raise refused("ax", f" is {shown(ax)}: must be matplotlib's Axes")
     return ax
 
 

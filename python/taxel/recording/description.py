@@ -50,9 +50,9 @@ def json_of(of: Source) -> str:
         "source": of.origin.source,
         "side": sensor.side,
         "heel": sensor.heel,
-        "registers": None if registers is None else json.loads(registers._json()),
+        "registers": None if registers is None else registers._held,
         "registers_array": None if driven == sensor.array else driven._geometry(),
-        "register_changes": [[at, json.loads(held._json())] for at, held in changes],
+        "register_changes": [[at, held._held] for at, held in changes],
         "board_changes": [[change.at_ns, change._described()] for change in of.marks.board_changes()],
         "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in of.marks.notes()],
         "detections": [

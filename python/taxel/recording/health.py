@@ -12,8 +12,8 @@ from taxel import _core
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.messages import counted
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -141,7 +141,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     if isinstance(held, Events):
         return judged(held.array, _statistics_of_events(held))
     if not isinstance(held, Frames):
-        raise ProblemError(f"recorded is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
+        raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     activity, moved = (of.astype(np.int64).reshape(held.array.shape) for of in _core.changes_of_frames(held._parts()))
     # The values of pictures count from the least one.
     scale, least = ticks_by_unit(held), np.fmin.reduce(held.values, axis=None, initial=np.inf)

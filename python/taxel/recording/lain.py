@@ -30,7 +30,7 @@ def without_what_lay(recording: Recording, first_us: int) -> tuple[Tare | None, 
         return None, ""
     span, said = _without(read[0], read[1], first_us), f"{recording.path}: the rest is {read[1]}"
     if span is None:
-        return None, f"{said}, and there is no other rest, so the tare holds it; give --tare FILE"
+        return None, f"{said}, and there is no other rest, so the tare holds it; give a tare's file"
     tare = Tare.take(source, start_us=span[0], stop_us=span[1], note=str(recording.path))
     return tare, f"{said}, so the tare is of a time without it"
 
@@ -46,7 +46,7 @@ def free_of_what_lay(recording: Recording, rest: Rest) -> tuple[tuple[int, int] 
     free, said = _free(read[0], rest), f"{recording.path}: the rest is {rest}"
     span = _later(read[0], free) if len(free) else None
     if span is None:
-        return rest.quiet_us, f"{said}, and there is no other rest, so the tare holds it; give --tare FILE"
+        return rest.quiet_us, f"{said}, and there is no other rest, so the tare holds it; give a tare's file"
     return span, f"{said}, so the tare is of a time without it"
 
 

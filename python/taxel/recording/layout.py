@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen_whole
+from taxel._base.errors import refused
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -38,7 +39,7 @@ def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
     """
     if size != array.shape:
         held = " x ".join(map(str, size))
-        raise ProblemError(f"array: {array.rows} x {array.columns} taxels; {path} holds pictures of {held}")
+        raise refused("array", f": {array.rows} x {array.columns} taxels; {path} holds pictures of {held}")
 
 
 def on_array(of: S, array: Array) -> S:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import flag, instance, number, several, shown
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array, names_beside
@@ -77,7 +78,7 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
     flag("beside", beside)
     gap = None if gap_us is None else number("gap_us", gap_us)
     if gap is not None and not 0 <= gap < 2**52:
-        raise ProblemError(f"gap_us is {shown(gap_us)}: must be 0 or more")
+        raise refused("gap_us", f" is {shown(gap_us)}: must be 0 or more")
     if not sources:
         raise ProblemError("recordings: there must be one or more")
     return Recording(merged([part._contents for part in sources], gap, beside=beside))

@@ -10,6 +10,7 @@ from typing import Any
 
 from taxel._base.arguments import instance, several, text
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout
@@ -114,7 +115,7 @@ class OpenOptions:
         differs = given.pitch_mm is not None and (stated.pitch_mm, stated.places) != (given.pitch_mm, None)
         if stated.shape != given.shape or differs:
             sizes = ", ".join(self.array)
-            raise ProblemError(f"--array {sizes}: {recording.path} holds its own sensor, {stated!r}; leave it out")
+            raise refused("array", f" is {sizes}: {recording.path} holds its own sensor, {stated!r}; leave it out")
         # A .mcap holds its sensor, whose pitch may be unknown.
         if not recording.has_events or stated._is_measured or recording.kind == "mcap":
             return recording
@@ -167,5 +168,5 @@ def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordi
     """Return each sensor of recordings as one of its own; refuse what is no recording."""
     given = [recordings] if isinstance(recordings, Recording) else several(name, recordings)
     if not len(given):
-        raise ProblemError(f"{name} is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
+        raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
     return [recording for each in given for recording in sensors(instance(name, each, Recording))]

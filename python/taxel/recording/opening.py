@@ -15,6 +15,7 @@ import numpy as np
 from taxel import _core, formats
 from taxel._base import arguments, limits
 from taxel._base.arguments import flag, instance, text, whole
+from taxel._base.errors import helped
 from taxel._base.limits import opening
 from taxel._base.messages import warn
 from taxel._core import FormatError, ProblemError
@@ -287,9 +288,10 @@ def _open_one(place: Path, how: How) -> Recording:
             with_sidecars(contents if said is None else laid_out(contents, said, given=how.layout is not None))
         )
     except MemoryError:
-        raise FormatError(
-            f"{place}: needs more memory than there is ({limits.available()} bytes are available): --limit BYTES "
-            "(limit=) says how many may be read"
+        raise helped(
+            FormatError(f"{place}: needs more memory than there is ({limits.available()} bytes are available)"),
+            "limit",
+            "larger",
         ) from None
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import number
 from taxel._base.columns import frozen
+from taxel._base.errors import refused
 from taxel._base.limits import TIME_US
 from taxel._core import ProblemError
 from taxel.events import Events
@@ -34,9 +35,9 @@ def period_us(name: str, rate_hz: float) -> int:
     """
     rate = number(name, rate_hz, "Hz")
     if not 0 < rate <= 1e6:
-        raise ProblemError(f"{name} is {rate}: must be above 0, at most 1000000")
+        raise refused(name, f" is {rate}: must be above 0, at most 1000000")
     if rate < 1e-9:
-        raise ProblemError(f"{name} is {rate}: must be 1e-9 or more, a picture in 31 years")
+        raise refused(name, f" is {rate}: must be 1e-9 or more, a picture in 31 years")
     return round(1e6 / rate)
 
 

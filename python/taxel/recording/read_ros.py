@@ -10,6 +10,7 @@ from typing import Any
 
 from taxel._base import arguments
 from taxel._base.columns import frozen_whole
+from taxel._base.errors import helped, refused
 from taxel._base.messages import counted, warn
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -66,7 +67,7 @@ class Topics:
         count = max(len(topics), len(fields), len(arrays))
         for name, given in (("topic", len(topics)), ("field", len(fields)), ("array", len(arrays))):
             if given not in (0, 1, count):
-                raise ProblemError(f"{name}: given {given} times for {count} sources; must be once, or for each")
+                raise refused(name, f": given {given} times for {count} sources; must be once, or for each")
         topics = topics * count if len(topics) == 1 else topics
         every_field: Sequence[str | None] = fields * count if len(fields) == 1 else fields or [None] * count
         every_array: Sequence[Array | None] = arrays * count if len(arrays) == 1 else arrays or [None] * count
@@ -93,10 +94,11 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     FormatError : no topic is chosen, or as `taxel.formats.ros.read`
     """
     if not topics.topic:
-        raise FormatError(
-            f"{path}: a ROS bag; say what to open of it: --topic NAME --field NAME (topic=, field=), or [ros] in a "
-            f"layout file; taxel info {path} lists its topics"
+        error = FormatError(
+            f"{path}: a ROS bag, of which a topic, or [ros] in a layout file, is opened; taxel info {path} lists its "
+            "topics"
         )
+        raise helped(error, "topic", "give")
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
     sources: dict[str, Source] = {}
     for name, topic in zip(_names(path, reads), reads, strict=True):

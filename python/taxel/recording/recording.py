@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, text, window
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, plain
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -86,7 +87,7 @@ class Recording:
 
     def __init__(self, contents: Contents) -> None:
         if not isinstance(contents, Contents):
-            raise ProblemError(f"contents is {shown(contents)}: a recording is opened by taxel.open(path), not built")
+            raise refused("contents", f" is {shown(contents)}: a recording is opened by taxel.open(path), not built")
         self._contents = contents
         whole = contents.one
         self.path, self.name, self.kind = whole.origin.path, whole.origin.name, whole.origin.kind

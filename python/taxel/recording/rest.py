@@ -114,7 +114,7 @@ class Rest:
             "tare": "the given tare",
             "calibration": "the calibration's",
             "unit": "0, as the values are force or pressure",
-            "none": "not known, as no half second was quiet with nothing on it; give --tare",
+            "none": "not known, as no half second was quiet with nothing on it; a tare can be given",
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:

@@ -69,7 +69,7 @@ class Verdict(str):
     @classmethod
     def _of(cls, basis: Mapping[str, Any]) -> Self:
         """Return the verdict on what is known of a recording, which the compiled part gives."""
-        return cls._from(json.loads(_core.recording_verdict(json.dumps(basis))))
+        return cls._from(_core.recording_verdict(json.dumps(basis)))
 
     @classmethod
     def _from(cls, held: Mapping[str, Any]) -> Self:

@@ -78,7 +78,7 @@ def refuse_without_layout(path: Path) -> None:
                 "file, an array of pictures x rows x columns or pictures x taxels (docs/files.md)"
             )
         holds, lines = listed(there), _of_arrays(path, name, there)
-        says = "says which are the pictures" if len(there) > 1 else "says what it is"
+        says = "says which are the pictures" if len(there) > 1 else "or rate_hz, says what it is"
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 

@@ -97,7 +97,7 @@ def _header(of: Source) -> dict[str, Any]:
     driven = array if registers is None else registers.array
     return {
         "array": array._geometry(),
-        "registers": None if registers is None else json.loads(registers._json()),
+        "registers": None if registers is None else registers._held,
         **({} if driven == array else {"driven": driven._geometry()}),
         **_told(of),
         "source": of.origin.source,
@@ -225,11 +225,12 @@ def encoded(
     ProblemError : an array of more than 65 536 positions, or times more than 8.9 years apart
     """
     begins = None if held is None else np.ascontiguousarray(held).reshape(-1)
-    origin_us, offsets, payload, times, unmarked = _core.encode_datagrams(events._parts(), begins, clock is not None)
-    at = times * 1000 if clock is None or not len(times) else np.asarray(clock.host_ns(times), np.int64)
+    made = _core.encode_datagrams(events._parts(), begins, clock is not None)
+    at = made.times * 1000 if clock is None or not len(made.times) else np.asarray(clock.host_ns(made.times), np.int64)
     # Arrival times never decrease.
     arrived = np.maximum.accumulate(at) if len(at) else at
-    return origin_us, Datagrams(arrived, np.arange(len(arrived), dtype=np.uint64), offsets, payload), unmarked
+    datagrams = Datagrams(arrived, np.arange(len(arrived), dtype=np.uint64), made.offsets, made.payload)
+    return made.origin_us, datagrams, made.unmarked
 
 
 def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64], first: int, last: int) -> None:

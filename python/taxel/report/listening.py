@@ -16,6 +16,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
+from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._base.messages import escaped
 from taxel._base.times import begun
@@ -105,7 +106,7 @@ def write_listening(
     """
     detector("readout", readout)
     if not listened:
-        raise ProblemError("listened is empty: there is nothing to report")
+        raise refused("listened", " is empty: there is nothing to report")
     place = Path(folder)
     moments = {label: _moments(listened, label) for label in readout.labels}
     aligned = {} if alignments is None else alignments

@@ -11,7 +11,7 @@ use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeu
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
-use crate::{Array, Result, SpikeKind, problem};
+use crate::{Array, Hint, Result, SpikeKind, problem};
 
 mod file;
 #[cfg(test)]
@@ -91,10 +91,7 @@ impl Readout {
                 return Err(problem!("{label}: trained for after_spike {its}, this readout is for after_spike {mine}"));
             }
             if !(0.0..=LONGEST_DELAY_MS).contains(&cell.delay_ms) {
-                return Err(problem!(
-                    "{label}: delay_ms is {}: must lie between 0 and {LONGEST_DELAY_MS}",
-                    cell.delay_ms
-                ));
+                return Err(problem!("{label}: delay_ms is {}: must be from 0 to {LONGEST_DELAY_MS}", cell.delay_ms));
             }
             if let Some(n) = cell.weights.iter().position(|&w| !is_weight(w)) {
                 return Err(no_weight(&format!("{label}: weights[{n}]"), cell.weights[n]));
@@ -116,14 +113,14 @@ impl Readout {
 
     fn check_delays(&self) -> Result<()> {
         if self.delays_ms.is_empty() {
-            return Err(problem!("delays_ms is empty: must hold one delay or more"));
+            return Err(problem!("delays_ms"; " is empty: must hold one delay or more"));
         }
         for (k, &delay) in self.delays_ms.iter().enumerate() {
             if !(0.0..=LONGEST_DELAY_MS).contains(&delay) {
-                return Err(problem!("delays_ms[{k}] is {delay}: must lie between 0 and {LONGEST_DELAY_MS}"));
+                return Err(problem!("delays_ms"; "[{k}] is {delay}: must be from 0 to {LONGEST_DELAY_MS}"));
             }
             if k > 0 && delay <= self.delays_ms[k - 1] {
-                return Err(problem!("delays_ms[{k}] is {delay}, after {}: must ascend", self.delays_ms[k - 1]));
+                return Err(problem!("delays_ms"; "[{k}] is {delay}, after {}: must ascend", self.delays_ms[k - 1]));
             }
         }
         Ok(())
@@ -137,7 +134,9 @@ impl Readout {
                 let parts = own.named(names)?.into_iter().map(|(name, part)| (name.to_owned(), part.clone()));
                 Ok(Cow::Owned(Encoder::Composite(Composite { parts: parts.collect() })))
             }
-            (_, names) => Err(problem!("inputs are {names:?}: the encoder is no composite, so there are no others")),
+            (_, names) => {
+                Err(problem!("inputs"; " are {names:?}: the encoder is no composite, so there are no others"))
+            }
         }
     }
 
@@ -170,13 +169,19 @@ impl Readout {
         {
             let others = (mine.rows, mine.columns) == (array.rows, array.columns);
             let which = if others { ", of which others exist" } else { "" };
-            return Err(problem!(
+            let error = problem!(
                 "an array of {} x {} taxels: the readout was trained on {} x {}{which}",
                 array.rows,
                 array.columns,
                 mine.rows,
                 mine.columns
-            ));
+            );
+            let row = array.rows == 1 && array.len() == mine.len();
+            return Err(match row {
+                true if mine.rows == 1 => error.helped_by("array", Hint::Pitch),
+                true => error.helped_by("array", Hint::LayOut),
+                false => error,
+            });
         }
         for (label, cell) in &self.neurons {
             self.check_weights(label, cell, array)?;

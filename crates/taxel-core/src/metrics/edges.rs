@@ -33,7 +33,7 @@ pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Pat
         })
     };
     let Some((start, stop)) = asked.or_else(widest) else {
-        return Err(problem!("window: must be given, (start, stop) in ms, as lists of times do not say it"));
+        return Err(problem!("window"; ": must be given, (start, stop) in ms, as lists of times do not say it"));
     };
     for side in sides() {
         for (p, n) in (0..side.count).flat_map(|p| (0..side.trains).map(move |n| (p, n))) {

@@ -310,10 +310,10 @@ impl Reader {
             skipped_numbers: remarks.numbers.skipped(),
             before_first: before_first(remarks),
             so_far: remarks.counts.clone(),
-            converted: self.header().converted.clone().map(Box::new),
+            converted: self.header().conversion.converted.clone().map(Box::new),
             decoded: None,
             lines: data == Topic::Samples,
-            origin_us: self.header().origin_us,
+            origin_us: self.header().decoding.origin_us,
         }
     }
 
@@ -389,11 +389,11 @@ impl Reader {
                             *last = number;
                             *in_datagrams += data.len() as u64;
                             if *in_datagrams > most {
-                                wrong = Some(Error::format(
+                                wrong = Some(limits::too_large(
                                     &self.blocks.path,
                                     &format!(
                                         "the datagrams up to byte {} unpack to {in_datagrams} bytes; at most {most} are read \
-                                         (100 times the file and 64 MiB): --limit BYTES (limit=) says how many may be",
+                                         (100 times the file and 64 MiB)",
                                         block.offset
                                     ),
                                 ));
@@ -511,7 +511,7 @@ impl Reader {
     pub fn decode(&self, pairing: Pairing, stop: Stop<'_>) -> Result<Decoded> {
         let header = self.header();
         let array = header.array.clone();
-        let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.difference);
+        let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.decoding.difference);
         let mut sender = wire::SenderDecoder::new(decoder, 1);
         let mut decoded = Decoded::empty(Events::empty(array));
         #[allow(clippy::cast_possible_truncation)]
@@ -522,7 +522,8 @@ impl Reader {
                 let arrived = Some(message.at_ns / 1000);
                 let info = sender.push(message.data, arrived, &mut decoded.events);
                 let last = decoded.events.t.get(before..).and_then(<[i64]>::last).copied();
-                let left = leaves(&info, last, message.data.len(), frame_us).map_or(i64::MIN, |t| t + header.origin_us);
+                let left = leaves(&info, last, message.data.len(), frame_us)
+                    .map_or(i64::MIN, |t| t + header.decoding.origin_us);
                 decoded.left.push(left);
                 decoded.arrived_ns.push(message.at_ns);
                 decoded.number.push(message.number);
@@ -542,12 +543,12 @@ impl Reader {
             Ok(())
         })?;
         sender.finish_into(&mut decoded.events);
-        mark_repaired(&mut decoded.events, &header.repaired);
-        decoded.events.t.iter_mut().for_each(|t| *t += header.origin_us);
-        decoded.events.markers.iter_mut().for_each(|m| m.t += header.origin_us);
+        mark_repaired(&mut decoded.events, &header.decoding.repaired);
+        decoded.events.t.iter_mut().for_each(|t| *t += header.decoding.origin_us);
+        decoded.events.markers.iter_mut().for_each(|m| m.t += header.decoding.origin_us);
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.two().counts();
-        decoded.found = Found::of(&sender, header.origin_us);
+        decoded.found = Found::of(&sender, header.decoding.origin_us);
         Ok(decoded)
     }
 }

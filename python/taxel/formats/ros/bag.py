@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taxel._base.documents import read_text
+from taxel._base.errors import helped, refused
 from taxel._base.files import open_file
 from taxel._base.limits import CHUNK
 from taxel._base.messages import escaped, first_line, installing
@@ -75,10 +76,11 @@ class Bag:
             raise FormatError(f"{self.path}: topic {topic} has messages of several types ({', '.join(types)})")
         undefined = self.undefined(types[0])
         if undefined:
-            raise FormatError(
-                f"{self.path}: holds no definition of {undefined} (topic {topic}); give it by --types DIR (types=), a "
-                f"folder of .msg or .idl files, or by --ros NAME (ros=), one of {', '.join(_stores())}"
+            error = FormatError(
+                f"{self.path}: holds no definition of {undefined} (topic {topic}); a folder of .msg or .idl files may, "
+                f"or a release of ROS, one of {', '.join(_stores())}"
             )
+            raise helped(error, "types", "give")
         for connection in found:
             self._check_digest(connection)
         return found
@@ -218,7 +220,7 @@ def _store(connections: Sequence[Connection], types: Path | None, ros: str | Non
 
     stores = _stores()
     if ros is not None and ros not in stores:
-        raise ProblemError(f"ros is {ros}: must be one of {', '.join(stores)}")
+        raise refused("ros", f" is {ros}: must be one of {', '.join(stores)}")
     defined: dict[str, Any] = {} if ros is None else dict(get_typestore(stores[ros]).fielddefs)
     if types is not None:
         defined |= _of_folder(types, [connection.msgtype for connection in connections])

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.columns import Growing
+from taxel._base.errors import helped
 from taxel._base.limits import TIME_US, VALUE
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
@@ -175,7 +176,7 @@ class _Held:
         found = list(leaves(message))
         there = [path for path, numbers in found if numbers.size > 1]
         if len(there) > 1:
-            raise FormatError(f"say which field (--field NAME, field=); there are {_there(message)}")
+            raise helped(FormatError(f"has several fields with numbers, {_there(message)}"), "field", "give")
         if not there and not is_empty(found):
             self.trouble = "no field with more numbers than one; taxel info lists topics that have one"
         return there[0] if there else None
