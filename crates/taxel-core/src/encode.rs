@@ -258,7 +258,7 @@ impl Composite {
                 return Err(problem!("inputs"; ": {name:?} comes twice"));
             }
         }
-        let chosen = |name: &str| names.is_empty() || names.iter().any(|one| one == name);
+        let chosen = |name: &str| names.is_empty() || names.iter().any(|given| given == name);
         Ok(self.parts.iter().map(|(name, part)| (name.as_str(), part)).filter(|(name, _)| chosen(name)).collect())
     }
 
@@ -269,7 +269,7 @@ impl Composite {
     /// As [`Composite::named`].
     pub fn of_parts(&self, names: &[String], array: &Array) -> Result<Vec<bool>> {
         let named = self.named(names)?;
-        let chosen = |name: &str| named.iter().any(|(one, _)| *one == name);
+        let chosen = |name: &str| named.iter().any(|(given, _)| *given == name);
         let parts = self.parts.iter();
         Ok(parts.flat_map(|(name, part)| std::iter::repeat_n(chosen(name), inputs(part, array))).collect())
     }

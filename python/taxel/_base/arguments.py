@@ -374,7 +374,7 @@ def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ..
 def _refuse_others(name: str, values: NDArray[Any]) -> None:
     """Refuse entries of an array of objects that NumPy converts although they are no numbers: texts, None, spans."""
     if any(issubclass(kind, _NO_NUMBERS) for kind in set(map(type, values.flat))):
-        place, value = next((at, one) for at, one in np.ndenumerate(values) if isinstance(one, _NO_NUMBERS))
+        place, value = next((at, entry) for at, entry in np.ndenumerate(values) if isinstance(entry, _NO_NUMBERS))
         where = f"[{', '.join(map(str, place))}]" if place else ""
         raise refused(f"{name}{where}", f" is {shown(value)}: must be a number")
 

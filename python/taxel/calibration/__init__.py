@@ -295,8 +295,8 @@ class Calibration(Saved):
             curve = curve.bent(best_exponent(curve, laid))
         each_gain, gain = gains(array, curve, laid, flag("each", each))
         whole_fit._curve, whole_fit.gain = curve, each_gain
-        made = [one.made(curve, each_gain) for one in laid]
-        missed = np.concatenate([one.errors(curve, each_gain) for one in laid])
+        made = [loading.made(curve, each_gain) for loading in laid]
+        missed = np.concatenate([loading.errors(curve, each_gain) for loading in laid])
         unknown = 1 + (differ and exponent is None and not isinstance(curve, Table))
         unknown += int(np.count_nonzero(each_gain[there(array)] != gain)) if each else 0
         whole_fit.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
@@ -458,8 +458,8 @@ class Calibration(Saved):
         True
         """
         place = Path(checked_path("recording", recording))
-        own = f"{named(place).stem}.calibration.json"
-        return next((file for name in (own, "calibration.json") if (file := beside(place, name)).is_file()), None)
+        by_name = f"{named(place).stem}.calibration.json"
+        return next((file for name in (by_name, "calibration.json") if (file := beside(place, name)).is_file()), None)
 
     def described(self) -> str:
         """Return what it is in a line: the curve, its day, its residual."""

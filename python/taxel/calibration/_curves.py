@@ -131,9 +131,9 @@ class Law:
         return _core.law_rest(self.text, self.ramp)
 
     def _of(self, inputs: Values, rest: Values, back: bool) -> Values:
-        both = np.broadcast_arrays(inputs, rest)
-        values, at_rest = (np.ascontiguousarray(column, np.float64).ravel() for column in both)
-        return _core.law_of(self.text, self.ramp, values, at_rest, back).reshape(both[0].shape)
+        columns = np.broadcast_arrays(inputs, rest)
+        values, at_rest = (np.ascontiguousarray(column, np.float64).ravel() for column in columns)
+        return _core.law_of(self.text, self.ramp, values, at_rest, back).reshape(columns[0].shape)
 
     def values(self, readings: Values, rest: Values) -> Values:
         return self.share * self._of(readings, rest, back=False)

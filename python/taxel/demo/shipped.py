@@ -98,6 +98,6 @@ def described(readout: Readout) -> str:
     levels = readout.encoder.get_params()["levels"]
     names = [f"rise to {n}" for n in levels] + [f"fall below {n}" for n in levels]
     return "\n".join(
-        f"{label}: " + ", ".join(f"{name} {w:.3f} mV" for name, w in zip(names, one.weights, strict=True) if w > 5e-4)
-        for label, one in readout.neurons.items()
+        f"{label}: " + ", ".join(f"{name} {w:.3f} mV" for name, w in zip(names, cell.weights, strict=True) if w > 5e-4)
+        for label, cell in readout.neurons.items()
     )

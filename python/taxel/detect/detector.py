@@ -71,9 +71,9 @@ class _Detector(Saved):
 
     @classmethod
     def _from_text(cls, text: str) -> Self:
-        one = cls.__new__(cls)
-        one._hold(cls._check(text))
-        return one
+        detector = cls.__new__(cls)
+        detector._hold(cls._check(text))
+        return detector
 
     def _hold(self, text: str) -> None:
         """Hold the text of its file, which was checked."""

@@ -143,7 +143,7 @@ def array_of(examples: Sequence[Example]) -> Array | None:
     ------
     ProblemError : examples of different arrays (names their places)
     """
-    arrays = [None if isinstance(one.source, SpikeTrains) else one.source.array for one in examples]  # type: ignore[union-attr]
+    arrays = [None if isinstance(example.source, SpikeTrains) else example.source.array for example in examples]  # type: ignore[union-attr]
     first = arrays[0]
     for k, array in enumerate(arrays):
         if (array is None) != (first is None) or (array is not None and first is not None and not first.fits(array)):
@@ -162,7 +162,7 @@ def unit_of(examples: Sequence[Example]) -> str | None:
     ------
     ProblemError : examples in different units (names two of them)
     """
-    units = [None if isinstance(one.source, SpikeTrains) else recorded_unit(one.source) for one in examples]  # type: ignore[arg-type]
+    units = [None if isinstance(example.source, SpikeTrains) else recorded_unit(example.source) for example in examples]  # type: ignore[arg-type]
     for k, unit in enumerate(units):
         if unit != units[0]:
             of = f"{called(k, examples[k])} is in {unit}, {called(0, examples[0])} in {units[0]}"

@@ -184,7 +184,7 @@ def judge(
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
     labels = recipe._labels(examples)
     truths = _truths(examples, ways, labels)
-    scores = tuple(score(*both, window) for both in zip(joined, truths, strict=True))
+    scores = tuple(score(*compared, window) for compared in zip(joined, truths, strict=True))
     parts = [(fold.train, fold.test) for fold in ways]
     plain = plain_score(examples, labels, clocks, floor_of(recipe.encoder), parts, truths, window, report)
     return Judged(scores, score_together(joined, truths, window), how, tuple(trained), plain)
@@ -196,7 +196,7 @@ def _sound_examples(
     """Return checked examples, the window of scores (ms), and the clock of each example."""
     if frame_us is not None:
         finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
-    clocks = [clock_of(one, frame_us) for one in examples] if isinstance(examples, Sequence) else []
+    clocks = [clock_of(example, frame_us) for example in examples] if isinstance(examples, Sequence) else []
     return checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6), clocks
 
 
@@ -352,9 +352,9 @@ def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Rea
     trains = patterns[part.example].source
     assert isinstance(trains, SpikeTrains)
     neurons = readout.neurons.values()
-    steps = [trains.start / one.neuron.step_ms for one in neurons]
+    steps = [trains.start / neuron.neuron.step_ms for neuron in neurons]
     on_grid = all(abs(step - round(step)) < 1e-9 for step in steps)
-    return patterns if on_grid and all(len(one.weights) == len(trains) for one in neurons) else examples
+    return patterns if on_grid and all(len(neuron.weights) == len(trains) for neuron in neurons) else examples
 
 
 def _quiet() -> Any:
@@ -363,8 +363,8 @@ def _quiet() -> Any:
 
 
 def _detected(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
-    one, (frame_us, version) = examples[part.example], clocks[part.example]
-    detections = run(readout, one.source, tare=one.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
+    example, (frame_us, version) = examples[part.example], clocks[part.example]
+    detections = run(readout, example.source, tare=example.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
     return detections[(detections.t >= part.start) & (detections.t < part.stop)]
 
 
@@ -407,7 +407,10 @@ def _truths(
 
 
 def _only(examples: Sequence[Example], label: str) -> list[Example]:
-    return [one._replace(labels={name: t for name, t in one.labels.items() if name == label}) for one in examples]
+    return [
+        example._replace(labels={name: t for name, t in example.labels.items() if name == label})
+        for example in examples
+    ]
 
 
 def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
@@ -437,7 +440,7 @@ def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
 def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[str]) -> str | None:
     """Return a label of which no event is in any of these parts, if there is one."""
     for label in labels:
-        if not any(label in (of := examples[one.example].labels) and len(_inside(of[label], one)) for one in parts):
+        if not any(label in (of := examples[part.example].labels) and len(_inside(of[label], part)) for part in parts):
             return label
     return None
 
@@ -477,7 +480,7 @@ def _sound(folds: Sequence[Fold], examples: int) -> list[Fold]:
             raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold with parts to train on and parts to test")
         train, test = ([_sound_part(f"fold {n}", part, examples) for part in parts] for parts in (train, test))
         for part in test:
-            if any(part.start < other.stop and other.start < part.stop for other in tested.get(part.example, ())):
+            if any(part.start < trained.stop and trained.start < part.stop for trained in tested.get(part.example, ())):
                 raise ProblemError(f"fold {n}: {shown(part)} is tested twice")
             tested.setdefault(part.example, []).append(part)
         sound.append(Fold(train, test, _sound(inner, examples) if inner else inner))
@@ -505,7 +508,7 @@ def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> li
         events = np.sort(np.concatenate([_only_inside(examples[part.example], part) for part in group]))
         edges = (-np.inf, *_between_events(events, count), np.inf)
         stretches = [[_within(part, *of) for part in group] for of in pairwise(edges)]
-        groups = [own for each in stretches if (own := [part for part in each if part.start < part.stop])]
+        groups = [filled for each in stretches if (filled := [part for part in each if part.start < part.stop])]
     return _dealt(groups, count)
 
 
@@ -523,9 +526,9 @@ def _folds_for(label: str, examples: Sequence[Example], parts: Sequence[Part], c
         folds = _split(examples, parts, count)
         if not any(_lacks(examples, fold.train, [label]) for fold in folds):
             return folds
-    own = _only(examples, label)
+    of_label = _only(examples, label)
     groups = _grouped(examples, parts)
-    events = [sum(len(_only_inside(own[part.example], part)) for part in group) for group in groups]
+    events = [sum(len(_only_inside(of_label[part.example], part)) for part in group) for group in groups]
     having = [group for group, count_of in zip(groups, events, strict=True) if count_of]
     others = [group for group, count_of in zip(groups, events, strict=True) if not count_of]
     if len(having) > 1:
@@ -533,7 +536,7 @@ def _folds_for(label: str, examples: Sequence[Example], parts: Sequence[Part], c
     if sum(events) < 4:
         return []
     silent = [part for group in others for part in group]
-    folds = _split(own, having[0], min(count, sum(events) // 2))
+    folds = _split(of_label, having[0], min(count, sum(events) // 2))
     return [Fold([*fold.train, *silent], fold.test) for fold in folds]
 
 
@@ -542,8 +545,8 @@ def _dealt(groups: Sequence[Sequence[Part]], count: int) -> list[Fold]:
     count = min(count, len(groups))
     return [
         Fold(
-            [one for k, group in enumerate(groups) if k % count != n for one in group],
-            [one for group in groups[n::count] for one in group],
+            [part for k, group in enumerate(groups) if k % count != n for part in group],
+            [part for group in groups[n::count] for part in group],
         )
         for n in range(count)
     ]

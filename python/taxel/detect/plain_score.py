@@ -165,7 +165,9 @@ def plain_score(
     window_ms : float
     report : function of (step, done, all)
     """
-    lacking = [k for k, one in enumerate(examples) if one.tare is None or isinstance(one.source, SpikeTrains)]
+    lacking = [
+        k for k, example in enumerate(examples) if example.tare is None or isinstance(example.source, SpikeTrains)
+    ]
     if lacking:
         why = f"{called(lacking[0], examples[lacking[0]])} has no tare" if len(examples) > 1 else "there is no tare"
         return PlainScore(dict.fromkeys(labels), None, f"{why} to measure a load from")

@@ -157,21 +157,21 @@ class Score:
 
     def to_dict(self) -> dict[str, Any]:
         """Return counts and spreads (ms) as plain values, label by label; what is not known is None."""
-        one: dict[str, Any] = {
+        plain: dict[str, Any] = {
             name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near")
         }
         for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay)):
-            one[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
+            plain[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
         if self.by_label:
-            one["by_label"] = {label: part.to_dict() for label, part in self.by_label.items()}
-        return one
+            plain["by_label"] = {label: part.to_dict() for label, part in self.by_label.items()}
+        return plain
 
     def __repr__(self) -> str:
         rows = [*self.by_label.values()] if len(self.by_label) > 1 else []
         every = [*rows, self]
-        counts = [(one.events, one.found, one.missed, one.false, one.false_near) for one in every]
+        counts = [(score.events, score.found, score.missed, score.false, score.false_near) for score in every]
         table: list[tuple[str, ...]] = [("", "events", "found", "missed", "false", "near")]
-        table += [(escaped(one.label), *map(str, row)) for one, row in zip(every, counts, strict=True)]
+        table += [(escaped(score.label), *map(str, row)) for score, row in zip(every, counts, strict=True)]
         widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
         lines = [
             "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
@@ -179,7 +179,7 @@ class Score:
         ]
         # Spreads are long: each on a line of its own, within the 80 columns of a terminal.
         for what, of in (("t - event (ms)", "error"), ("known - event (ms)", "delay")):
-            lines += [what, *(f"{escaped(one.label).ljust(widths[0])}  {getattr(one, of)!r}" for one in every)]
+            lines += [what, *(f"{escaped(score.label).ljust(widths[0])}  {getattr(score, of)!r}" for score in every)]
         return "\n".join(lines)
 
 
@@ -228,17 +228,23 @@ def score(
     labels, times = _truth(found, truth)
     tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
     scores = {}
-    for one in tallies:
-        pairs, missed, false = np.column_stack([one.detected, one.events]), one.missed_events, one.false_detections
-        scores[one.label] = Score(one.label, pairs, missed, false, one.false_near, one.errors_ms, one.delays_ms)
+    for tally in tallies:
+        pairs, missed, false = (
+            np.column_stack([tally.detected, tally.events]),
+            tally.missed_events,
+            tally.false_detections,
+        )
+        scores[tally.label] = Score(
+            tally.label, pairs, missed, false, tally.false_near, tally.errors_ms, tally.delays_ms
+        )
     return Score(
         "all" if len(scores) != 1 else next(iter(scores)),
-        np.concatenate([one.pairs for one in scores.values()] or [np.empty((0, 2), np.int64)]),
-        np.concatenate([one.missed_events for one in scores.values()] or [np.empty(0, np.int64)]),
-        np.concatenate([one.false_detections for one in scores.values()] or [np.empty(0, np.int64)]),
-        sum(one.false_near for one in scores.values()),
-        np.concatenate([one.errors_ms for one in scores.values()] or [np.empty(0)]),
-        np.concatenate([one.delays_ms for one in scores.values()] or [np.empty(0)]),
+        np.concatenate([score.pairs for score in scores.values()] or [np.empty((0, 2), np.int64)]),
+        np.concatenate([score.missed_events for score in scores.values()] or [np.empty(0, np.int64)]),
+        np.concatenate([score.false_detections for score in scores.values()] or [np.empty(0, np.int64)]),
+        sum(score.false_near for score in scores.values()),
+        np.concatenate([score.errors_ms for score in scores.values()] or [np.empty(0)]),
+        np.concatenate([score.delays_ms for score in scores.values()] or [np.empty(0)]),
         scores,
     )
 
@@ -282,7 +288,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
         for label in dict.fromkeys(labels):
             if label not in window_ms:
                 raise refused("window_ms", f": there is none for {label!r}")
-            mine = np.array([other == label for other in labels])
+            mine = np.array([name == label for name in labels])
             windows[mine] = _windows([label] * int(mine.sum()), window_ms[label])
         return windows
     widths = numbers("window_ms", window_ms, np.float64, "ms")

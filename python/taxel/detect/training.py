@@ -126,7 +126,7 @@ def fit(
 
 def trained(examples: Sequence[Example], recipe: Recipe, progress: Progress | None) -> Trained:
     """Train a readout as `fit` does, and return how its labels were aligned as well."""
-    sound, clocks = checked(examples), [clock_of(one) for one in examples]
+    sound, clocks = checked(examples), [clock_of(example) for example in examples]
     report = reporting(progress)
     recipe = in_pictures(instance("recipe", recipe, Recipe), sound, clocks)
     possibly = possible(recipe, sound)
@@ -140,7 +140,7 @@ def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
 
     The local load requires a tare.
     """
-    return recipe._without_choices(LocalLoad.name) if any(one.tare is None for one in examples) else recipe
+    return recipe._without_choices(LocalLoad.name) if any(example.tare is None for example in examples) else recipe
 
 
 class Encoded:
@@ -154,7 +154,7 @@ class Encoded:
 
     def __init__(self, examples: Sequence[Example], recipe: Recipe, report: Progress, *, search: bool = False) -> None:
         labels = recipe._labels(examples)
-        given = search or any(isinstance(one.source, SpikeTrains) for one in examples)
+        given = search or any(isinstance(example.source, SpikeTrains) for example in examples)
         #: The recipe with the parts of `patterns`.
         self.plan = recipe._narrowed(labels, search=search, choices=given)
         #: The examples as the trains that the first points receive.
@@ -165,14 +165,14 @@ class Encoded:
     def receiving(self, plan: Recipe) -> tuple[Recipe, Sequence[Example]]:
         """Return a recipe for one point of one label with the parts that the trains are of, and these trains."""
         (label,) = plan.neurons
-        own = plan._narrowed([label])
-        have, need = (one.encoder._each() for one in (self.plan, own))
+        narrowed = plan._narrowed([label])
+        have, need = (recipe.encoder._each() for recipe in (self.plan, narrowed))
         if all(part in have for part in need):
             return replace(plan, encoder=self.plan.encoder), self.patterns
-        key = own.encoder.to_json()
+        key = narrowed.encoder.to_json()
         if key not in self._others:
-            self._others[key] = self._encode(own)
-        return own, self._others[key]
+            self._others[key] = self._encode(narrowed)
+        return narrowed, self._others[key]
 
     def part(self, of: Callable[[Sequence[Example]], list[Example]]) -> Encoded:
         """Return a part of all examples, which shares their trains."""
@@ -252,7 +252,7 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
         plan, patterns = examples.receiving(recipe._with_point(label, point))
         return _fitted(patterns, plan, label, array, report, point, place, known, count=len(points) > 1)
 
-    count = sum(len(one.labels.get(label, ())) for one in examples.patterns)
+    count = sum(len(pattern.labels.get(label, ())) for pattern in examples.patterns)
     best, refused = None, None
     try:
         best = fitted(points[0], 0)
@@ -271,14 +271,14 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
         for place in range(_FOLLOWED if followed else 1):
             with contextlib.suppress(ProblemError):
                 others.append(fitted(point, place))
-        other = min(others, key=lambda one: one.wrong, default=None)
-        if other is not None and other.wrong <= wrong - fewer:
-            best = other
+        second = min(others, key=lambda fit: fit.wrong, default=None)
+        if second is not None and second.wrong <= wrong - fewer:
+            best = second
     if best is None:
         assert refused is not None
         raise refused
-    for one in best.caught:
-        warn(one, stacklevel=5)
+    for caught in best.caught:
+        warn(caught, stacklevel=5)
     return best
 
 
@@ -342,11 +342,11 @@ class Fitting:
         #: How much later than the event the neuron is trained to fire, ms, the encoder's latency apart. Where an age of
         #: the touch begins then it is later: a spike at that age acts after its time.
         self.delay_ms = delay_ms + (0.0 if ages is None else _acts_after_ms(learner._on_grid()))
-        given = self._given = [_times(k, one, label) for k, one in enumerate(examples)]
+        given = self._given = [_times(k, example, label) for k, example in enumerate(examples)]
         count = sum(map(len, given))
         if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
-        sources = [_inputs(k, one, recipe, label, array) for k, one in enumerate(examples)]
+        sources = [_inputs(k, example, recipe, label, array) for k, example in enumerate(examples)]
         self._graded = received.kind == "graded"
         quantities = received._quantities() if recipe.align else {}
         followed = None
@@ -363,14 +363,14 @@ class Fitting:
             self.alignment = aligned_to(followed, label, given)
         elif recipe.align:
             self.alignment = align(sources, label, given, received.latency_ms, ages)
-        self._names = [called(k, one) for k, one in enumerate(examples)]
-        self._sources = sources if followed is None else [only(one, quantities[followed.train]) for one in sources]
+        self._names = [called(k, example) for k, example in enumerate(examples)]
+        self._sources = sources if followed is None else [only(of, quantities[followed.train]) for of in sources]
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
         for name, times in zip(self._names, felt, strict=True):
             self._check_apart(name, times, learner._on_grid().refractory)
         later = [np.zeros(len(times), np.int64) for times in felt]
         if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
-            later = [later_us(one, ages, to_ms(t), delay_ms) for one, t in zip(sources, felt, strict=True)]
+            later = [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
         shift_ms = received.latency_ms + self.delay_ms
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
         self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
@@ -401,7 +401,7 @@ class Fitting:
     ) -> list[NDArray[np.float64]] | None:
         """Return the windows in which the neuron must be silent; None where it must at any time but at targets."""
         if ages is not None and neuron.kernel == "exponential":
-            return [silent_windows(one, ages, t, neuron) for one, t in zip(trains, self._targets, strict=True)]
+            return [silent_windows(train, ages, t, neuron) for train, t in zip(trains, self._targets, strict=True)]
         if followed is not None:
             return silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, neuron.step_ms)
         return None

@@ -243,7 +243,7 @@ class Encoder(Value):
         >>> LevelCrossing([10.0]).transform([Frames([[[0.0]], [[12.0]]], [0, 1000])])
         [SpikeTrains(2 trains, 1 spike, 0 to 1 ms)]
         """
-        encoded = [self.encode(one) for one in several("recordings", recordings)]
+        encoded = [self.encode(recording) for recording in several("recordings", recordings)]
         return [trains.split_by_sign() if trains.signed else trains for trains in encoded]
 
     def stream(self, array: Array | None = None) -> EncoderStream:

@@ -308,22 +308,22 @@ def compare_codes(
     >>> round(compare_codes(trials, ["soft", "hard"] * 4, {"first": code}, folds=2)["first"].right, 2)
     1.0
     """
-    patterns = [instance("trials", one, SpikeTrains) for one in several("trials", trials)]
+    patterns = [instance("trials", trial, SpikeTrains) for trial in several("trials", trials)]
     by_name: dict[str, Code] = mapping("codes", codes)
     for name, code in by_name.items():
         if not isinstance(code, Code):
             raise refused("codes", f"[{name}] is {shown(code)}: must be a taxel.information.Code")
     if not by_name:
         raise refused("codes", " is empty: name at least one")
-    if not patterns or len({len(one) for one in patterns}) > 1:
+    if not patterns or len({len(pattern) for pattern in patterns}) > 1:
         raise ProblemError("trials must be one or more, with equally many trains each")
-    given = [one.start for one in patterns] if onsets_ms is None else onsets_ms
+    given = [pattern.start for pattern in patterns] if onsets_ms is None else onsets_ms
     onsets = finite_numbers("onsets_ms", given, "ms").ravel().tolist()
     if len(onsets) != len(patterns):
         raise refused("onsets_ms", f" has {len(onsets)} entries: must be {len(patterns)}, one a trial")
     estimates = {}
     for name, code in by_name.items():
-        read = np.array([code.decode(one, onset) for one, onset in zip(patterns, onsets, strict=True)])
+        read = np.array([code.decode(pattern, onset) for pattern, onset in zip(patterns, onsets, strict=True)])
         vary = max(1, int(np.count_nonzero(np.ptp(read, axis=0) > 0)))
         nested = nested_predictions([read @ read.T], [vary], labels, groups=groups, count=folds, seed=seed)
         estimates[name] = estimate(labels, nested.responses, groups=groups, seed=seed)

@@ -86,11 +86,11 @@ class FoldSums:
         total: ClassMoments | None = None
         with threads(several=self._table.shape[1] >= _WORTH_THREADS):
             for k, name in enumerate(self._names):
-                one = self._summed(name)
-                total = one if total is None else total + one
+                moments = self._summed(name)
+                total = moments if total is None else total + moments
                 if keep == "folds":
-                    self._sums[int(name)] = one
-                del one
+                    self._sums[int(name)] = moments
+                del moments
                 if progress is not None:
                     progress(k + 1, len(self._names))
         assert total is not None  # there are two folds at least
@@ -142,11 +142,11 @@ class FoldSums:
         classes, into = self.classes, None
         if merge is not None:
             merge = instance("merge", merge, dict)
-            missing = [one for one in self.classes.tolist() if one not in merge]
+            missing = [name for name in self.classes.tolist() if name not in merge]
             if missing:
                 raise refused("merge", f" says nothing of class {missing[0]!r}")
             classes, into = np.unique(
-                words("merge", [merge[one] for one in self.classes.tolist()]), return_inverse=True
+                words("merge", [merge[name] for name in self.classes.tolist()]), return_inverse=True
             )
         model.classes_ = classes
         shift = None if self._shift is None else self._shift[:used]

@@ -130,7 +130,7 @@ def split(
     for name in range(int(fold.max()) + 1):
         train = np.flatnonzero(fold != name)
         mine = _inside(row[train], None if belongs is None else belongs[train], inner, seed)
-        parts.append(Part(np.flatnonzero(fold == name), train, tuple(train[one] for one in mine)))
+        parts.append(Part(np.flatnonzero(fold == name), train, tuple(train[group] for group in mine)))
     return Split(classes, row, fold, tuple(parts))
 
 

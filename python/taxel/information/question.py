@@ -57,26 +57,27 @@ class Question:
         if not self.trials:
             raise refused("trials", " is []: must hold one at least")
         shape = self.trials[0].array.shape
-        other = next((one for one in self.trials if one.array.shape != shape), None)
-        if other is not None:
-            sizes = " x ".join(map(str, other.array.shape)), " x ".join(map(str, shape))
+        differing = next((trial for trial in self.trials if trial.array.shape != shape), None)
+        if differing is not None:
+            sizes = " x ".join(map(str, differing.array.shape)), " x ".join(map(str, shape))
             raise ProblemError(
-                f"{other.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be of one"
+                f"{differing.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be "
+                "of one"
             )
-        self.labels = np.array([one.label for one in self.trials])
-        groups = [one.group for one in self.trials]
+        self.labels = np.array([trial.label for trial in self.trials])
+        groups = [trial.group for trial in self.trials]
         self.groups = np.array(groups) if any(groups) else None
         stratified(self.labels, count=self.folds, groups=self.groups, seed=self.seed)
         if self.encoder is None:
             self.encoder = ChangeEvents(noise_floor=floor_of(self.trials))
         if not isinstance(self.encoder, ChangeEvents | FA1):
             raise refused("encoder", f" is {shown(self.encoder)}: must be ChangeEvents or FA1, one train a taxel")
-        sources = {id(one.source): one.source for one in self.trials}
+        sources = {id(trial.source): trial.source for trial in self.trials}
         held = {key: HeldValues(source) for key, source in sources.items()}
-        self.held = [held[id(one.source)] for one in self.trials]
+        self.held = [held[id(trial.source)] for trial in self.trials]
         self.finest = finest_us(list(sources.values()))
         if self.window_ms is None:
-            endless = next((one for one in self.trials if one.stop_us is None), None)
+            endless = next((trial for trial in self.trials if trial.stop_us is None), None)
             if endless is not None:
                 raise ProblemError(f"{endless.name}: has no end; give window_ms, or every trial its stop_us")
             reach = np.inf
@@ -88,14 +89,14 @@ class Question:
                 )
         self.contact = contacts(self.trials, self.held, self.encoder, self.finest, reach)
         if np.isnan(self.contact).all():
-            lasts = max(int(np.ptp(one.source.t)) for one in self.trials if len(one.source))
+            lasts = max(int(np.ptp(trial.source.t)) for trial in self.trials if len(trial.source))
             if lasts < STEP_US:
                 raise ProblemError(
                     f"{self.trials[0].name}: its pictures all lie within {lasts} us, so they have no times; "
                     "give them some (taxel.Frames)"
                 )
             raise refused("trials", f": no event in any of them by {self.encoder!r}; a lower noise_floor may help")
-        ends = np.array([np.inf if one.stop_us is None else one.stop_us for one in self.trials])
+        ends = np.array([np.inf if trial.stop_us is None else trial.stop_us for trial in self.trials])
         self.ended = bool(np.isfinite(ends).all())
         lengths = (ends - self.contact)[~np.isnan(self.contact)]
         self.window_us = float(reach if np.isfinite(reach) else max(lengths.min(), self.finest))
@@ -200,7 +201,7 @@ class Question:
         """Return the columns of parameters that can stand in for the labels; the notes name the others."""
         columns = {}
         for name in self.trials[0].parameters:
-            column = np.array([one.parameters.get(name, "") for one in self.trials])
+            column = np.array([trial.parameters.get(name, "") for trial in self.trials])
             if (column == self.labels).all():
                 self.notes.append(f"parameter {name} is left out: it says what the label says")
                 continue
@@ -223,8 +224,8 @@ def floor_of(trials: Sequence[LabelledTrial]) -> float:
         return 3.0 if first.intensity is not None else 0.5
     if first.unit == "ticks":
         return 3.0
-    sources = {id(one.source): one.source for one in trials}.values()
-    largest = max(float(np.abs(one.values).max(initial=0.0)) for one in sources if isinstance(one, Frames))
+    sources = {id(trial.source): trial.source for trial in trials}.values()
+    largest = max(float(np.abs(source.values).max(initial=0.0)) for source in sources if isinstance(source, Frames))
     if largest == 0:
         raise refused("trials", ": every picture is 0")
     return float(f"{largest / 40:.2g}")
@@ -233,4 +234,4 @@ def floor_of(trials: Sequence[LabelledTrial]) -> float:
 def _series(least: float, most: float) -> list[int]:
     """Return whole us in steps of 1, 2, 5 within limits."""
     steps = [step * 10**power for power in range(10) for step in _STEPS]
-    return [one for one in steps if least <= one <= most]
+    return [step for step in steps if least <= step <= most]

@@ -58,4 +58,4 @@ class BatchLearner(SpikeLearner):
     ) -> list[NDArray[np.float64]]:
         """Return the output spikes in each pattern; `instead` replaces learnt attributes by name."""
         weights, learnt = self._fitted(), json.dumps(self._said | dict(instead))
-        return [_core.run_batch(self._kind, self._json(), weights, learnt, one._parts()) for one in patterns]
+        return [_core.run_batch(self._kind, self._json(), weights, learnt, pattern._parts()) for pattern in patterns]

@@ -38,7 +38,7 @@ def checked_examples(
     _, times = examples(patterns, targets)
     cone._check()
     each = [None] * len(times) if silence is None else several("silence", silence)
-    asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
+    asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
     trained = several("patterns", patterns)
     if not len(trained) == len(times) == len(asked) or not trained:
         raise ProblemError(

@@ -290,7 +290,7 @@ class ConeRProblem:
     ) -> None:
         trains, times = examples(patterns, targets)
         each = [None] * len(trains) if silence is None else several("silence", silence)
-        asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
+        asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
         self._trains = len(trains[0][1]) - 1 if trains else 0
         self._counted = _counted(instance("cone", cone, ConeR), trains)
         if self._counted is not None:

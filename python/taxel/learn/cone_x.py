@@ -443,7 +443,7 @@ class ConeXProblem:
     def _restated(self) -> tuple[ConeX, list[SpikeTrains]]:
         """Return the learner's parameters and the patterns that state the problem."""
         json_text, parts = self._stated
-        return ConeX._from_values(json.loads(json_text)), [SpikeTrains._from_parts(one) for one in parts]
+        return ConeX._from_values(json.loads(json_text)), [SpikeTrains._from_parts(part) for part in parts]
 
     def __getstate__(self) -> dict[str, Any]:
         return {"_stated": self._stated, "targets": self.targets, "margin": self.margin}

@@ -167,7 +167,7 @@ class OnlineConeR(ConeR):
         each = [None] * len(trains) if silence is None else several("silence", silence)
         if len(each) != len(trains):
             raise refused("silence", f": {len(each)} lists for {len(trains)} patterns, must be one a pattern")
-        asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
+        asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
         with self._locked():
             self._begin()
             for p, (pattern, target, here) in enumerate(zip(trains, times, asked, strict=True)):

@@ -283,11 +283,11 @@ def _room(rows: PatternRows, w: _Floats, exact: ExactPotential, touch: float) ->
     least, found = _Least(np.inf, rows.start, True), np.inf
     for first in range(0, len(begin), BLOCK):
         here = slice(first, first + BLOCK)
-        one, found = _Curves(rows, w, exact, begin[here], end[here]).least(found, touch)
-        if one.silent is False:
-            return one
-        if least.silent and (one.silent is None or one.room < least.room):
-            least = one
+        margin, found = _Curves(rows, w, exact, begin[here], end[here]).least(found, touch)
+        if margin.silent is False:
+            return margin
+        if least.silent and (margin.silent is None or margin.room < least.room):
+            least = margin
     return least
 
 

@@ -129,7 +129,7 @@ class Tempotron(Learner):
         ProblemError : invalid patterns, labels or first weights
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
-        trains = [one._parts() for one in patterns_of(patterns)]
+        trains = [pattern._parts() for pattern in patterns_of(patterns)]
         truth = _labels(labels)
         first = None if start is None else floats("start", start)
         if progress is not None:

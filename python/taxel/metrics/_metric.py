@@ -50,8 +50,8 @@ def _plain(metric: str, name: str, value: Any) -> Any:
 def distance(metric: str, a: Pattern, b: Pattern, options: Mapping[str, Any]) -> float:
     """Return the distance of two trains or two patterns."""
     if isinstance(a, SpikeTrains) != isinstance(b, SpikeTrains):
-        name, value, other = ("b", b, "a") if isinstance(a, SpikeTrains) else ("a", a, "b")
-        raise refused(name, f" is {shown(value)}: must be a taxel.SpikeTrains, as {other} is")
+        name, value, wanted = ("b", b, "a") if isinstance(a, SpikeTrains) else ("a", a, "b")
+        raise refused(name, f" is {shown(value)}: must be a taxel.SpikeTrains, as {wanted} is")
     return _core.distance(stated(metric, options), _one(metric, "a", a), _one(metric, "b", b))
 
 

@@ -63,8 +63,8 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
         ax.scatter(times, train, size, "black", marker="|", linewidths=0.8)
     else:
         names = ("ON", "OFF") if trains.signed else ("above 0", "below 0")
-        for on, colour, name in zip((True, False), (ON, OFF), names, strict=True):
-            chosen = (trains.values > 0) == on
+        for rising, colour, name in zip((True, False), (ON, OFF), names, strict=True):
+            chosen = (trains.values > 0) == rising
             ax.scatter(times[chosen], train[chosen], size, colour, marker="|", linewidths=0.8, label=name)
         ax.legend(loc="upper right")
     ax.set(xlabel="time (ms)", ylabel="train", xlim=_wide(trains.start, trains.stop), ylim=(-0.7, len(trains) - 0.3))

@@ -97,23 +97,25 @@ def convert(
         if isinstance(source, Frames):
             raise refused("frames_hz", ": pictures keep their own times; open the file and ask it for frames(rate_hz)")
         if whole.is_several and together(whole.sources):
-            whole = alone({name: pictures(one, frames_hz, name="frames_hz") for name, one in whole.sources.items()})
+            whole = alone(
+                {name: pictures(source, frames_hz, name="frames_hz") for name, source in whole.sources.items()}
+            )
         else:
             whole = Contents(pictures(whole.one, frames_hz, name="frames_hz"), whole.sources)
     written = stored(whole, place)
-    one, lost = written.one, list(written.one.losses.lost())
+    made, lost = written.one, list(written.one.losses.lost())
     match kind:
         case ".lsa":
-            _write_lsa(place, one, overwrite)
+            _write_lsa(place, made, overwrite)
         case ".npz":
-            write_whole(place, lambda file: write_npz(file, one), overwrite=overwrite)
+            write_whole(place, lambda file: write_npz(file, made), overwrite=overwrite)
         case ".csv":
-            write_whole(place, lambda file: write_csv(file, one.table), overwrite=overwrite)
+            write_whole(place, lambda file: write_csv(file, made.table), overwrite=overwrite)
         case ".h5":
-            write_h5(place, one, overwrite=overwrite)
+            write_h5(place, made, overwrite=overwrite)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                before = whole.sources if written.is_several else {one.origin.label: whole.one}
+                before = whole.sources if written.is_several else {made.origin.label: whole.one}
                 counts = {name: _counts(before[name], source) for name, source in written.sources.items()}
                 write_mcap(part, written, compression, counts)
                 lost += _read_otherwise(part, whole.one)

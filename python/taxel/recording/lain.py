@@ -54,10 +54,10 @@ def _free(pictures: Frames, rest: Rest) -> NDArray[np.int64]:
     """Return the numbers of the pictures without what lay on the array in the quiet stretch of a rest."""
     assert rest.quiet_us is not None
     assert rest.lay is not None
-    on = rest.lay > 0
-    values = pictures.values.reshape(len(pictures), -1)[:, on]
+    is_loaded = rest.lay > 0
+    values = pictures.values.reshape(len(pictures), -1)[:, is_loaded]
     lain = values[slice(*np.searchsorted(pictures.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
-    return np.flatnonzero((values < lain - rest.lay[on] / 2).all(axis=1))
+    return np.flatnonzero((values < lain - rest.lay[is_loaded] / 2).all(axis=1))
 
 
 def _later(pictures: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:

@@ -65,8 +65,8 @@ class Version2:
     )
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            whole(one.name, getattr(self, one.name), one.metadata["min"], one.metadata["max"])
+        for field in fields(self):
+            whole(field.name, getattr(self, field.name), field.metadata["min"], field.metadata["max"])
 
 
 def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:

@@ -183,10 +183,10 @@ class Layer:
         if sunk.shape != cells:
             raise refused("sunk_mm", f" has shape {sunk.shape}: the array has {cells}")
         pressure, base = self._core.press(sunk.reshape(-1))
-        on = _KPA * pressure.reshape(self.array.shape)
+        above = _KPA * pressure.reshape(self.array.shape)
         # MPa mm^2 is N.
         force = float(pressure.sum()) * self.array.row_mm * self.array.column_mm
-        return Pressed(on, _KPA * base.reshape(self.array.shape).astype(np.float64), force)
+        return Pressed(above, _KPA * base.reshape(self.array.shape).astype(np.float64), force)
 
     def forget(self) -> None:
         """Begin the next touch without the pressures of the last two."""

@@ -216,17 +216,17 @@ class SpikeTrains(Columns):
         >>> both, both.values
         (SpikeTrains(3 trains, 3 spikes, graded, 0 to 9 ms), array([1. , 0.5, 2.5], dtype=float32))
         """
-        each = [instance(f"parts[{n}]", one, SpikeTrains) for n, one in enumerate(several("parts", parts))]
+        each = [instance(f"parts[{n}]", part, SpikeTrains) for n, part in enumerate(several("parts", parts))]
         if not each:
             raise refused("parts", ": there is none, one or more is needed")
-        each = [one.split_by_sign() if one.signed else one for one in each]
-        graded = any(one.kind == "graded" for one in each)
+        each = [trains.split_by_sign() if trains.signed else trains for trains in each]
+        graded = any(trains.kind == "graded" for trains in each)
         return cls._of_own(
-            np.concatenate([one.times for one in each]),
-            np.concatenate([[0], np.cumsum(np.concatenate([one.counts for one in each]))]).astype(np.int64),
-            min(one.start for one in each),
-            max(one.stop for one in each),
-            np.concatenate([one._ones_without() for one in each]) if graded else None,
+            np.concatenate([trains.times for trains in each]),
+            np.concatenate([[0], np.cumsum(np.concatenate([trains.counts for trains in each]))]).astype(np.int64),
+            min(trains.start for trains in each),
+            max(trains.stop for trains in each),
+            np.concatenate([trains._ones_without() for trains in each]) if graded else None,
             "graded" if graded else "unsigned",
         )
 
