@@ -175,8 +175,6 @@ def pairwise(
 
 # recording: header, remarks and counts as JSON
 
-def live_defaults() -> str: ...
-
 UNKNOWN: Final = 65_535
 LOADED_TICKS: Final = 8.0
 
@@ -436,22 +434,15 @@ def registers_words(registers: str) -> tuple[list[int], float]: ...
 def registers_of_words(words: list[int], channels: int) -> str: ...
 def registers_commands(source: str, target: str, array: _Array) -> list[tuple[int, int]]: ...
 
-# live: options, readout, tare, counters and summary as JSON; said as label, t, known, slope, said us, said ns
+# live: options, tare, counters and summary as JSON; said as label, t, known, slope, said us, said ns
 
 @final
 class Live:
     def __new__(
         cls,
-        host: str,
-        port: int,
-        parts: _Array,
         options: str,
-        record: tuple[str | PathLike[str], str, bool] | None,
-        readout: str | None,
-        tare: str | None,
-        tare_us: int | None,
+        record: str | PathLike[str] | None,
         say: Callable[[str, int, int, float, int, int], object] | None,
-        lines: bool,
         feed: Feed | None,
     ) -> Live: ...
     def address(self) -> tuple[str, int]: ...
@@ -478,7 +469,7 @@ class Live:
 
 @final
 class Feed:
-    def __new__(cls, place: str, queue_bytes: int | None) -> Feed: ...
+    def __new__(cls, place: str, queue_bytes: int) -> Feed: ...
     def take(self, parcel: bytes) -> bool: ...
     def begin_session(self) -> None: ...
     def compare(self, asked: int, came: int, answered: int, back: int) -> None: ...

@@ -10,7 +10,7 @@ use taxel_core::encode;
 use taxel_core::wire::Registers;
 use taxel_live::Quantiles;
 use taxel_live::clock::Pace;
-use taxel_live::pipeline::{Arrival, OutputDetection};
+use taxel_live::pipeline::{Arrival, LiveOptions, OutputDetection};
 use taxel_live::ports::Port;
 
 use super::handler::{LabelRow, UnhealthyTaxels, UserPreset};
@@ -32,6 +32,9 @@ pub(super) enum Message {
         /// False: no board, recordings only (`taxel view`).
         live: bool,
         array: Option<ArrayInfo>,
+        /// The options of the session by their names in Python, but for sensor, registers, readout and tare; null without a board.
+        #[cfg_attr(feature = "development", schemars(with = "Option<serde_json::Map<String, Value>>"))]
+        options: Option<Box<LiveOptions>>,
         /// Where datagrams are received.
         udp: Option<String>,
         /// Whether intensities are differences; null without a board.

@@ -249,6 +249,8 @@ export interface Hello {
   /** False: no board, recordings only (`taxel view`). */
   live: boolean;
   array: ArrayInfo | null;
+  /** The options of the session by their names in Python, but for sensor, registers, readout and tare; null without a board. */
+  options: Record<string, unknown> | null;
   /** Where datagrams are received. */
   udp: string | null;
   /** Whether intensities are differences; null without a board. */

@@ -16,6 +16,7 @@ use super::readout_queue::ReadoutQueue;
 use super::recorder::{Host, Recorder};
 use super::sending::Line;
 use super::sink::OutputDetection;
+use super::source::Source;
 use super::viewer_queue::ViewerEvents;
 use crate::capture::Receiver;
 use crate::latency::Latencies;
@@ -59,6 +60,8 @@ pub(super) struct RecordingSlot {
 /// State shared by all threads.
 pub(super) struct Shared {
     pub(super) options: LiveOptions,
+    /// The other sources of the recording.
+    pub(super) sources: Vec<Source>,
     pub(super) begun: Instant,
     pub(super) receiver: Receiver,
     pub(super) readout_queue: ReadoutQueue,
