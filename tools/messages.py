@@ -30,7 +30,7 @@ READS = {
     "RecordedNote": ("text", "t_us"),
     "hello": ("array",),
     "registers": ("values",),
-    "detection": ("label", "t_us", "known_us", "slope_mv_per_ms", "said_us"),
+    "detection": ("label", "t_us", "known_us", "slope_mv_per_ms", "reported_us"),
     "spikes": ("encoder", "t_ms", "train", "value", "left_out"),
     "opened": ("array", "name", "registers", "detections", "notes"),
     "transport": ("state",),

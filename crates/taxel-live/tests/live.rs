@@ -213,7 +213,7 @@ fn detections_live_are_those_of_the_recording() {
     assert_eq!(again, output);
     assert!(again.len() > 5, "the presses are detected: {}", again.len());
     // By the host's clock less the offset no detection can be output before it was known, but for the clocks' estimate.
-    assert!(delivered.iter().all(|s| s.output_us >= s.detection.known - 192), "{delivered:?}");
+    assert!(delivered.iter().all(|s| s.reported_us >= s.detection.known - 192), "{delivered:?}");
 }
 
 /// The board's times of a recording's pictures, us.

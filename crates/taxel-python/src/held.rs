@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
-use taxel_core::lain::{self as lying, LOADED_TICKS};
+use taxel_core::preload::{LOADED_TICKS, place, preload as preload_of};
 use taxel_core::rest::{Rest, Value, touched_from};
 use taxel_core::touch_counts::{BIN_US, TouchCounts};
 use taxel_core::tracked_rest::TrackedRest;
@@ -236,18 +236,18 @@ fn touched_above(noise_floor: f64) -> f64 {
     touched_from(0.0, noise_floor)
 }
 
-/// What lay on a sensor in its quiet stretch, and where that was, for people.
+/// The preload of each taxel, and its place as text.
 #[pyfunction]
-fn lain<'py>(
+fn preload<'py>(
     py: Python<'py>,
     less: PyReadonlyArray1<'py, f64>,
     columns: usize,
     above: f64,
     corner: (usize, usize),
 ) -> PyResult<(Bound<'py, PyArray1<f64>>, String)> {
-    let lay = lying::lain(slice("less", &less)?, columns, above);
-    let on = lying::place(&lay, columns, corner);
-    Ok((array(py, lay), on))
+    let loads = preload_of(slice("less", &less)?, columns, above);
+    let at = place(&loads, columns, corner);
+    Ok((array(py, loads), at))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -257,7 +257,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(held_as_events, module)?)?;
     module.add_function(wrap_pyfunction!(above_rest, module)?)?;
     module.add("LOADED_TICKS", LOADED_TICKS)?;
-    module.add_function(wrap_pyfunction!(lain, module)?)?;
+    module.add_function(wrap_pyfunction!(preload, module)?)?;
     module.add_function(wrap_pyfunction!(touches_of_events, module)?)?;
     module.add_function(wrap_pyfunction!(touches_of_frames, module)?)?;
     module.add_function(wrap_pyfunction!(changes_of_frames, module)?)?;

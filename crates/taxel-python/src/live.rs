@@ -38,7 +38,7 @@ fn to_record(path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Reco
 
 fn output_parts(output: OutputDetection) -> OutputParts {
     let d = output.detection;
-    (d.label, d.t, d.known, d.slope, output.output_us, output.output_ns, d.repaired)
+    (d.label, d.t, d.known, d.slope, output.reported_us, output.reported_ns, d.repaired)
 }
 
 thread_local! {

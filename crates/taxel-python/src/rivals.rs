@@ -176,7 +176,7 @@ fn fit_batch<'py>(
     let batch = Batch::from_json(name, parameters).map_err(core)?;
     let (patterns, targets) = (to_patterns(patterns)?, to_targets(&targets)?);
     let learnt = enter(py, |stop| batch.fit(&patterns, &targets, stop))?;
-    Ok((array(py, learnt.weights), Value::Object(learnt.said).to_string()))
+    Ok((array(py, learnt.weights), Value::Object(learnt.results).to_string()))
 }
 
 /// Output spikes of such a learner.
@@ -186,11 +186,11 @@ fn run_batch<'py>(
     name: &str,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
-    said: &str,
+    results: &str,
     pattern: SpikesIn<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let batch = Batch::from_json(name, parameters).map_err(core)?;
-    let learnt = Learnt { weights: slice("weights", &weights)?.to_vec(), said: parsed(name, said)? };
+    let learnt = Learnt { weights: slice("weights", &weights)?.to_vec(), results: parsed(name, results)? };
     let pattern = to_spikes(pattern)?;
     let fired = enter(py, |stop| batch.run(&learnt, &pattern, stop))?;
     Ok(array(py, fired))

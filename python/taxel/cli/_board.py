@@ -191,7 +191,7 @@ def _bridged(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
         return []
     if counts["ended"]:
         state = "ended there; waiting for another"
-    elif counts["heard"]:
+    elif counts["received"]:
         state = "connected"
     else:
         state = "SILENT: the other computer, or the network to it, is gone; waiting"

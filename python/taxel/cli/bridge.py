@@ -138,6 +138,6 @@ def _watch(live: Live, published: Bridge, seconds: float | None, console: Consol
 def _receivers(counts: dict[str, dict[str, Any]]) -> str:
     connected = []
     for what, row in (("recorders", counts["block"]), ("viewers", counts["drop"])):
-        if row["heard"]:
+        if row["subscribed"]:
             connected.append(f"{what} connected; parcels: {row['sent']:,} sent, {row['dropped']:,} dropped")
     return "; ".join(connected) or "no receiver is connected"

@@ -98,8 +98,8 @@ def live(typed: _Typed) -> None:
     """Receive a board's events and print what a readout detects, live; with --panel or --to, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
-    JSON, written by the thread that made it: label; t_us, known_us and said_us by the board's clock; slope_mv_per_ms;
-    said_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
+    JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
+    reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
     which are counted. --panel shows the board in a browser, --to in Rerun or Foxglove; a slow viewer loses pictures,
     never data. Exit code 3: nothing was received, or something was lost after it had arrived; 2: the board has more
     taxels than the array.
@@ -193,12 +193,12 @@ def _report(folder: Path, readout: Readout | PlainRule, path: Path, tare: Tare |
     """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
     from taxel.detect import Example, Outcome  # noqa: PLC0415
-    from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
+    from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
 
     recording = taxel.open(path)
     rest = tare if isinstance(tare, Tare) else None
     outcome = Outcome(str(path), Example(recording, {}, rest), recording.detections)
-    write_listening(folder, readout, [outcome], title=f"Live detections, recorded to {path}")
+    write_detections(folder, readout, [outcome], title=f"Live detections, recorded to {path}")
 
 
 def _print_summary(summary: Summary, guard_frames: float) -> None:
@@ -206,7 +206,7 @@ def _print_summary(summary: Summary, guard_frames: float) -> None:
     detections, events = counted(counters["detections"], "detection"), counted(counters["events"], "event")
     say(f"{detections}, {events} in {counters['seconds']:.1f} s")
     if counters["detections"]:
-        say(f"from known to output: {delays(counters['said_latency'])}")
+        say(f"from known to output: {delays(counters['report_latency'])}")
     if counters["wrong"]:
         wrong = counted(counters["wrong"], "detection")
         say(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")

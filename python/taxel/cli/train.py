@@ -115,9 +115,9 @@ def train(
         training.readout.save(out, overwrite=overwrite)
         rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     if report is not None:
-        from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
+        from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
 
-        write_listening(
+        write_detections(
             report,
             training.readout,
             training.outcomes,

@@ -25,7 +25,7 @@ class BatchLearner(SpikeLearner):
 
     weights_: NDArray[np.float64] = field(init=False)
     #: Names of further results, which the compiled part reads in `predict`.
-    _said: dict[str, Any] = field(init=False)
+    _results: dict[str, Any] = field(init=False)
 
     def fit(self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> Self:
         """Learn weights that fire the neuron at the targets and nowhere else.
@@ -49,8 +49,8 @@ class BatchLearner(SpikeLearner):
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
         self.weights_, learnt = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
-        self._said = json.loads(learnt)
-        for name, value in self._said.items():
+        self._results = json.loads(learnt)
+        for name, value in self._results.items():
             setattr(self, f"{name}_", value)
         return self
 
@@ -58,5 +58,5 @@ class BatchLearner(SpikeLearner):
         self, patterns: list[SpikeTrains], instead: Mapping[str, Any] = MappingProxyType({})
     ) -> list[NDArray[np.float64]]:
         """Return the output spikes in each pattern; `instead` replaces learnt attributes by name."""
-        weights, learnt = self._fitted(), json.dumps(self._said | dict(instead))
+        weights, learnt = self._fitted(), json.dumps(self._results | dict(instead))
         return [_core.run_batch(self._kind, self._json(), weights, learnt, one._parts()) for one in patterns]

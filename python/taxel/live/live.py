@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from functools import partial
 from types import TracebackType
@@ -15,21 +15,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, instance, numbers, several, shown, text, whole
+from taxel._base.arguments import finite, flag, numbers, shown, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped
 from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detections import Detection, Detections
+from taxel.detections import Detection
 from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.options import LiveOptions
 from taxel.live.summary import Summary, summary_of
 from taxel.recording.changes import Zeroing
 from taxel.tare import Tare
 
-__all__ = ["Live", "heard"]
+__all__ = ["Live"]
 
 #: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"
@@ -134,7 +134,7 @@ class Live:
 
     Notes
     -----
-    `t` and `known` of a detection are the same live and from the recording; `said` is the time of its output. The
+    `t` and `known` of a detection are the same live and from the recording; `reported` is the time of its output. The
     offset and drift of the clocks are estimated from arrivals: a delay is never negative, so the lower envelope of
     arrival time minus board time is the offset.
 
@@ -250,7 +250,7 @@ class Live:
         `heartbeat_us` (the longest interval between heartbeats of a board of version 2, or None), `arrival` (state:
         "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended),
         `bridged` (None, or of a board of another computer: parcels, missing, dropped, dropped_by_kernel, repeated,
-        refused, restarts, silences, heard, ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`,
+        refused, restarts, silences, received, ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`,
         `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range
@@ -258,7 +258,7 @@ class Live:
         each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble),
         `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
-        `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
+        `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
         drift_ppm, or None), `pace` (drift_ppm, delay: as a latency, beyond the shortest; doubt: why they cannot be, or
         None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 
@@ -389,19 +389,19 @@ class Live:
         """The latest zeroing of each taxel that was zeroed, by `zero` or a panel."""
         return tuple(Zeroing(*one) for one in self._core.zeroed())
 
-    def note(self, said: str) -> None:
+    def note(self, message: str) -> None:
         """Write a note into the recording, with the current time.
 
         Parameters
         ----------
-        said : str
+        message : str
             The text.
 
         Raises
         ------
         ProblemError : nothing is recorded, or to a `.lsa`, which holds bytes only
         """
-        self._core.note(text("note", said))
+        self._core.note(text("note", message))
 
     def record(
         self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
@@ -489,36 +489,3 @@ class Live:
 
 def _given(inlet: LslInlet) -> str:
     return f"given,columns={':'.join(inlet.columns)}"
-
-
-def heard(said: Sequence[Detection]) -> Detections:
-    """Return detections of a `Live` as columns.
-
-    Parameters
-    ----------
-    said : sequence of Detection
-
-    Returns
-    -------
-    Detections
-
-    Raises
-    ------
-    ProblemError : something that is no detection
-
-    Examples
-    --------
-    >>> heard([Detection("contact", 1000, 1344)])
-    Detections(1: contact 1; 1000 to 1000 us)
-    """
-    detections = [instance("said", one, Detection) for one in several("said", said)]
-    times = [one.said for one in detections]
-    reported: Any = None if None in times else times
-    return Detections._of(
-        [one.label for one in detections],
-        [one.t for one in detections],
-        [one.known for one in detections],
-        [one.slope for one in detections],
-        reported,
-        [one.repaired for one in detections],
-    )

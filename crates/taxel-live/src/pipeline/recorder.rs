@@ -318,7 +318,7 @@ impl Recorder {
     pub(super) fn detection(&self, output: &OutputDetection) -> Result<()> {
         let found = &output.detection;
         let (Some(t), Some(known)) = (self.timed(found.t), self.timed(found.known)) else { return Ok(()) };
-        self.with_track(|track| track.detection(output.output_ns, &Detection { t, known, ..found.clone() }))
+        self.with_track(|track| track.detection(output.reported_ns, &Detection { t, known, ..found.clone() }))
     }
 
     /// Sets the rest that is subtracted from the pictures from now on.

@@ -32,7 +32,7 @@ const ANSWER_EVERY: Duration = Duration::from_millis(50);
 pub(super) struct Published {
     pub(super) counters: Counters,
     pub(super) decode_latency: Latencies,
-    pub(super) output_latency: Latencies,
+    pub(super) report_latency: Latencies,
     pub(super) markers: Vec<Marker>,
     pub(super) picture: Vec<u16>,
     pub(super) tare: Option<Tare>,
@@ -144,7 +144,7 @@ impl Shared {
             capture: self.receiver.counts(),
             bridged: self.receiver.bridged(),
             decode_latency: published.decode_latency.quantiles(),
-            output_latency: published.output_latency.quantiles(),
+            report_latency: published.report_latency.quantiles(),
             sent: self.sending.iter().map(|line| line.counts()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),
             ..published.counters.clone()

@@ -40,7 +40,7 @@ pub struct Reader {
     rebuilt: Rebuilt,
     /// How many bytes of a source may be in memory at once.
     memory: u64,
-    /// Whether a user said so.
+    /// Whether a user stated it.
     allowed: bool,
 }
 
