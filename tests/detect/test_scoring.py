@@ -215,7 +215,7 @@ def test_detections_are_chosen_by_label_time_and_place() -> None:
         ((None, [], []), "label is .*: must be a list of texts"),
         (("a", [1], [1]), "label is .*: must be a list of texts"),
         ((["a"], [1], [1], ["steep"]), "slope"),
-        ((["a"], [1], [1], [1.0], [1, 2]), "said has 2 entries"),
+        ((["a"], [1], [1], [1.0], [1, 2]), "reported has 2 entries"),
     ],
 )
 def test_nonsense_in_detections_is_one_clear_error(columns: tuple[object, ...], said: str) -> None:

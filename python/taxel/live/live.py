@@ -400,6 +400,15 @@ class Live:
         Raises
         ------
         ProblemError : nothing is recorded, or to a `.lsa`, which holds bytes only
+
+        Examples
+        --------
+        >>> import tempfile, taxel
+        >>> path = f"{tempfile.mkdtemp()}/walk.mcap"
+        >>> with Live(0, host="127.0.0.1", record=path) as live:
+        ...     live.note("heel strike")
+        >>> taxel.open(path).notes[0].text
+        'heel strike'
         """
         self._core.note(text("note", message))
 
