@@ -109,7 +109,9 @@ slow: released $(VENV)/.for-test dist bridge
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
 	$(BIN)/python -m pytest -q -m slow tests $(BESIDE)
 
-lint: build $(VENV)/.for-test $(VENV)/.for-lint
+# Either build of the extension does.
+lint: $(VENV)/.for-test $(VENV)/.for-lint
+	@$(MAKE) --question $(VENV)/.released 2>/dev/null || $(MAKE) --no-print-directory build
 	cargo fmt --all --check
 	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from registers_source import OPERATOR, Table, parsed, power_law, read
+from registers_source import OPERATOR, Table, parsed, read
 
 HEAD = "Made from registers.toml by tools/registers.py (`make registers`): edit that."
 OPPOSITE = {ast.LtE: ">", ast.Lt: ">=", ast.GtE: "<", ast.Gt: "<=", ast.Eq: "!=", ast.NotEq: "=="}
@@ -81,17 +81,17 @@ def formatted(expression: str, unit: str) -> tuple[str, str]:
     }[unit]
 
 
+def rust_entries(source: Table, values: Table) -> str:
+    """Write values of the registers as entries of a struct."""
+    flags = {field["name"] for field in source["field"] if field["unit"] == "flag"}
+    return " ".join(f"{name}: {str(bool(v)).lower() if name in flags else v}," for name, v in values.items())
+
+
 def rust_preset(source: Table, preset: Table) -> str:
-    """Write a preset as a constant."""
-    entries = []
-    for field in source["field"]:
-        number = preset["values"].get(field["name"], field["default"])
-        entries.append(f"{field['name']}: {str(bool(number)).lower() if field['unit'] == 'flag' else number},")
-    body = "\n            ".join(entries)
-    return (
-        f'    Preset {{\n        name: "{preset["name"]}",\n        sense_lines: {preset["sense_lines"]},\n'
-        f"        registers: Registers {{\n            {body}\n        }},\n    }},"
-    )
+    """Write a preset: what differs from the defaults."""
+    entries = rust_entries(source, preset["values"])
+    registers = f"Registers {{ {entries} ..DEFAULTS }}" if entries else "DEFAULTS"
+    return f'Preset {{ name: "{preset["name"]}", sense_lines: {preset["sense_lines"]}, registers: {registers} }},'
 
 
 def rust_rules(source: Table, *, warns: bool) -> str:
@@ -261,6 +261,8 @@ pub struct Preset {{
     pub registers: Registers,
 }}
 
+const DEFAULTS: Registers = Registers {{ {rust_entries(source, {f["name"]: f["default"] for f in source["field"]})} }};
+
 /// The presets, in the order of the reference; a board's registers at reset are the first preset for its array's size.
 pub const PRESETS: [Preset; {len(source["preset"])}] = [
 {newline.join(rust_preset(source, preset) for preset in source["preset"])}
@@ -292,15 +294,16 @@ pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {{
 
 def rust_power_law(source: Table) -> str:
     """Write the power law as the logic looks it up."""
-    law = power_law(source)
-    table = "\n".join("    " + " ".join(f"{entry}," for entry in law[k : k + 12]) for k in range(0, len(law), 12))
-    return as_formatted(f"""/// Number of fractional bits of [`POWER_LAW`].
-pub const POWER_LAW_FRACTION: u32 = {source["power_law"]["fraction_bits"]};
+    law = source["power_law"]
+    return as_formatted(f"""use std::sync::LazyLock;
 
-/// Ticks to the power of {source["power_law"]["exponent"]} (5.1), in fixed point: the lookup table of the logic.
-pub const POWER_LAW: [u32; {len(law)}] = [
-{table}
-];
+/// Number of fractional bits of [`POWER_LAW`].
+pub const POWER_LAW_FRACTION: u32 = {law["fraction_bits"]};
+
+/// Ticks to the power of {law["exponent"]} (5.1), in fixed point: the lookup table of the logic.
+pub static POWER_LAW: LazyLock<[u32; {law["entries"]}]> = LazyLock::new(|| {{
+    std::array::from_fn(|tick| (libm::pow(tick as f64, {law["exponent"]}) * f64::from(1 << POWER_LAW_FRACTION)).round() as u32)
+}});
 """)
 
 

@@ -82,8 +82,8 @@ __all__ = [
 
 #: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
 _ROOMS = (
-    "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot", "recording", "simulate",
-    "tasks", "wire",
+    "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot", "recording", "report",
+    "simulate", "tasks", "wire",
 )  # fmt: skip
 _RECORDING = (
     "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",

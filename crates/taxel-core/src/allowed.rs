@@ -199,7 +199,7 @@ macro_rules! ranges {
         fn check_ranges(&self) -> $crate::Result<()> {
             let mut of = Self::RANGES.iter();
             $(if let Some(parameter) = of.next() {
-                parameter.check(&ranges!(@ self $name $($method)?))?;
+                parameter.check(&$crate::allowed::ranges!(@ self $name $($method)?))?;
             })*
             Ok(())
         }

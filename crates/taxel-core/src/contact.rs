@@ -50,7 +50,12 @@ fn pitch_of(array: &Array) -> Result<f64> {
 
 /// Checks that a value of a scene is within its range; `place` names its owner in the error.
 fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range: Range) -> Result<()> {
-    Parameter { name, unit, range }.check(&value).map_err(|error| match error {
+    of_scene(place, Parameter { name, unit, range }.check(&value))
+}
+
+/// The outcome of a check as that of a scene; `place` names its owner in the error.
+fn of_scene(place: &str, outcome: Result<()>) -> Result<()> {
+    outcome.map_err(|error| match error {
         Error::Problem(text) => Error::Scene(format!("{place}: {text}")),
         other => other,
     })

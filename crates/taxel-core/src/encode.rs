@@ -4,8 +4,8 @@ mod blocks;
 mod bracket;
 mod by_stamp;
 mod channels;
+mod encoding;
 mod fields;
-mod law;
 mod loaded;
 mod local_sums;
 mod periods;
@@ -33,7 +33,7 @@ pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
 pub use tare::{Tare, TareBuilder, Zeroing};
 
-use law::Law;
+use encoding::Encoding;
 use side_by_side::SideBySide;
 use stream::{spikes_of_events, spikes_of_frames};
 
@@ -62,11 +62,11 @@ macro_rules! encoders {
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
         impl Encoder {
-            fn law(&self) -> &dyn Law {
+            fn encoding(&self) -> &dyn Encoding {
                 match self { $(Self::$Kind(e) => e,)* Self::Composite(e) => e }
             }
 
-            fn law_mut(&mut self) -> &mut dyn Law {
+            fn encoding_mut(&mut self) -> &mut dyn Encoding {
                 match self { $(Self::$Kind(e) => e,)* Self::Composite(e) => e }
             }
 
@@ -157,7 +157,7 @@ impl Encoder {
     ///
     /// `Problem`, naming the parameter, its value and what is valid.
     pub fn check(&self) -> Result<()> {
-        self.law().check()
+        self.encoding().check()
     }
 
     /// Starts a stream that encodes the input of an array.
@@ -167,32 +167,32 @@ impl Encoder {
     /// `Problem` if a parameter is out of range, or if an encoder that needs a tare has none or one of another array.
     pub fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         self.check()?;
-        self.law().stream(array)
+        self.encoding().stream(array)
     }
 
     /// The latency that the encoder's own algorithm adds between a touch and its spike, ms.
     #[must_use]
     pub fn latency_ms(&self) -> f64 {
-        self.law().latency_ms()
+        self.encoding().latency_ms()
     }
 
     /// The number of spike trains of the encoder for an array.
     #[must_use]
     pub fn trains(&self, array: &Array) -> usize {
-        self.law().trains(array)
+        self.encoding().trains(array)
     }
 
     /// The meaning of the spikes' values; a neuron receives each signed train as two, ON and OFF.
     #[must_use]
     pub fn kind(&self) -> SpikeKind {
-        self.law().kind()
+        self.encoding().kind()
     }
 
     /// The same encoder with this tare; an encoder that uses no tare is returned unchanged.
     #[must_use]
     pub fn with_tare(&self, tare: &Tare) -> Self {
         let mut with = self.clone();
-        with.law_mut().set_tare(tare);
+        with.encoding_mut().set_tare(tare);
         with
     }
 
@@ -240,6 +240,10 @@ pub struct Composite {
 }
 
 impl Composite {
+    fn described() -> Described {
+        Described::by(&Self { parts: BTreeMap::new() }, &["parts"], &[])
+    }
+
     /// The parts with these names, in the order of all parts; no name stands for all of them.
     ///
     /// # Errors
@@ -277,11 +281,7 @@ fn inputs(part: &Encoder, array: &Array) -> usize {
     part.trains(array) * part.kind().inputs_per_train()
 }
 
-impl Law for Composite {
-    fn described() -> Described {
-        Described::by(&Self { parts: BTreeMap::new() }, &["parts"], &[])
-    }
-
+impl Encoding for Composite {
     fn check(&self) -> Result<()> {
         if self.parts.is_empty() {
             return Err(problem!("composite: parts is empty: must be encoders by name, one or more"));
@@ -322,6 +322,6 @@ impl Law for Composite {
     }
 
     fn set_tare(&mut self, tare: &Tare) {
-        self.parts.values_mut().for_each(|part| part.law_mut().set_tare(tare));
+        self.parts.values_mut().for_each(|part| part.encoding_mut().set_tare(tare));
     }
 }

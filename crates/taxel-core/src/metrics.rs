@@ -4,8 +4,8 @@
 //! matrices. A distance between trains is extended to patterns as the sum over trains with the same number; the metrics
 //! with `spatial` or `multi_unit` in their names use other trains as well.
 
+mod distance;
 mod edges;
-mod law;
 pub mod matching;
 mod merged;
 mod pairwise;
@@ -20,7 +20,7 @@ pub use patterns::Patterns;
 pub use van_rossum::Normalisation;
 pub use van_rossum_spatial::{OwnTrain, Smoothing};
 
-use law::{Law, Ready};
+use distance::{Distance, Ready};
 use pairwise::Matrix;
 
 use crate::parameters::Described;
@@ -45,7 +45,7 @@ macro_rules! metrics {
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
         impl Metric {
-            fn law(&self) -> &dyn Law {
+            fn kind(&self) -> &dyn Distance {
                 match self { $(Self::$Kind(metric) => metric,)* }
             }
 
@@ -121,7 +121,7 @@ impl Metric {
     ///
     /// `Problem`, naming the parameter.
     pub fn check(&self) -> Result<()> {
-        self.law().check()
+        self.kind().check()
     }
 
     /// The distance between two patterns (the first of each side).
@@ -141,9 +141,8 @@ impl Metric {
     pub fn pairwise(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let ready = self.prepare(a, b)?;
         let matrix = Matrix::new(a.count, b.map(|b| b.count));
-        match ready.fill(&matrix, a, b, work) {
-            Some(filled) => filled?,
-            None => matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?,
+        if !ready.fill(&matrix, a, b, work)? {
+            matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?;
         }
         Ok(matrix.finish())
     }
@@ -164,6 +163,6 @@ impl Metric {
                 ));
             }
         }
-        self.law().ready(a, b)
+        self.kind().ready(a, b)
     }
 }

@@ -32,16 +32,10 @@ impl Described {
         Self { defaults, required: required.to_vec(), ranges: ranges.to_vec() }
     }
 
-    /// The same description with one more parameter, which is null by default.
-    #[must_use]
-    pub fn or_nothing(self, name: &'static str) -> Self {
-        self.or(name, Value::Null)
-    }
-
     /// The same description with one more parameter, which has no range.
     #[must_use]
-    pub fn or(mut self, name: &'static str, default: impl Into<Value>) -> Self {
-        self.defaults.insert(name.to_owned(), default.into());
+    pub fn or(mut self, name: &'static str, default: Value) -> Self {
+        self.defaults.insert(name.to_owned(), default);
         self
     }
 
@@ -78,3 +72,48 @@ impl Described {
         serde_json::json!({ "defaults": self.defaults, "required": self.required, "ranges": ranges })
     }
 }
+
+/// Declares a struct of parameters: a line for each, with its default and, if it is a number, its unit and its valid
+/// values; `or method` names the method that returns the value of one that is left out.
+///
+/// The struct gets `Default`, the table `RANGES`, `check_ranges`, which reads it, and `described`.
+macro_rules! parameters {
+    (
+        $(#[$about:meta])*
+        pub struct $Kind:ident {
+            $(
+                $(#[$meaning:meta])*
+                pub $name:ident: $type:ty = $default:expr $(, $unit:literal, $range:expr $(, or $method:ident)?)?;
+            )*
+        }
+    ) => {
+        $(#[$about])*
+        pub struct $Kind {
+            $($(#[$meaning])* pub $name: $type,)*
+        }
+
+        impl Default for $Kind {
+            fn default() -> Self {
+                Self { $($name: $default,)* }
+            }
+        }
+
+        impl $Kind {
+            $crate::allowed::ranges! {
+                $($($name $(($method))?: $unit, $range;)?)*
+            }
+
+            /// The parameters with their defaults and ranges.
+            #[must_use]
+            pub fn described() -> $crate::parameters::Described {
+                let defaults = Self::default();
+                $crate::parameters::Described {
+                    defaults: [$((stringify!($name).to_owned(), serde_json::json!(defaults.$name)),)*].into_iter().collect(),
+                    required: vec![],
+                    ranges: Self::RANGES.to_vec(),
+                }
+            }
+        }
+    };
+}
+pub(crate) use parameters;

@@ -202,13 +202,14 @@ impl SpikeTrains {
             return Ok(all);
         }
         // Trains are merged instead of sorted, because a sort of this many spikes could not be interrupted.
-        let next = |n: usize, k: usize| (k < self.offsets[n + 1]).then(|| Reverse(Next { t: self.times[k], n, k }));
+        let next =
+            |n: usize, k: usize| (k < self.offsets[n + 1]).then(|| Reverse(NextSpike { t: self.times[k], n, k }));
         let mut heads: BinaryHeap<_> = (0..self.len()).filter_map(|n| next(n, self.offsets[n])).collect();
         while let Some(mut head) = heads.peek_mut() {
             if all.len().is_multiple_of(BETWEEN_CHECKS) {
                 stop.check()?;
             }
-            let Next { n, k, .. } = head.0;
+            let NextSpike { n, k, .. } = head.0;
             all.push(spike(n, k));
             match next(n, k + 1) {
                 Some(following) => *head = following,
@@ -267,31 +268,31 @@ const BETWEEN_CHECKS: usize = 1 << 18;
 
 /// The next spike of train `n`, with index `k` among all; ordered by time, then by train.
 #[derive(Debug, Clone, Copy)]
-struct Next {
+struct NextSpike {
     t: f64,
     n: usize,
     k: usize,
 }
 
-impl Ord for Next {
+impl Ord for NextSpike {
     fn cmp(&self, other: &Self) -> Ordering {
         self.t.total_cmp(&other.t).then(self.n.cmp(&other.n))
     }
 }
 
-impl PartialOrd for Next {
+impl PartialOrd for NextSpike {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Next {
+impl PartialEq for NextSpike {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Next {}
+impl Eq for NextSpike {}
 
 /// [`SpikeTrains::check`] for borrowed columns.
 ///

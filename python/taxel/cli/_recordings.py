@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from taxel._base.arguments import short
 from taxel._base.documents import NotTomlError, of_toml
+from taxel._base.files import try_whole
 from taxel._base.messages import collected, escaped
 from taxel._base.progress import Steps
 from taxel._core import ProblemError
@@ -58,8 +59,6 @@ def try_report(folder: Path) -> None:
     FileExistsError : the folder holds a report already
     OSError : the folder cannot be made
     """
-    from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
-
     missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)

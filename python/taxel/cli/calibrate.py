@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from taxel._base.files import beside, named
+import taxel
+from taxel._base.files import beside, named, try_whole
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
@@ -71,23 +72,18 @@ def calibrate(
 
     Example: taxel calibrate weight.mcap --load 9.81 --from 2 --to 4 --tare 1
     """
-    from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.tasks import CalibrateOptions, KnownLoad  # noqa: PLC0415
-    from taxel.tasks import calibrate as calibrate_by  # noqa: PLC0415
-    from taxel.tasks.calibrate import read_loads  # noqa: PLC0415
-
     if load is None and (start is not None or stop is not None):
         raise ProblemError("--from and --to are the time of --load: give --load")
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {start} and --to {stop} s: --from must not be after --to")
-    options = CalibrateOptions(law, assignments(set_ or []), table, unit, each, exponent, tare, date, note)
+    options = taxel.tasks.CalibrateOptions(law, assignments(set_ or []), table, unit, each, exponent, tare, date, note)
     opened = files.opener.one(recording)
     place = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)
     with progress(as_json):
-        known = [] if loads is None else read_loads(loads)
-        known += [] if load is None else [KnownLoad(load, load_unit, start, stop, place="--load")]
-        made = calibrate_by(opened, known, options)
+        known = [] if loads is None else taxel.tasks.read_loads(loads)
+        known += [] if load is None else [taxel.tasks.KnownLoad(load, load_unit, start, stop, place="--load")]
+        made = taxel.tasks.calibrate(opened, known, options)
     made.calibration.save(place, overwrite=overwrite)
     say_warnings(made.warnings)
     if as_json:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import taxel
+from taxel._base.files import try_whole
 from taxel._core import ProblemError
 from taxel.cli._app import App, with_out
 from taxel.cli._bar import bar
@@ -55,9 +57,6 @@ def convert(
     Example: taxel convert walk.mcap walk.csv
     Example: taxel convert trials/ recordings/
     """
-    import taxel  # noqa: PLC0415  the command line starts quickly
-    from taxel._base.files import try_whole  # noqa: PLC0415
-
     if target.suffix:
         try_whole(target, overwrite=overwrite)
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import taxel
 from taxel import _core
 from taxel._base.messages import plain
 from taxel._core import ProblemError
@@ -60,8 +61,6 @@ def cut(
 
     Example: taxel cut walk.mcap heel.mcap --from 1.5 --to 3 --rows 0:20
     """
-    import taxel  # noqa: PLC0415  the command line starts quickly
-
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {plain(start)} --to {plain(stop)}: the part must not end before it begins")
     whole = of_source(files.opener.one(recording), source)

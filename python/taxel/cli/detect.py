@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import taxel
+from taxel._base.files import try_whole, write_whole
 from taxel._base.times import begun
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP, TARE_HELP, progress, say_warnings, try_report
 from taxel.cli._say import say
+from taxel.detections import Detections
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -64,27 +67,20 @@ def detect(
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
-    from taxel._base.files import try_whole, write_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import Readout, load  # noqa: PLC0415
-    from taxel.tasks import DetectOptions  # noqa: PLC0415
-    from taxel.tasks import detect as detect_in  # noqa: PLC0415
-
     if csv is not None:
         try_whole(csv, overwrite=overwrite)
     if report is not None:
         try_report(report)
-    options = DetectOptions(tare, frame_us, window_ms)
-    loaded = load(readout)
+    options = taxel.tasks.DetectOptions(tare, frame_us, window_ms)
+    loaded = taxel.detect.load(readout)
     with progress(as_json) as update:
         update(f"reading {recording}", 0, 0)
         opened = files.opener.all([recording])
-        found = detect_in(loaded, opened, truth, options, progress=update)
+        found = taxel.tasks.detect(loaded, opened, truth, options, progress=update)
     if csv is not None:
         write_whole(csv, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
     if report is not None:
-        from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
-
-        write_detections(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
+        taxel.report.write_detections(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
     say_warnings(found.warnings)
     written = {"written": csv, "report": None if report is None else report / "report.html"}
     places = {name: str(path) for name, path in written.items() if path is not None}
@@ -95,7 +91,7 @@ def detect(
         if recording.is_dir() or len(found.each) > 1:
             say(f"{each.outcome.name}:")
         _print(each, given=tare is not None)
-        if isinstance(loaded, Readout):
+        if isinstance(loaded, taxel.Readout):
             say(each.outcome.outside_text)
     if found.score is not None:
         say("", f"against {truth} (window {window_ms:g} ms):", *repr(found.score).split("\n"))
@@ -135,8 +131,6 @@ def _table(outcomes: Sequence[Outcome]) -> str:
 
 def _print(each: Detected, *, given: bool) -> None:
     """Print detections, with times from the recording's beginning on, and what may have kept others away."""
-    from taxel.detections import Detections  # noqa: PLC0415  the command line starts quickly
-
     found, begin_us = each.outcome.found, each.outcome.begin_us
     detections = Detections._of(found.label, found.t - begin_us, found.known - begin_us, found.slope)
     say(repr(detections))

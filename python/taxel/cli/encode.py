@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+import taxel
 from taxel._base.files import try_whole
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import App, with_out
@@ -39,14 +40,11 @@ def encode(
     """
     if out.suffix != ".npz":
         raise ProblemError(f"{out}: spikes are written to a .npz")
-    from taxel.tasks import EncodeOptions  # noqa: PLC0415  the command line starts quickly
-    from taxel.tasks import encode as encode_by  # noqa: PLC0415
-
     try_whole(out, overwrite=overwrite)
-    options = EncodeOptions(encoder, assignments(values or []), tare)
+    options = taxel.tasks.EncodeOptions(encoder, assignments(values or []), tare)
     with progress(as_json) as update:
         update(f"reading {recording}", 0, 0)
-        encoded = encode_by(files.opener.one(recording), options, progress=update)
+        encoded = taxel.tasks.encode(files.opener.one(recording), options, progress=update)
     encoded.trains.save(out, overwrite=overwrite)
     say_warnings(encoded.warnings)
     result = {"recording": str(recording), **encoded.to_dict(), "written": str(out)}

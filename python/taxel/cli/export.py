@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
+import taxel
 from taxel._base.messages import installing
+from taxel._core import Error
 from taxel.cli._app import App, with_out
 from taxel.cli._say import say
 
@@ -41,11 +43,8 @@ def nir(
 
     Example: taxel export nir walk.json walk.nir
     """
-    from taxel._core import Error  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import Readout  # noqa: PLC0415
-
     try:
-        lost = Readout.load(readout).to_nir(out, spike_ms=spike_ms, overwrite=overwrite)
+        lost = taxel.Readout.load(readout).to_nir(out, spike_ms=spike_ms, overwrite=overwrite)
     except ModuleNotFoundError as error:
         raise Error(f"{error}: {installing('nir')}") from None
     if as_json:

@@ -12,9 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+import taxel
+from taxel._base.files import try_whole, write_whole
 from taxel._base.messages import counted
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
+from taxel.array import Array
 from taxel.cli._app import App
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
@@ -22,7 +25,7 @@ from taxel.cli._recordings import TARE_HELP, progress, say_warnings
 from taxel.cli._say import say
 from taxel.cli._topics import listed
 from taxel.clock import doubt
-from taxel.spikes import to_ms
+from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
     from taxel.frames import Frames
@@ -68,11 +71,9 @@ def info(
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
     """
-    from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
     from taxel.recording.pressure import above_rest  # noqa: PLC0415
     from taxel.recording.without_layout import are_spike_trains  # noqa: PLC0415
-    from taxel.tasks import info as info_of  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
@@ -94,13 +95,13 @@ def info(
         if len(every) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:
                 raise ProblemError(_several(file, every))
-            infos = [info_of(one, tare) for one in every]
+            infos = [taxel.tasks.info(one, tare) for one in every]
             of_each = [one.facts for one in infos]
             result = [json.dumps(of_each if len(every) > 1 else of_each[0])]
             say(*(result if as_json else chain.from_iterable(map(_pages, of_each))))
             say_warnings(dict.fromkeys(text for one in infos for text in one.warnings))
             return
-        found = info_of(recording, tare)
+        found = taxel.tasks.info(recording, tare)
         facts, pressed = found.facts, found.pressed
         facts["array_assumed"] &= not files.array
     say_warnings(found.warnings)
@@ -118,8 +119,6 @@ def info(
 
 def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:
     """Return what a file of spike trains holds, as one line of JSON or as lines for people."""
-    from taxel.spikes import SpikeTrains  # noqa: PLC0415  the command line starts quickly
-
     if drawn:
         raise ProblemError(f"{file}: spike trains; a picture or a table is of a recording")
     trains = SpikeTrains.load(file)
@@ -142,7 +141,6 @@ def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest]
     """Write rates, a map of the taxels and the pressure over time as a picture."""
     import matplotlib as mpl  # noqa: PLC0415  loads slowly
 
-    from taxel._base.files import write_whole  # noqa: PLC0415
     from taxel.plot import overview, pressure  # noqa: PLC0415
 
     mpl.use("Agg")
@@ -203,8 +201,6 @@ def _page(facts: dict[str, Any]) -> list[str]:
 
 
 def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
-
     array = Array._from_geometry(facts["array"])
     size = f"{array.rows} x {array.columns} taxels, {array._apart()}"
     # The default's name, and that of --array, say nothing more.

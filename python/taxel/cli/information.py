@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import taxel
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
@@ -68,15 +69,11 @@ def information(
 
     Example: taxel information drops.mcap --labels drops.csv --window-ms 50
     """
-    from taxel.report.information import write_information  # noqa: PLC0415  the command line starts quickly
-    from taxel.tasks import InformationOptions  # noqa: PLC0415
-    from taxel.tasks import information as estimate  # noqa: PLC0415
-
     if report.suffix != ".html":
         raise ProblemError(f"--report {report}: is one page, so its name must end in .html")
     if report.exists() and not overwrite:
         raise FileExistsError(17, "exists already; give --overwrite or another --report", str(report))
-    options = InformationOptions(
+    options = taxel.tasks.InformationOptions(
         encoder,
         assignments(values or []),
         window_ms,
@@ -110,9 +107,9 @@ def information(
                 trials = trials if of else what
                 update(what, done, of)
 
-            result = estimate(opened, labels, options, progress=show, watch=known.add)
+            result = taxel.tasks.information(opened, labels, options, progress=show, watch=known.add)
             update("drawing", 0, 0)
-            write_information(report, result.answer, overwrite=overwrite)
+            taxel.report.write_information(report, result.answer, overwrite=overwrite)
     except KeyboardInterrupt:
         say(known.line(draws), err=True)
         raise

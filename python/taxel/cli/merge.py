@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+import taxel
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP
@@ -43,8 +44,6 @@ def merge(
 
     Example: taxel merge left.mcap right.mcap -o both.mcap --beside
     """
-    import taxel  # noqa: PLC0415  the command line starts quickly
-
     opened = [files.opener.one(path) for path in recordings]
     parts = opened if label is None else [part for each in opened for part in taxel.cut(each, label=label)]
     merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6, beside=beside)

@@ -9,6 +9,8 @@ from typing import Annotated, Any
 import typer
 from rich.progress import Progress
 
+import taxel
+from taxel._base.files import try_whole, write_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import App
@@ -49,13 +51,10 @@ def simulate(
 
     Example: taxel simulate scene.toml -o touch.mcap --movie touch.gif
     """
-    import taxel  # noqa: PLC0415  the command line starts quickly
-    from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
-    from taxel.plot.film import film, writer_of  # noqa: PLC0415
-    from taxel.simulate import SceneFile, play, truth  # noqa: PLC0415
+    from taxel.plot.film import film, writer_of  # noqa: PLC0415  loads pictures
 
     with progress(quiet=True):
-        scene_file = SceneFile.open(scene)
+        scene_file = taxel.simulate.SceneFile.open(scene)
     seed = scene_file.seed if seed is None else seed
     targets = [path for path in (out, movie, labels) if path is not None]
     if len({path.resolve() for path in targets}) < len(targets):
@@ -64,7 +63,7 @@ def simulate(
         writer_of(movie)
     for path in targets:
         try_whole(path, overwrite=overwrite)
-    contacts, force = truth(scene_file.acts(), preset=scene_file.preset, array=scene_file.array)
+    contacts, force = taxel.simulate.truth(scene_file.acts(), preset=scene_file.preset, array=scene_file.array)
     about: dict[str, Any] = {"scene": str(scene), "seed": seed, "contacts": [contact._asdict() for contact in contacts]}
     about["peak_n"] = float(force.max())
     lines = [f"{scene}: {counted(len(contacts), 'touch', 'touches')}, at most {force.max():.3g} N"]
@@ -72,7 +71,7 @@ def simulate(
     with bar:
         if out is not None or movie is not None:
             task = bar.add_task("playing", total=1.0)
-            played = play(
+            played = taxel.simulate.play(
                 scene_file.acts(),
                 seed=seed,
                 watch=lambda share: bar.update(task, completed=share),

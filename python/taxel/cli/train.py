@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import taxel
+from taxel._base.files import try_whole
 from taxel._base.messages import collected
 from taxel._core import ProblemError
 from taxel.cli._app import App
@@ -96,28 +98,22 @@ def train(
     Example: taxel train a.mcap b.mcap --labels events.csv --encoder contact_area --tare 0.05
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
-    from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.tasks import TrainOptions  # noqa: PLC0415
-    from taxel.tasks import train as train_on  # noqa: PLC0415
-
     try_whole(out, overwrite=overwrite)
     if report is not None:
         try_report(report)
     changes = assignments(values or []) | {
         key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
     }
-    options = TrainOptions(recipe, changes, tare, folds, search, window_ms)
+    options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, search, window_ms)
     with progress(as_json) as update:
         update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3), 0, 0)
         opened = files.opener.all(recordings)
         _try_rules(rule, labels, opened, overwrite=overwrite)
-        training = train_on(opened, labels, options, progress=update)
+        training = taxel.train(opened, labels, options, progress=update)
         training.readout.save(out, overwrite=overwrite)
         rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     if report is not None:
-        from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
-
-        write_detections(
+        taxel.report.write_detections(
             report,
             training.readout,
             training.outcomes,
@@ -141,7 +137,6 @@ def train(
 
 def _try_rules(place: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:
     """Check that plain rules can be written, before the work whose result they hold."""
-    from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.tasks.labels import references  # noqa: PLC0415
 
     if place is None:
@@ -180,10 +175,8 @@ def _next(training: Training, out: Path, tare: str | None) -> str:
 
 def _are_quiet(recordings: Sequence[Recording]) -> bool:
     """Return whether a detection finds the rest of each recording by itself."""
-    from taxel.tasks import rest  # noqa: PLC0415  the command line starts quickly
-
     try:
         with collected():
-            return all(rest(one) for one in recordings)
+            return all(taxel.tasks.rest(one) for one in recordings)
     except ProblemError:
         return False

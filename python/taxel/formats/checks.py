@@ -1,22 +1,39 @@
-"""Checks that readers of files share: the size of a sensor, the range and the order of times."""
+"""Checks that readers of files share: that there are any, the size of a sensor, the range and the order of times."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.arguments import path as checked_path
 from taxel._base.limits import TAXELS, TIME_US
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["ascending", "ascending_us", "sensor", "table", "whole_us"]
+__all__ = ["ascending", "ascending_us", "files_at", "sensor", "table", "whole_us"]
 
 #: Times that are converted at once, so that little memory is taken beside them.
 _PIECE = 1 << 16
+
+
+def files_at(path: str | Path, files: Callable[[Path], list[Path]], what: str) -> list[Path]:
+    """Return the files of a format at a path, of which there must be one or more.
+
+    Raises
+    ------
+    FormatError : there is none (says `what` they are)
+    ProblemError : `path` is no path
+    """
+    place = Path(checked_path("path", path))
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no {what} in it")
+    return found
 
 
 def sensor(place: str, array: Array) -> Array:

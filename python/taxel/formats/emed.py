@@ -15,13 +15,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base import arguments
 from taxel._base.columns import Growing
 from taxel._base.limits import TIME_US
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import sensor
+from taxel.formats.checks import files_at, sensor
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 from taxel.spikes import to_us
@@ -72,11 +71,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format (names file and line)
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no emed .lst in it")
-    for file in paths:
+    for file in files_at(path, files, "emed .lst"):
         yield _read(file)
 
 

@@ -21,8 +21,8 @@ from taxel._base.limits import unpacked
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending, whole_us
-from taxel.formats.trial import MARGIN_US, Trial
+from taxel.formats.checks import ascending, files_at, whole_us
+from taxel.formats.trial import Trial, scored_around
 from taxel.frames import Frames
 
 __all__ = ["files", "format_212", "step_times", "trials"]
@@ -58,11 +58,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format (names file and line or byte)
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no NAME.hea with NAME.let in it")
-    for header in paths:
+    for header in files_at(path, files, "NAME.hea with NAME.let"):
         rate, samples, signals = _header(header)
         steps = header.with_suffix(".ts")
         for name, first, checksum in signals:
@@ -73,13 +69,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
             for k in range(0, samples, _AT_ONCE):
                 valid = k + np.flatnonzero(values[k : k + _AT_ONCE] != NO_SAMPLE)
                 kept.add(t=whole_us(header.name, valid / rate, 0), values=values[valid, None, None])
-            truth: dict[str, NDArray[np.int64]] = {}
-            scored = (0, 0)
-            if foot == "left" and steps.exists():
-                truth = step_times(steps)
-                ends = [times for times in truth.values() if len(times)]
-                if ends:
-                    scored = (min(e[0] for e in ends) - MARGIN_US, max(e[-1] for e in ends) + MARGIN_US)
+            truth = step_times(steps) if foot == "left" and steps.exists() else {}
             yield Trial(
                 name=f"{header.stem} {foot}".strip(),
                 person=header.stem,
@@ -93,7 +83,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
                 source=_SOURCE,
                 foot=foot,
                 group="healthy" if header.stem.startswith("control") else "patient",
-                scored=(int(scored[0]), int(scored[1])),
+                scored=scored_around(truth),
             )
 
 

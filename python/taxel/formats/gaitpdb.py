@@ -18,9 +18,9 @@ from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending, whole_us
+from taxel.formats.checks import ascending, files_at, whole_us
 from taxel.formats.layout import packaged
-from taxel.formats.trial import MARGIN_US, Trial
+from taxel.formats.trial import Trial, scored_around
 from taxel.frames import Frames
 
 __all__ = ["contacts", "files", "trials"]
@@ -57,16 +57,12 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format (names file, line and column)
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no file such as GaCo02_01.txt in it")
+    paths = files_at(path, files, "file such as GaCo02_01.txt")
     places, foot_of = packaged("gaitpdb"), Array(1, 8, name="gaitpdb foot")
-    known = _events_table((place if place.is_dir() else place.parent) / "events.csv")
+    known = _events_table(paths[0].parent / "events.csv")
     for file in paths:
         match = _NAME.fullmatch(file.name)
-        if match is None:
-            raise FormatError(f"{file.name}: must be named such as GaCo02_01.txt")
+        assert match is not None  # as `files` chose it
         person = match[1]
         feet = ((8,), np.float32)
         read = Growing(file.name, t=((), np.int64), left=feet, right=feet, totals=((2,), np.float64))
@@ -84,11 +80,6 @@ def trials(path: str | Path) -> Iterator[Trial]:
                     f"events.csv: {person} {foot}, sample {samples.max()}; {file.name} has {len(t)} lines"
                 )
             truth = {"contact": t[samples[:, 0]], "foot_off": t[samples[:, 1]]}
-            scored = (
-                (int(truth["contact"][0]) - MARGIN_US, int(truth["foot_off"][-1]) + MARGIN_US)
-                if len(samples)
-                else (0, 0)
-            )
             yield Trial(
                 name=f"{file.name.split('.')[0]} {foot}",
                 person=person,
@@ -97,7 +88,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
                 source=_SOURCE,
                 foot=foot,
                 group="healthy" if match[3] == "Co" else "patient",
-                scored=scored,
+                scored=scored_around(truth),
                 series={"total": total},
             )
 

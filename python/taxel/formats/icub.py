@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from taxel._base import arguments
 from taxel._base.columns import Growing
 from taxel._base.header_table import HeaderTable
 from taxel._base.limits import unpacked
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
+from taxel.formats.checks import files_at
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -64,11 +64,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format (names file and line)
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no table of grasps (OBJECT.csv.gz) in it")
-    for file in paths:
+    for file in files_at(path, files, "table of grasps (OBJECT.csv.gz)"):
         name = file.name.removesuffix(".gz").removesuffix(".csv")
         shapes = {"taxels": ((len(_TAXELS),), np.float32), "joints": ((len(_JOINTS),), np.float64)}
         grasps: dict[str, Growing] = {}

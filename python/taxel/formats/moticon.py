@@ -15,13 +15,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base import arguments
 from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending, ascending_us, whole_us
-from taxel.formats.trial import MARGIN_US, Trial
+from taxel.formats.checks import ascending, ascending_us, files_at, whole_us
+from taxel.formats.trial import Trial, scored_around
 from taxel.frames import Frames
 
 __all__ = ["MARKERS", "files", "trials"]
@@ -63,11 +62,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format (names file, line and column)
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no Moticon text export in it (lines of # that name the sensor insoles)")
-    steps = _steps_table((place if place.is_dir() else place.parent) / "steps.csv")
+    paths = files_at(path, files, "Moticon text export (lines of # that name the sensor insoles)")
+    steps = _steps_table(paths[0].parent / "steps.csv")
     for file in paths:
         yield from _read(file, steps.get(file.stem))
 
@@ -109,7 +105,6 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             else np.array(marked[foot, event], np.int64)
             for event in ("contact", "foot_off")
         }
-        ends = [times for times in truth.values() if len(times)]
         yield Trial(
             name=f"{file.stem} {foot}",
             person=about.get("Sensor insoles", "moticon"),
@@ -122,9 +117,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             truth=truth,
             source=_SOURCE,
             foot=foot,
-            scored=(min(int(e[0]) for e in ends) - MARGIN_US, max(int(e[-1]) for e in ends) + MARGIN_US)
-            if ends
-            else (0, 0),
+            scored=scored_around(truth),
             series={"total": own.column("total")},
             about=about,
             unread=tuple(name for k, name in enumerate(names) if k not in columns and name.startswith(f"{foot} ")),

@@ -19,8 +19,8 @@ from taxel._base.columns import Growing
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import ascending, whole_us
-from taxel.formats.trial import MARGIN_US, Trial
+from taxel.formats.checks import ascending, files_at, whole_us
+from taxel.formats.trial import Trial, scored_around
 from taxel.frames import Frames
 
 __all__ = ["contacts", "files", "trials"]
@@ -52,11 +52,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format (names file, line and column)
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no pedar .asc in it")
-    for file in paths:
+    for file in files_at(path, files, "pedar .asc"):
         yield from _read(file)
 
 
@@ -109,9 +105,7 @@ def _read(file: Path) -> Iterator[Trial]:
             truth=truth,
             source=_SOURCE,
             foot=foot,
-            scored=(int(truth["contact"][0]) - MARGIN_US, int(truth["foot_off"][-1]) + MARGIN_US)
-            if len(stances)
-            else (0, 0),
+            scored=scored_around(truth),
             series={"total": total},
         )
 

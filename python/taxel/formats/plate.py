@@ -20,6 +20,7 @@ from taxel._base.h5_file import H5File
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
+from taxel.formats.checks import files_at
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -62,11 +63,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no file subjNNN.h5 in it")
-    folder = place if place.is_dir() else place.parent
+    paths = files_at(path, files, "file subjNNN.h5")
+    folder = paths[0].parent
     known, about = _events_table(folder / "events.csv"), _trials_table(folder / "trials.csv")
     for file in paths:
         person = file.stem

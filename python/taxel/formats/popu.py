@@ -16,6 +16,7 @@ from taxel._base import arguments
 from taxel._base.archive import read_arrays, stored_names
 from taxel._core import FormatError
 from taxel.array import Array
+from taxel.formats.checks import files_at
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -51,15 +52,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no .npz with readings and pose in it")
-    for file in paths:
+    for file in files_at(path, files, ".npz with readings and pose"):
         held = read_arrays(file, ("readings", "pose"))
-        missing = [name for name in ("readings", "pose") if name not in held]
-        if missing:
-            raise FormatError(f"{file.name}: holds no array {missing[0]}; must be readings and pose")
         readings, names = held["readings"], held["pose"]
         if readings.ndim != 4 or readings.dtype.kind not in "ui" or names.shape != readings.shape[:1]:
             raise FormatError(f"{file.name}: readings must be poses x snapshots x rows x columns, with a name a pose")

@@ -23,7 +23,7 @@ from taxel._base.number_text import refuse_digits
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
-from taxel.formats.checks import sensor
+from taxel.formats.checks import files_at, sensor
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 
@@ -73,11 +73,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format (names file, line and cell)
     """
-    place = Path(arguments.path("path", path))
-    paths = files(place)
-    if not paths:
-        raise FormatError(f"{place}: no Tekscan movie in it (text that begins with DATA_TYPE)")
-    for file in paths:
+    for file in files_at(path, files, "Tekscan movie (text that begins with DATA_TYPE)"):
         yield _read(file)
 
 

@@ -14,7 +14,7 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["MARGIN_US", "Trial"]
+__all__ = ["MARGIN_US", "Trial", "scored_around"]
 
 #: Readers score detections from this time before the first reference event to this time after the last one, us.
 MARGIN_US = 100_000
@@ -137,3 +137,9 @@ class Trial:
     def __repr__(self) -> str:
         events = ", ".join(f"{len(times)} {event}" for event, times in self.truth.items()) or "no truth"
         return escaped(f"Trial({self.name}: {self.recorded!r}, {events})")
+
+
+def scored_around(truth: Mapping[str, NDArray[np.int64]]) -> tuple[int, int]:
+    """Return the interval from `MARGIN_US` before the first reference event to as long after the last one, us."""
+    times = np.concatenate([*truth.values(), np.empty(0, np.int64)])
+    return (int(times.min()) - MARGIN_US, int(times.max()) + MARGIN_US) if len(times) else (0, 0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 from threadpoolctl import threadpool_limits
 
 __all__ = ["threads"]
@@ -10,6 +12,5 @@ __all__ = ["threads"]
 def threads(*, several: bool) -> threadpool_limits:
     """Limit NumPy and SciPy to one thread until the context ends, unless several are worth their cost."""
     # SciPy has a pool of threads of its own, which can be limited only once it is loaded.
-    import scipy.linalg  # noqa: F401, PLC0415
-
+    import_module("scipy.linalg")
     return threadpool_limits(None if several else 1)

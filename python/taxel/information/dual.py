@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # its modules load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import finite_numbers
@@ -41,18 +42,16 @@ def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     ------
     ProblemError : a matrix of no inner product
     """
-    from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
-
     trials, centred = len(square), _centred(square)
     least = trials * np.finfo(float).eps * float(np.abs(centred).max())
     if level < least:
         raise ProblemError(
             f"ridge: {level:.3g} in the unit of inner products is lost in their rounding; must be {least:.3g} at least"
         )
-    factor, fault = lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
+    factor, fault = scipy.linalg.lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
     if fault:
         raise ProblemError("grams: a matrix has a direction of negative length, so it is of no inner product")
-    inverse = lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
+    inverse = scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
     return np.asarray(inverse + np.tril(inverse, -1).T - 1 / trials)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import scipy  # its modules load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import callback, finite, number, shown, whole
@@ -341,8 +342,6 @@ def _interval(
     random: np.random.Generator,
 ) -> tuple[float, float]:
     """Return both ends as distances from the estimate."""
-    from scipy.special import ndtri, stdtrit  # noqa: PLC0415  loads slowly
-
     units = np.arange(len(row)) if belongs is None else belongs
     owner = np.unique(units, return_index=True)[1]
     # Where each unit has one label, the number of units a label is part of the design, and redraws keep it.
@@ -360,7 +359,7 @@ def _interval(
     ends = np.quantile(redrawn, [(1 - confidence) / 2, (1 + confidence) / 2]) - redrawn.mean()
     if belongs is not None:
         free = max(1, len(owner) - 1)
-        wider = stdtrit(free, (1 + confidence) / 2) / ndtri((1 + confidence) / 2)
+        wider = scipy.special.stdtrit(free, (1 + confidence) / 2) / scipy.special.ndtri((1 + confidence) / 2)
         ends *= wider * np.sqrt(len(owner) / free)
     return float(min(ends[0], 0.0)), float(max(ends[1], 0.0))
 
@@ -398,9 +397,7 @@ def _left_open(
 
     By Fano's inequality, with Clopper and Pearson's upper end for the share of errors.
     """
-    from scipy.special import betaincinv  # noqa: PLC0415  loads slowly
-
-    share = betaincinv(wrong + 1, np.maximum(trials - wrong, 1e-9), (1 + confidence) / 2)[..., None, None]
+    share = scipy.special.betaincinv(wrong + 1, np.maximum(trials - wrong, 1e-9), (1 + confidence) / 2)[..., None, None]
     even = np.where(np.eye(len(prior), dtype=bool), 1 - share, share / (len(prior) - 1))
     table = np.rint(_FINE * prior[:, None] * even)
     return np.asarray(label_entropy(table) - plug_in(table))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its modules load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import instance, number, shown
@@ -81,8 +82,6 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
     >>> str(keeps(every, every)), str(keeps(some, every))
     ('keeps', 'loses')
     """
-    from scipy.special import stdtrit  # noqa: PLC0415  loads slowly
-
     a, b = instance("cheap", cheap, Estimate).local, instance("dear", dear, Estimate).local
     part = number("share", share)
     if not 0 < part < 1:
@@ -96,7 +95,7 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
         return float(units.std(ddof=1) / np.sqrt(len(units))) if len(units) > 1 else np.inf
 
     margin, error = cheap.bits - part * dear.bits, error_of(a - part * b)
-    reach = float(stdtrit(max(1, len(np.unique(belongs)) - 1), CONFIDENCE))
+    reach = float(scipy.special.stdtrit(max(1, len(np.unique(belongs)) - 1), CONFIDENCE))
     above = reach * error_of(b)
     if np.isfinite(above) and dear.bits <= above:
         return Verdict("nothing", margin, error)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy  # its modules load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import numbers
@@ -76,10 +77,12 @@ class ClassMoments:
         shift : float64, shape (features,), optional
             Taken off every trial, so that values far from 0 keep their digits.
         """
-        from scipy.linalg import blas, lapack  # noqa: PLC0415  loads slowly
-
         moments = cls(classes, x.shape[1], dtype)
-        product, pack = (blas.ssyrk, lapack.strttf) if dtype == np.float32 else (blas.dsyrk, lapack.dtrttf)
+        product, pack = (
+            (scipy.linalg.blas.ssyrk, scipy.linalg.lapack.strttf)
+            if dtype == np.float32
+            else (scipy.linalg.blas.dsyrk, scipy.linalg.lapack.dtrttf)
+        )
         square = np.zeros((x.shape[1], x.shape[1]), dtype, order="F")
         for block, mine in blocks(x, rows, dtype, shift):
             square = product(1.0, block.T, beta=1.0, c=square, lower=1, overwrite_c=1)
@@ -108,10 +111,12 @@ class ClassMoments:
 
     def first(self, features: int) -> ClassMoments:
         """Return the sums of the first so many features."""
-        from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
-
         single = self.scatter.dtype == np.float32
-        unpack, pack = (lapack.stfttr, lapack.strttf) if single else (lapack.dtfttr, lapack.dtrttf)
+        unpack, pack = (
+            (scipy.linalg.lapack.stfttr, scipy.linalg.lapack.strttf)
+            if single
+            else (scipy.linalg.lapack.dtfttr, scipy.linalg.lapack.dtrttf)
+        )
         square = unpack(self.sums.shape[1], self.scatter, uplo="L")[0]
         part = ClassMoments.__new__(ClassMoments)
         part.counts, part.sums = self.counts, self.sums[:, :features]
@@ -159,8 +164,6 @@ def solved(moments: ClassMoments, ridge: float, priors: str, shift: NDArray[np.f
     ------
     ProblemError : one class, not more trials than classes, or no feature that varies
     """
-    from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
-
     there = moments.counts > 0
     counts = moments.counts[there]
     trials = int(counts.sum())
@@ -179,10 +182,10 @@ def solved(moments: ClassMoments, ridge: float, priors: str, shift: NDArray[np.f
     weighed = varying & (variance > 0)
     scale = np.divide(1.0, np.sqrt(variance), out=np.zeros_like(variance), where=weighed)
     right = np.asfortranarray(((means - centre) * scale).T)
-    factor, fault = lapack.dpotrf(_scaled(within, scale), lower=1, clean=0, overwrite_a=1)
+    factor, fault = scipy.linalg.lapack.dpotrf(_scaled(within, scale), lower=1, clean=0, overwrite_a=1)
     rank = int(weighed.sum())
     if fault == 0 and factor.diagonal().min() ** 2 > _SINGULAR:
-        values = lapack.dpotrs(factor, right, lower=1)[0]
+        values = scipy.linalg.lapack.dpotrs(factor, right, lower=1)[0]
     else:
         # dpotrf overwrote the matrix by its factor, so the matrix is computed again.
         del factor, within
@@ -199,13 +202,11 @@ def solved(moments: ClassMoments, ridge: float, priors: str, shift: NDArray[np.f
 
 def _within(moments: ClassMoments) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the scatter within classes (lower triangle), and the sum of squares of each feature."""
-    from scipy.linalg import blas, lapack  # noqa: PLC0415  loads slowly
-
-    square = lapack.dtfttr(moments.sums.shape[1], moments.scatter.astype(np.float64), uplo="L")[0]
+    square = scipy.linalg.lapack.dtfttr(moments.sums.shape[1], moments.scatter.astype(np.float64), uplo="L")[0]
     squares = square.diagonal().copy()
     there = moments.counts > 0
     rooted = np.asfortranarray((moments.sums[there] / np.sqrt(moments.counts[there, None])).T)
-    return blas.dsyrk(-1.0, rooted, beta=1.0, c=square, lower=1, overwrite_c=1), squares
+    return scipy.linalg.blas.dsyrk(-1.0, rooted, beta=1.0, c=square, lower=1, overwrite_c=1), squares
 
 
 def _scaled(square: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -239,24 +240,22 @@ def _by_pivots(square: NDArray[np.float64], right: NDArray[np.float64]) -> tuple
     With features in the order of pivots the factor is [L1; L2], and the columns of [-inv(L1') L2'; 1] span the
     directions in which no class varies. What lies in these is taken off the right side and off a solution.
     """
-    from scipy.linalg import blas, lapack  # noqa: PLC0415  loads slowly
-
-    factor, pivots, rank, _ = lapack.dpstrf(square, tol=_SINGULAR, lower=1)
+    factor, pivots, rank, _ = scipy.linalg.lapack.dpstrf(square, tol=_SINGULAR, lower=1)
     if rank == len(square) or factor[rank - 1, rank - 1] ** 2 < _CLEAR:
         return None
     order = pivots - 1
     upper = np.asfortranarray(factor[:rank, :rank])
-    dependence = -blas.dtrsm(1.0, upper, np.asfortranarray(factor[rank:, :rank].T), lower=1, trans_a=1)
-    gram, fault = lapack.dpotrf(np.eye(dependence.shape[1]) + dependence.T @ dependence, lower=1)
+    dependence = -scipy.linalg.blas.dtrsm(1.0, upper, np.asfortranarray(factor[rank:, :rank].T), lower=1, trans_a=1)
+    gram, fault = scipy.linalg.lapack.dpotrf(np.eye(dependence.shape[1]) + dependence.T @ dependence, lower=1)
     if fault != 0:
         return None
 
     def without_dependence(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        along = lapack.dpotrs(gram, dependence.T @ values[:rank] + values[rank:], lower=1)[0]
+        along = scipy.linalg.lapack.dpotrs(gram, dependence.T @ values[:rank] + values[rank:], lower=1)[0]
         return np.concatenate((values[:rank] - dependence @ along, values[rank:] - along))
 
     basic = np.zeros_like(right)
-    basic[:rank] = lapack.dpotrs(upper, without_dependence(right[order])[:rank], lower=1)[0]
+    basic[:rank] = scipy.linalg.lapack.dpotrs(upper, without_dependence(right[order])[:rank], lower=1)[0]
     solved = np.empty_like(right)
     solved[order] = without_dependence(basic)
     return solved, int(rank)
@@ -264,9 +263,7 @@ def _by_pivots(square: NDArray[np.float64], right: NDArray[np.float64]) -> tuple
 
 def _by_eigenvectors(square: NDArray[np.float64], right: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
     """Solve by the directions in which classes vary at all, to a relative cut of 1e-10."""
-    from scipy.linalg import eigh  # noqa: PLC0415  loads slowly
-
-    values, vectors = eigh(square, lower=True)
+    values, vectors = scipy.linalg.eigh(square, lower=True)
     varying = values > _SINGULAR * values[-1]
     vectors = vectors[:, varying]
     return vectors @ ((vectors.T @ right) / values[varying, None]), int(varying.sum())

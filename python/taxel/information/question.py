@@ -16,6 +16,7 @@ from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.frames import Frames
 from taxel.information.estimate import Estimate, estimate
 from taxel.information.folds import Split, split
+from taxel.information.folds import folds as stratified
 from taxel.information.nested import Matrices, Nested, predictions
 from taxel.information.rasters import event_grams, features
 from taxel.information.sampling import (
@@ -52,8 +53,6 @@ class Question:
     _splits: dict[tuple[str, int], Split] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
-
         if not self.trials:
             raise ProblemError("trials is []: must hold one at least")
         shape = self.trials[0].array.shape
@@ -66,7 +65,7 @@ class Question:
         self.labels = np.array([one.label for one in self.trials])
         groups = [one.group for one in self.trials]
         self.groups = np.array(groups) if any(groups) else None
-        folds(self.labels, count=self.folds, groups=self.groups, seed=self.seed)
+        stratified(self.labels, count=self.folds, groups=self.groups, seed=self.seed)
         if self.encoder is None:
             self.encoder = ChangeEvents(noise_floor=floor_of(self.trials))
         if not isinstance(self.encoder, ChangeEvents | FA1):
@@ -198,8 +197,6 @@ class Question:
 
     def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
         """Return the columns of parameters that can stand in for the labels; the notes name the others."""
-        from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
-
         columns = {}
         for name in self.trials[0].parameters:
             column = np.array([one.parameters.get(name, "") for one in self.trials])
@@ -210,7 +207,7 @@ class Question:
                 self.notes.append(f"parameter {name} is left out: some trials have none")
                 continue
             try:
-                folds(column, count=self.folds, groups=self.groups, seed=self.seed)
+                stratified(column, count=self.folds, groups=self.groups, seed=self.seed)
             except ProblemError as error:
                 self.notes.append(f"parameter {name} is left out: {error}")
                 continue

@@ -6,7 +6,7 @@ by its own methods. The command line and the page call these functions; ``python
 process of its own (`taxel.tasks.__main__`).
 """
 
-from taxel.tasks.calibrate import Calibrated, CalibrateOptions, KnownLoad, calibrate
+from taxel.tasks.calibrate import Calibrated, CalibrateOptions, KnownLoad, calibrate, read_loads
 from taxel.tasks.detect import Detected, Detecting, DetectOptions, detect
 from taxel.tasks.encode import Encoded, EncodeOptions, encode
 from taxel.tasks.info import Info, info
@@ -35,6 +35,7 @@ __all__ = [
     "encode",
     "info",
     "information",
+    "read_loads",
     "rest",
     "train",
 ]

@@ -3,7 +3,7 @@
 use super::Board;
 use super::asynchronous::{Asynchronous, Crossing, Sample};
 use super::comparator::NOT_RETURNED;
-use super::link::Found;
+use super::link::ScannedEvent;
 use super::options::{IntensityWord, Previous};
 use crate::{Result, problem};
 
@@ -132,7 +132,7 @@ impl Board {
                 IntensityWord::Difference => (value >= before, value.abs_diff(before)),
             }
         };
-        if self.enqueue(Found { at, x, y, p, intensity }, read, sink) && !registers.mechanoreceptor {
+        if self.enqueue(ScannedEvent { at, x, y, p, intensity }, read, sink) && !registers.mechanoreceptor {
             self.comparators.values[taxel] = value;
         }
     }
@@ -163,13 +163,13 @@ impl Board {
         debug_assert!(!new || due.is_empty());
         for Crossing { at, x, y, p, value, moved } in due {
             let intensity = if self.intensity == IntensityWord::Difference { moved } else { value };
-            self.enqueue(Found { at, x, y, p, intensity }, read, sink);
+            self.enqueue(ScannedEvent { at, x, y, p, intensity }, read, sink);
         }
     }
 
     /// Queues an event on the active version of the wire; returns false if the queue was full and the event was
     /// dropped.
-    fn enqueue(&mut self, found: Found, read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
+    fn enqueue(&mut self, found: ScannedEvent, read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
         self.counts.changes += 1;
         if read.accepted.is_some_and(|accepted| !accepted[self.array.index(found.x, found.y)]) {
             self.link.refuse(&mut self.counts);

@@ -22,7 +22,7 @@ const EVENT_WORDS: usize = 2;
 
 /// An event found by the scan.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Found {
+pub(super) struct ScannedEvent {
     /// Time since reset, 10 ns.
     pub(super) at: u64,
     pub(super) x: u16,
@@ -80,7 +80,7 @@ impl Link {
     /// event was dropped.
     pub(super) fn words(
         &mut self,
-        found: Found,
+        found: ScannedEvent,
         valued: bool,
         counts: &mut BoardCounts,
         sink: &mut impl FnMut(&[u8]) -> bool,
@@ -133,7 +133,7 @@ impl Link {
     /// Queues an event of version 2; returns false if the queue was full and the event was dropped.
     pub(super) fn pack(
         &mut self,
-        found: Found,
+        found: ScannedEvent,
         counts: &mut BoardCounts,
         sink: &mut impl FnMut(&[u8]) -> bool,
     ) -> bool {
@@ -143,7 +143,7 @@ impl Link {
             return false;
         }
         counts.words += EVENT_WORDS as u64;
-        let Found { at, x, y, p, intensity } = found;
+        let ScannedEvent { at, x, y, p, intensity } = found;
         packer.event(at / 100, (x, y), p, intensity, &mut |datagram, events| {
             queue.send(datagram, EVENT_WORDS * events, counts, sink);
         });

@@ -4,34 +4,30 @@ use serde::{Deserialize, Serialize};
 
 use super::converter::{Converter, Scan, TICKS_A_US};
 use super::ramp::RAMP_END_V;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::{Result, Stop, problem};
 
-/// A converter that sets the duration of its ramp frame by frame; the rest of a step and of a column is constant.
-///
-/// After a frame the taxel that moved farthest sets the length of the next ramp: the length that lets it move by
-/// `moves_ticks` of that ramp within the frame, so that a reading's error by its age stays of the size of that by its
-/// resolution. A move of `noise_ticks` or less of the coarser of two ramps does not count; without any, the next ramp
-/// lasts twice as long, up to the gentlest. The rule is ours: the thesis calls for one and states none.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Adaptive {
-    /// The converter; its times of a step and a column are those with its own `ramp`, which they include.
-    pub converter: Converter,
-    /// The shortest time of the ramp, ticks.
-    pub steepest: u32,
-    /// The longest, ticks.
-    pub gentlest: u32,
-    /// How far the fastest taxel may move in a frame, ticks.
-    pub moves_ticks: f64,
-    /// What does not count as a move, ticks.
-    pub noise_ticks: f64,
-}
-
-impl Default for Adaptive {
-    fn default() -> Self {
-        Self { converter: Converter::default(), steepest: 38, gentlest: 510, moves_ticks: 4.0, noise_ticks: 2.0 }
+parameters! {
+    /// A converter that sets the duration of its ramp frame by frame; the rest of a step and of a column is constant.
+    ///
+    /// After a frame the taxel that moved farthest sets the length of the next ramp: the length that lets it move by
+    /// `moves_ticks` of that ramp within the frame, so that a reading's error by its age stays of the size of that by
+    /// its resolution. A move of `noise_ticks` or less of the coarser of two ramps does not count; without any, the
+    /// next ramp lasts twice as long, up to the gentlest. The rule is ours: the thesis calls for one and states none.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Adaptive {
+        /// The converter; its times of a step and a column are those with its own `ramp`, which they include.
+        pub converter: Converter = Converter::default();
+        /// The shortest time of the ramp, ticks.
+        pub steepest: u32 = 38, "ticks", Range::within(1.0, 65_534.0);
+        /// The longest, ticks.
+        pub gentlest: u32 = 510, "ticks", Range::within(1.0, 65_534.0);
+        /// How far the fastest taxel may move in a frame, ticks.
+        pub moves_ticks: f64 = 4.0, "ticks", Range::ABOVE_0;
+        /// What does not count as a move, ticks.
+        pub noise_ticks: f64 = 2.0, "ticks", Range::FROM_0;
     }
 }
 
@@ -52,19 +48,6 @@ pub struct Converted {
 const MOST: f64 = 2e8;
 
 impl Adaptive {
-    ranges! {
-        steepest: "ticks", Range::within(1.0, 65_534.0);
-        gentlest: "ticks", Range::within(1.0, 65_534.0);
-        moves_ticks: "ticks", Range::ABOVE_0;
-        noise_ticks: "ticks", Range::FROM_0;
-    }
-
-    /// Its parameters, with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter.
     ///
     /// # Errors

@@ -7,53 +7,39 @@
 use serde::{Deserialize, Serialize};
 
 use super::ramp::{RAMP_END_V, Ramp, RampShape};
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::{Result, problem};
 
 /// Ticks of the counter in 1 us.
 pub const TICKS_A_US: f64 = 300.0;
 
-/// How voltages become ticks; the times are those of the preset "5.2 kHz".
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Converter {
-    /// How the ramp rises.
-    pub shape: RampShape,
-    /// How long it rises, ticks of 1/300 us.
-    pub ramp: u32,
-    /// Between a comparator's two thresholds, V (thesis 4.3.2).
-    pub hysteresis_v: f64,
-    /// Time constant of a comparator's input behind the multiplexer, us: it settles to 2 % in 0.2 us (4.4.1).
-    pub settle_us: f64,
-    /// Time constant of the amplifiers, `R_f C`, us: a column's voltage decays with it in the next. 0: they settle at once.
-    pub amplifier_us: f64,
-    /// Time constant with which the ramp falls back, us. A guess.
-    pub discharge_us: f64,
-    /// From a step's beginning to the ramp's, us.
-    pub wait_us: f64,
-    /// From one sense line of a channel to its next, us.
-    pub step_us: f64,
-    /// From one column to the next, us.
-    pub line_us: f64,
-    /// Sense lines of a channel.
-    pub steps: usize,
-}
-
-impl Default for Converter {
-    fn default() -> Self {
-        Self {
-            shape: RampShape::Rc,
-            ramp: 150,
-            hysteresis_v: 0.1,
-            settle_us: 0.05,
-            amplifier_us: 0.0,
-            discharge_us: 0.02,
-            wait_us: 0.2,
-            step_us: 0.75,
-            line_us: 3.0,
-            steps: 4,
-        }
+parameters! {
+    /// How voltages become ticks; the times are those of the preset "5.2 kHz".
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Converter {
+        /// How the ramp rises.
+        pub shape: RampShape = RampShape::Rc;
+        /// How long it rises, ticks of 1/300 us.
+        pub ramp: u32 = 150, "ticks", Range::within(1.0, 65_534.0);
+        /// Between a comparator's two thresholds, V (thesis 4.3.2).
+        pub hysteresis_v: f64 = 0.1, "V", Range::FROM_0;
+        /// Time constant of a comparator's input behind the multiplexer, us: it settles to 2 % in 0.2 us (4.4.1).
+        pub settle_us: f64 = 0.05, "us", TIME;
+        /// Time constant of the amplifiers, `R_f C`, us: a column's voltage decays with it in the next. 0: they settle
+        /// at once.
+        pub amplifier_us: f64 = 0.0, "us", TIME;
+        /// Time constant with which the ramp falls back, us. A guess.
+        pub discharge_us: f64 = 0.02, "us", TIME;
+        /// From a step's beginning to the ramp's, us.
+        pub wait_us: f64 = 0.2, "us", TIME;
+        /// From one sense line of a channel to its next, us.
+        pub step_us: f64 = 0.75, "us", Range::ABOVE_0.at_most(1e6);
+        /// From one column to the next, us.
+        pub line_us: f64 = 3.0, "us", Range::ABOVE_0.at_most(1e6);
+        /// Sense lines of a channel.
+        pub steps: usize = 4, "", Range::within(1.0, 65_535.0);
     }
 }
 
@@ -64,24 +50,6 @@ const MOST_POINTS: f64 = 1e7;
 const TIME: Range = Range::FROM_0.at_most(1e6);
 
 impl Converter {
-    ranges! {
-        ramp: "ticks", Range::within(1.0, 65_534.0);
-        hysteresis_v: "V", Range::FROM_0;
-        settle_us: "us", TIME;
-        amplifier_us: "us", TIME;
-        discharge_us: "us", TIME;
-        wait_us: "us", TIME;
-        step_us: "us", Range::ABOVE_0.at_most(1e6);
-        line_us: "us", Range::ABOVE_0.at_most(1e6);
-        steps: "", Range::within(1.0, 65_535.0);
-    }
-
-    /// Its parameters, with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter, and that a step holds its ramp and a column its steps.
     ///
     /// # Errors
@@ -117,8 +85,8 @@ impl Converter {
 
     /// The shape of a comparator's input in a step.
     ///
-    /// `line_v` is the line's voltage when it has settled, `over_v` by how much it lies above that as the step begins, and
-    /// `input_v` the comparator's input then.
+    /// `line_v` is the line's voltage when it has settled, `over_v` by how much it lies above that as the step begins,
+    /// and `input_v` the comparator's input then.
     fn input(&self, line_v: f64, over_v: f64, input_v: f64) -> Input {
         let (slow, mut fast) = (self.amplifier_us, self.settle_us);
         if (slow - fast).abs() < 1e-6 * fast {
@@ -306,8 +274,8 @@ impl Scan {
         self.converter = converter;
     }
 
-    /// Converts a frame of voltages, `[row * columns + column]`, columns in their order; each step of a channel reads its
-    /// next row. Ticks with their fraction; not a number where a comparator had not returned when the ramp began.
+    /// Converts a frame of voltages, `[row * columns + column]`, columns in their order; each step of a channel reads
+    /// its next row. Ticks with their fraction; not a number where a comparator had not returned when the ramp began.
     ///
     /// Before the first frame everything is settled. Where voltages are fewer than taxels, those given are converted.
     pub fn frame(&mut self, volts: &[f64], ticks: &mut [f64]) {

@@ -3,43 +3,28 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 
 /// The force at which [`Fabric::touch_us`] is stated, N: the least that the thesis could detect (4.4.1).
 pub const TOUCH_N: f64 = 0.02;
 
-/// A law of conductance, `G = G0 + k F^n`, the same for each taxel. All three values are guesses: no maker publishes them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Fabric {
-    /// G0: conductance at rest, uS.
-    pub rest_us: f64,
-    /// What 0.02 N adds, uS; the default is 0.1 V at 1.3 V and 47 kOhm.
-    pub touch_us: f64,
-    /// n.
-    pub exponent: f64,
-}
-
-impl Default for Fabric {
-    fn default() -> Self {
-        Self { rest_us: 0.1, touch_us: 1.64, exponent: 0.7 }
+parameters! {
+    /// A law of conductance, `G = G0 + k F^n`, the same for each taxel. All three values are guesses: no maker
+    /// publishes them.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Fabric {
+        /// G0: conductance at rest, uS.
+        pub rest_us: f64 = 0.1, "uS", Range::FROM_0;
+        /// What 0.02 N adds, uS; the default is 0.1 V at 1.3 V and 47 kOhm.
+        pub touch_us: f64 = 1.64, "uS", Range::ABOVE_0;
+        /// n.
+        pub exponent: f64 = 0.7, "", Range::within(0.5, 1.0);
     }
 }
 
 impl Fabric {
-    ranges! {
-        rest_us: "uS", Range::FROM_0;
-        touch_us: "uS", Range::ABOVE_0;
-        exponent: "", Range::within(0.5, 1.0);
-    }
-
-    /// Its parameters, with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter.
     ///
     /// # Errors

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::grid::{Grid, Idle, LEAST_WIRE_OHM};
 use super::limit::Limit;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::{Result, Stop, problem};
 
 /// Resistances of switches and wires, ohm.
@@ -21,61 +21,32 @@ fn wire_is_sound(wire_ohm: f64) -> Result<()> {
     Ok(())
 }
 
-/// Rows held by transimpedance amplifiers and columns by switches, all at one voltage; the read column is at ground
-/// (thesis 4.3.2). Ideal it gives `V = V_trans (1 + R_f G)` of each taxel by itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct VirtualGround {
-    /// Voltage of the lines, V (thesis 4.4.1).
-    pub v_trans: f64,
-    /// Feedback resistor, kOhm (thesis 4.3.2).
-    pub feedback_kohm: f64,
-    /// Open-loop gain of the amplifiers; nothing: without bound. A guess.
-    pub gain: Option<f64>,
-    /// How far the amplifiers' offsets differ: standard deviation, mV.
-    pub offset_mv: f64,
-    /// A column's switch, ohm: an ADG734's (typical).
-    pub switch_ohm: f64,
-    /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
-    pub wire_ohm: f64,
-    /// Where the amplifiers saturate, V.
-    pub rail_v: f64,
-    /// Of the offsets.
-    pub seed: u64,
-}
-
-impl Default for VirtualGround {
-    fn default() -> Self {
-        Self {
-            v_trans: 1.3,
-            feedback_kohm: 47.0,
-            gain: Some(1e5),
-            offset_mv: 0.0,
-            switch_ohm: 2.5,
-            wire_ohm: 0.0,
-            rail_v: 5.0,
-            seed: 0,
-        }
+parameters! {
+    /// Rows held by transimpedance amplifiers and columns by switches, all at one voltage; the read column is at ground
+    /// (thesis 4.3.2). Ideal it gives `V = V_trans (1 + R_f G)` of each taxel by itself.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct VirtualGround {
+        /// Voltage of the lines, V (thesis 4.4.1).
+        pub v_trans: f64 = 1.3, "V", Range::ABOVE_0.at_most(1e3);
+        /// Feedback resistor, kOhm (thesis 4.3.2).
+        pub feedback_kohm: f64 = 47.0, "kOhm", Range::ABOVE_0.at_most(1e6);
+        /// Open-loop gain of the amplifiers; nothing: without bound. A guess.
+        pub gain: Option<f64> = Some(1e5), "", Range::FROM_1;
+        /// How far the amplifiers' offsets differ: standard deviation, mV.
+        pub offset_mv: f64 = 0.0, "mV", Range::FROM_0.at_most(1e6);
+        /// A column's switch, ohm: an ADG734's (typical).
+        pub switch_ohm: f64 = 2.5, "ohm", LINE;
+        /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
+        pub wire_ohm: f64 = 0.0, "ohm", LINE;
+        /// Where the amplifiers saturate, V.
+        pub rail_v: f64 = 5.0, "V", Range::ABOVE_0;
+        /// Of the offsets.
+        pub seed: u64 = 0;
     }
 }
 
 impl VirtualGround {
-    ranges! {
-        v_trans: "V", Range::ABOVE_0.at_most(1e3);
-        feedback_kohm: "kOhm", Range::ABOVE_0.at_most(1e6);
-        gain: "", Range::FROM_1;
-        offset_mv: "mV", Range::FROM_0.at_most(1e6);
-        switch_ohm: "ohm", LINE;
-        wire_ohm: "ohm", LINE;
-        rail_v: "V", Range::ABOVE_0;
-    }
-
-    /// Its parameters, with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter.
     ///
     /// # Errors
@@ -132,43 +103,26 @@ impl VirtualGround {
     }
 }
 
-/// Rows that resistors pull to ground, one driven line at the supply: no amplifier, and crosstalk between taxels
-/// (thesis 3.4.2; Appendix 1, figure 1.1).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Divider {
-    /// Voltage of the driven line, V (thesis 3.4.2).
-    pub supply_v: f64,
-    /// The other half of the divider, kOhm. A guess.
-    pub resistor_kohm: f64,
-    /// A driven line's switch, ohm.
-    pub switch_ohm: f64,
-    /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
-    pub wire_ohm: f64,
-    /// Whether lines that are not driven are held at ground (thesis 3.4.2) or float.
-    pub idle: Idle,
-}
-
-impl Default for Divider {
-    fn default() -> Self {
-        Self { supply_v: 5.0, resistor_kohm: 10.0, switch_ohm: 0.0, wire_ohm: 0.0, idle: Idle::Held }
+parameters! {
+    /// Rows that resistors pull to ground, one driven line at the supply: no amplifier, and crosstalk between taxels
+    /// (thesis 3.4.2; Appendix 1, figure 1.1).
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Divider {
+        /// Voltage of the driven line, V (thesis 3.4.2).
+        pub supply_v: f64 = 5.0, "V", Range::ABOVE_0.at_most(1e3);
+        /// The other half of the divider, kOhm. A guess.
+        pub resistor_kohm: f64 = 10.0, "kOhm", Range::ABOVE_0.at_most(1e6);
+        /// A driven line's switch, ohm.
+        pub switch_ohm: f64 = 0.0, "ohm", LINE;
+        /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
+        pub wire_ohm: f64 = 0.0, "ohm", LINE;
+        /// Whether lines that are not driven are held at ground (thesis 3.4.2) or float.
+        pub idle: Idle = Idle::Held;
     }
 }
 
 impl Divider {
-    ranges! {
-        supply_v: "V", Range::ABOVE_0.at_most(1e3);
-        resistor_kohm: "kOhm", Range::ABOVE_0.at_most(1e6);
-        switch_ohm: "ohm", LINE;
-        wire_ohm: "ohm", LINE;
-    }
-
-    /// Its parameters, with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter.
     ///
     /// # Errors

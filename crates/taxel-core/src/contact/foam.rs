@@ -4,53 +4,41 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
-use super::within;
+use super::{of_scene, within};
 use crate::Result;
 use crate::allowed::Range;
+use crate::parameters::parameters;
 
-/// Open-cell foam: elastic, then collapsing, then dense (Gibson and Ashby, *Cellular Solids*, chapter 5).
-///
-/// Stress is `E e` up to the yield strain, then `E e_y ((e_D - e_y) / (e_D - e))^m`, and from 0.02 before `e_D`, where
-/// the solid itself is pressed, straight on. Two losses come on top: Hunt and Crossley's `F (1 + chi v)`, and a dashpot
-/// in each column, `F + eta v dF/dd`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Foam {
-    /// Young's modulus E, kPa. A guess: makers' foams lie between 20 and 100.
-    pub modulus_kpa: f64,
-    /// Of the layer, mm (thesis 4.3.1).
-    pub thickness_mm: f64,
-    /// Poisson's ratio in compression; independent columns are a good approximation only near 0.
-    pub poisson: f64,
-    /// Strain e_y at which cells collapse.
-    pub yield_strain: f64,
-    /// Strain e_D at which the walls all touch.
-    pub densification_strain: f64,
-    /// Exponent m of the stress between collapse and e_D, between 1 and 2.
-    pub exponent: f64,
-    /// chi, s/m: loss that grows with speed. 0.25 sends a ball back at about three quarters of its speed.
-    pub damping_s_m: f64,
-    /// eta, ms: the dashpot's time. A guess, on which the demo's delays depend.
-    pub dashpot_ms: f64,
+parameters! {
+    /// Open-cell foam: elastic, then collapsing, then dense (Gibson and Ashby, *Cellular Solids*, chapter 5).
+    ///
+    /// Stress is `E e` up to the yield strain, then `E e_y ((e_D - e_y) / (e_D - e))^m`, and from 0.02 before `e_D`,
+    /// where the solid itself is pressed, straight on. Two losses come on top: Hunt and Crossley's `F (1 + chi v)`, and
+    /// a dashpot in each column, `F + eta v dF/dd`.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Foam {
+        /// Young's modulus E, kPa. A guess: makers' foams lie between 20 and 100.
+        pub modulus_kpa: f64 = 60.0, "kPa", Range::ABOVE_0;
+        /// Of the layer, mm (thesis 4.3.1).
+        pub thickness_mm: f64 = 10.0, "mm", Range::ABOVE_0;
+        /// Poisson's ratio in compression; independent columns are a good approximation only near 0.
+        pub poisson: f64 = 0.0, "", Range::FROM_0.below(0.5);
+        /// Strain e_y at which cells collapse.
+        pub yield_strain: f64 = 0.05;
+        /// Strain e_D at which the walls all touch.
+        pub densification_strain: f64 = 0.95, "", Range::ABOVE_0.at_most(1.0);
+        /// Exponent m of the stress between collapse and e_D, between 1 and 2.
+        pub exponent: f64 = 1.2, "", Range::above(1.0).below(2.0);
+        /// chi, s/m: loss that grows with speed. 0.25 sends a ball back at about three quarters of its speed.
+        pub damping_s_m: f64 = 0.25, "s/m", Range::FROM_0;
+        /// eta, ms: the dashpot's time. A guess, on which the demo's delays depend.
+        pub dashpot_ms: f64 = 1.0, "ms", Range::FROM_0;
+    }
 }
 
 /// How far before e_D the law goes straight on: the slope there, some 15 MPa, is that of solid polyurethane.
 const SOLID: f64 = 0.02;
-
-impl Default for Foam {
-    fn default() -> Self {
-        Self {
-            modulus_kpa: 60.0,
-            thickness_mm: 10.0,
-            poisson: 0.0,
-            yield_strain: 0.05,
-            densification_strain: 0.95,
-            exponent: 1.2,
-            damping_s_m: 0.25,
-            dashpot_ms: 1.0,
-        }
-    }
-}
 
 impl Foam {
     /// Checks that the law makes sense.
@@ -59,16 +47,9 @@ impl Foam {
     ///
     /// `Scene`, naming the parameter.
     pub fn check(&self) -> Result<()> {
-        let of = |name, value, unit, range| within("foam", name, value, unit, range);
-        of("modulus_kpa", self.modulus_kpa, "kPa", Range::ABOVE_0)?;
-        of("thickness_mm", self.thickness_mm, "mm", Range::ABOVE_0)?;
-        of("poisson", self.poisson, "", Range::FROM_0.below(0.5))?;
-        of("densification_strain", self.densification_strain, "", Range::ABOVE_0.at_most(1.0))?;
-        of("yield_strain", self.yield_strain, "", Range::ABOVE_0.below(self.densification_strain - SOLID))?;
-        of("exponent", self.exponent, "", Range::above(1.0).below(2.0))?;
-        of("damping_s_m", self.damping_s_m, "s/m", Range::FROM_0)?;
-        of("dashpot_ms", self.dashpot_ms, "ms", Range::FROM_0)?;
-        Ok(())
+        of_scene("foam", self.check_ranges())?;
+        let below_solid = Range::ABOVE_0.below(self.densification_strain - SOLID);
+        within("foam", "yield_strain", self.yield_strain, "", below_solid)
     }
 
     /// The deepest that anything can sink: the layer's thickness, mm.

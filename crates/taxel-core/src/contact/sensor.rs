@@ -5,56 +5,43 @@ use rand::{Rng, RngCore, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use super::within;
+use super::of_scene;
 use crate::allowed::Range;
 use crate::circuit::ramp::RAMP_END_V;
 use crate::circuit::{Fabric, Ramp, VirtualGround};
+use crate::parameters::parameters;
 use crate::{Error, Result};
 
 /// The ramp for which `noise_ticks` is stated.
 const STATED_RAMP: f64 = 150.0;
 
-/// The sensor's response to force: one law for all taxels, and how far taxels differ.
-///
-/// A taxel conducts `G = G0 + k F^n`; the amplifier gives `V = V_trans (1 + R_f G)` (thesis 4.3.2). The ramp is an RC
-/// curve towards 5 V that ends at 3 V: 0.02 N, which the thesis could detect at 1.3 V (4.4.1), is then 0.1 V and 4.5
-/// ticks of a ramp of 150. Above 3 V a taxel reads the ramp's whole time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Sensor {
-    /// Voltage of the lines, V (thesis 4.4.1).
-    pub v_trans: f64,
-    /// Feedback resistor, kOhm (thesis 4.3.2).
-    pub feedback_kohm: f64,
-    /// Conductance at rest, uS. A guess.
-    pub rest_us: f64,
-    /// Conductance that 0.02 N adds, uS: 0.1 V at the default voltage and resistor.
-    pub touch_us: f64,
-    /// Exponent n of force, 0.5 to 1. A guess: no maker's curve was found.
-    pub exponent: f64,
-    /// Side of a taxel, mm (thesis 5.6.1).
-    pub side_mm: f64,
-    /// How far gains differ: standard deviation of their logarithm. A guess.
-    pub gain_spread: f64,
-    /// How far offsets differ: standard deviation, mV. A guess.
-    pub offset_mv: f64,
-    /// Noise of one conversion: standard deviation in ticks of a ramp of 150; more of a slower one. A guess.
-    pub noise_ticks: f64,
-}
-
-impl Default for Sensor {
-    fn default() -> Self {
-        Self {
-            v_trans: 1.3,
-            feedback_kohm: 47.0,
-            rest_us: 0.1,
-            touch_us: 1.64,
-            exponent: 0.7,
-            side_mm: 2.29,
-            gain_spread: 0.2,
-            offset_mv: 20.0,
-            noise_ticks: 0.5,
-        }
+parameters! {
+    /// The sensor's response to force: one law for all taxels, and how far taxels differ.
+    ///
+    /// A taxel conducts `G = G0 + k F^n`; the amplifier gives `V = V_trans (1 + R_f G)` (thesis 4.3.2). The ramp is an
+    /// RC curve towards 5 V that ends at 3 V: 0.02 N, which the thesis could detect at 1.3 V (4.4.1), is then 0.1 V and
+    /// 4.5 ticks of a ramp of 150. Above 3 V a taxel reads the ramp's whole time.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Sensor {
+        /// Voltage of the lines, V (thesis 4.4.1).
+        pub v_trans: f64 = 1.3, "V", Range::ABOVE_0.below(RAMP_END_V);
+        /// Feedback resistor, kOhm (thesis 4.3.2).
+        pub feedback_kohm: f64 = 47.0, "kOhm", Range::ABOVE_0;
+        /// Conductance at rest, uS. A guess.
+        pub rest_us: f64 = 0.1, "uS", Range::FROM_0;
+        /// Conductance that 0.02 N adds, uS: 0.1 V at the default voltage and resistor.
+        pub touch_us: f64 = 1.64, "uS", Range::ABOVE_0;
+        /// Exponent n of force, 0.5 to 1. A guess: no maker's curve was found.
+        pub exponent: f64 = 0.7, "", Range::within(0.5, 1.0);
+        /// Side of a taxel, mm (thesis 5.6.1).
+        pub side_mm: f64 = 2.29, "mm", Range::ABOVE_0;
+        /// How far gains differ: standard deviation of their logarithm. A guess.
+        pub gain_spread: f64 = 0.2, "", Range::FROM_0;
+        /// How far offsets differ: standard deviation, mV. A guess.
+        pub offset_mv: f64 = 20.0, "mV", Range::FROM_0;
+        /// Noise of one conversion: standard deviation in ticks of a ramp of 150; more of a slower one. A guess.
+        pub noise_ticks: f64 = 0.5, "ticks", Range::FROM_0;
     }
 }
 
@@ -65,20 +52,7 @@ impl Sensor {
     ///
     /// `Scene`, naming the parameter.
     pub fn check(&self) -> Result<()> {
-        for (name, value, unit, range) in [
-            ("v_trans", self.v_trans, "V", Range::ABOVE_0.below(RAMP_END_V)),
-            ("feedback_kohm", self.feedback_kohm, "kOhm", Range::ABOVE_0),
-            ("rest_us", self.rest_us, "uS", Range::FROM_0),
-            ("touch_us", self.touch_us, "uS", Range::ABOVE_0),
-            ("exponent", self.exponent, "", Range::within(0.5, 1.0)),
-            ("side_mm", self.side_mm, "mm", Range::ABOVE_0),
-            ("gain_spread", self.gain_spread, "", Range::FROM_0),
-            ("offset_mv", self.offset_mv, "mV", Range::FROM_0),
-            ("noise_ticks", self.noise_ticks, "ticks", Range::FROM_0),
-        ] {
-            within("sensor", name, value, unit, range)?;
-        }
-        Ok(())
+        of_scene("sensor", self.check_ranges())
     }
 
     /// Input voltage of a taxel without spread under a force, V.

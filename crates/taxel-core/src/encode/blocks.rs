@@ -20,12 +20,12 @@ pub(super) fn in_blocks(values: &[f32]) -> &[Block] {
 
 /// The next picture, if it follows in memory. It is prefetched a block at a time while the current picture is read or
 /// encoded: a processor has few line fill buffers, and would drop more prefetches at once.
-pub(super) struct Next {
+pub(super) struct NextPicture {
     at: *const Block,
     left: usize,
 }
 
-impl Next {
+impl NextPicture {
     /// No prefetch, because the address of the next picture is not known.
     pub(super) fn unknown() -> Self {
         Self { at: std::ptr::null(), left: 0 }

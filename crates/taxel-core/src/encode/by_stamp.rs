@@ -3,7 +3,7 @@
 //! Reading: what changes without events, as a rest that is tracked does, is computed between stamps too: 10 ms after the
 //! last one, and from 80 ms on after each further eighth of the time since it.
 
-use super::blocks::{BLOCK, Block, Next, blocks, in_blocks};
+use super::blocks::{BLOCK, Block, NextPicture, blocks, in_blocks};
 use super::channels::Channels;
 use super::loaded::Loaded;
 use super::sampled::Source;
@@ -152,7 +152,7 @@ impl<M: Measure> Stream for ByStamp<M> {
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
         self.source.frame(t)?;
-        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut Next::after(values))?;
+        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut NextPicture::after(values))?;
         for (block, values) in in_blocks(self.held.values()).iter().enumerate() {
             if std::mem::take(&mut self.changed[block]) {
                 self.loaded.take_block(block, values);

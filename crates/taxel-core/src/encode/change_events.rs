@@ -2,36 +2,38 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next};
-use super::law::Law;
+use super::blocks::{BLOCK, Block, NextPicture};
+use super::encoding::Encoding;
 use super::sampled::{Rule, Sampled};
 use super::stream::Stream;
-use crate::allowed::{Range, ranges};
+use crate::allowed::Range;
 pub use crate::board::Previous;
-use crate::parameters::Described;
+use crate::parameters::parameters;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
-/// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).
-///
-/// A spike's value is the quantised change. A value that a state of version 2 repaired replaces the previous value
-/// without a spike. The first sample becomes the first previous value without a spike. Computed in f32. One signed
-/// train per taxel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ChangeEvents {
-    /// The smallest change that causes an event, in the sensor's unit, above 0; theta_0 of equation 5.7. Default 3
-    /// ticks, the
-    /// floor of the board's fast presets (wire.md, section 3).
-    pub noise_floor: f64,
-    /// Bits of an event's value, 1 to 10 (figure 5.7). Default 1: rise or fall.
-    pub bits: u32,
-    /// The reference of a change. Default the value last sent.
-    pub previous: Previous,
-    /// How U / theta_0 is rounded to a whole number. Default truncation.
-    pub rounding: Rounding,
-    /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    pub period_ms: f64,
+parameters! {
+    /// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).
+    ///
+    /// A spike's value is the quantised change. A value that a state of version 2 repaired replaces the previous value
+    /// without a spike. The first sample becomes the first previous value without a spike. Computed in f32. One signed
+    /// train per taxel.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct ChangeEvents {
+        /// The smallest change that causes an event, in the sensor's unit, above 0; theta_0 of equation 5.7. Default 3
+        /// ticks, the
+        /// floor of the board's fast presets (wire.md, section 3).
+        pub noise_floor: f64 = 3.0, "", Range::ABOVE_0;
+        /// Bits of an event's value, 1 to 10 (figure 5.7). Default 1: rise or fall.
+        pub bits: u32 = 1, "", Range::within(1.0, 10.0);
+        /// The reference of a change. Default the value last sent.
+        pub previous: Previous = Previous::default();
+        /// How U / theta_0 is rounded to a whole number. Default truncation.
+        pub rounding: Rounding = Rounding::default();
+        /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+        pub period_ms: f64 = super::periods::stamp_period(), "ms", Range::WHOLE_US;
+    }
 }
 
 /// How U / theta_0 is rounded to a whole number.
@@ -45,31 +47,7 @@ pub enum Rounding {
     Floor,
 }
 
-impl Default for ChangeEvents {
-    fn default() -> Self {
-        Self {
-            noise_floor: 3.0,
-            bits: 1,
-            previous: Previous::default(),
-            rounding: Rounding::default(),
-            period_ms: super::periods::stamp_period(),
-        }
-    }
-}
-
-impl ChangeEvents {
-    ranges! {
-        noise_floor: "", Range::ABOVE_0;
-        bits: "", Range::within(1.0, 10.0);
-        period_ms: "ms", Range::WHOLE_US;
-    }
-}
-
-impl Law for ChangeEvents {
-    fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
+impl Encoding for ChangeEvents {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         // Changes are compared in f32.
@@ -111,7 +89,7 @@ impl Rule for Changes {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         let floor = self.floor;
         for (block, (new, last)) in held.iter().zip(&mut self.last).enumerate().filter(|(b, _)| changed[*b]) {
             next.fetch();

@@ -1,7 +1,7 @@
 //! The existing taxels of an array as an encoder's channels, which of them a picture changes, and which events are
 //! valid.
 
-use super::blocks::{BLOCK, Block, Next};
+use super::blocks::{BLOCK, Block, NextPicture};
 use crate::held::Held;
 use crate::vectors::wide;
 use crate::{Array, Error, EventsView, Result, problem};
@@ -11,7 +11,7 @@ pub(super) const FARTHEST: u64 = 1 << 60;
 
 wide! {
     /// Copies the blocks of a picture that differ from the stored ones.
-    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool], next: &mut Next) -> Result<()> {
+    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool], next: &mut NextPicture) -> Result<()> {
         /// All exponent bits: infinite or not a number.
         const NOT_FINITE: u32 = 0x7f80_0000;
         for ((new, held), changed) in new.iter().zip(held).zip(changed) {
@@ -97,7 +97,7 @@ impl Channels {
         values: &[f32],
         held: &mut Held<f32>,
         changed: &mut [bool],
-        next: &mut Next,
+        next: &mut NextPicture,
     ) -> Result<()> {
         let held = held.values_mut().as_chunks_mut().0;
         if values.len() != self.grid() {

@@ -5,51 +5,37 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::Block;
 use super::by_stamp::{ByStamp, Measure};
-use super::law::Law;
+use super::encoding::Encoding;
 use super::loaded::Loaded;
 use super::stream::Stream;
 use super::tare::Tare;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike, SpikeKind, problem};
 
-/// Contact area: rises and falls of the number of loaded taxels through levels.
-///
-/// A taxel is loaded while its value exceeds its rest by more than the board's noise floor and half a tick; it counts
-/// only if one of its 8 neighbours is loaded too, which rejects noise. A taxel without any event, in the tare or since,
-/// is unloaded. The area is computed once per stamp, after its last event; spikes have the stamp's time. Trains,
-/// unsigned: rises through each level, then falls below each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ContactArea {
-    /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
-    pub noise_floor: f64,
-    /// Numbers of taxels, ascending; default 2, 4, 8, 16, 32.
-    pub levels: Vec<u32>,
-    /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
-    /// used.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tare: Option<Tare>,
-}
-
-impl Default for ContactArea {
-    fn default() -> Self {
-        Self { noise_floor: 3.0, levels: vec![2, 4, 8, 16, 32], tare: None }
+parameters! {
+    /// Contact area: rises and falls of the number of loaded taxels through levels.
+    ///
+    /// A taxel is loaded while its value exceeds its rest by more than the board's noise floor and half a tick; it
+    /// counts only if one of its 8 neighbours is loaded too, which rejects noise. A taxel without any event, in the
+    /// tare or since, is unloaded. The area is computed once per stamp, after its last event; spikes have the stamp's
+    /// time. Trains, unsigned: rises through each level, then falls below each.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct ContactArea {
+        /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
+        pub noise_floor: f64 = 3.0, "", Range::FROM_0;
+        /// Numbers of taxels, ascending; default 2, 4, 8, 16, 32.
+        pub levels: Vec<u32> = vec![2, 4, 8, 16, 32];
+        /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
+        /// used.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub tare: Option<Tare> = None;
     }
 }
 
-impl ContactArea {
-    ranges! {
-        noise_floor: "", Range::FROM_0;
-    }
-}
-
-impl Law for ContactArea {
-    fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
-    }
-
+impl Encoding for ContactArea {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.levels.is_empty() {

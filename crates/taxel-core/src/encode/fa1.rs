@@ -18,43 +18,46 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next};
-use super::law::Law;
+use super::blocks::{BLOCK, Block, NextPicture};
+use super::encoding::Encoding;
 use super::power::power;
 use super::sampled::{Rule, Sampled};
 use super::stream::Stream;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
-/// The FA-1 afferent by equations 5.1 to 5.5, with polarity.
-///
-/// Computed in f64; pressure below 0 counts as 0 before 5.1. A value that a state of version 2 repaired is no change in
-/// 5.3. The initial state is that of a constant input equal to the first sample. One signed train per taxel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Fa1 {
-    /// Power of the compression 5.1, above 0; default 0.7 (Table 5.3).
-    pub alpha: f64,
-    /// A, 1/ms: how much a spike raises the threshold; default 20 (Table 5.3).
-    pub a: f64,
-    /// B: how fast the threshold decays; default 0.05 (Table 5.3).
-    pub b: f64,
-    /// The unit of time of B; default the sample.
-    pub decay: Decay,
-    /// The baseline threshold itself, 0 or more, in compressed units; by default it is computed from `range`. Table 5.3
-    /// prints 0, with which every change fires.
-    pub theta_0: Option<f64>,
-    /// The largest pressure, in the sensor's unit: theta_0 = range^alpha / 1024 (text to Table 5.3). Default 150 ticks,
-    /// the ramp of the board's 5.2 kHz preset.
-    pub range: Option<f64>,
-    /// Bits of a spike's value, 1 to 10: by equation 5.7 the value is U in units of theta_0, rounded towards zero, from
-    /// +-1 to +-(2^bits - 1). Spike times remain those of 5.4. Default 1: rise or fall.
-    pub bits: u32,
-    /// T, ms: the sampling period of events and frames; default 1, for which the thesis states "about 100 Hz". Frames
-    /// must arrive at this period, within half of it.
-    pub period_ms: f64,
+parameters! {
+    /// The FA-1 afferent by equations 5.1 to 5.5, with polarity.
+    ///
+    /// Computed in f64; pressure below 0 counts as 0 before 5.1. A value that a state of version 2 repaired is no
+    /// change in 5.3. The initial state is that of a constant input equal to the first sample. One signed train per
+    /// taxel.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Fa1 {
+        /// Power of the compression 5.1, above 0; default 0.7 (Table 5.3).
+        pub alpha: f64 = 0.7, "", Range::ABOVE_0.at_most(4.0);
+        /// A, 1/ms: how much a spike raises the threshold; default 20 (Table 5.3).
+        pub a: f64 = 20.0, "1/ms", Range::FROM_0;
+        /// B: how fast the threshold decays; default 0.05 (Table 5.3).
+        pub b: f64 = 0.05, "", Range::FROM_0;
+        /// The unit of time of B; default the sample.
+        pub decay: Decay = Decay::default();
+        /// The baseline threshold itself, 0 or more, in compressed units; by default it is computed from `range`. Table
+        /// 5.3 prints 0, with which every change fires.
+        pub theta_0: Option<f64> = None, "", Range::FROM_0;
+        /// The largest pressure, in the sensor's unit: theta_0 = range^alpha / 1024 (text to Table 5.3). Default 150
+        /// ticks, the ramp of the board's 5.2 kHz preset.
+        pub range: Option<f64> = None, "", Range::ABOVE_0;
+        /// Bits of a spike's value, 1 to 10: by equation 5.7 the value is U in units of theta_0, rounded towards zero,
+        /// from +-1 to +-(2^bits - 1). Spike times remain those of 5.4. Default 1: rise or fall.
+        pub bits: u32 = 1, "", Range::within(1.0, 10.0);
+        /// T, ms: the sampling period of events and frames; default 1, for which the thesis states "about 100 Hz".
+        /// Frames must arrive at this period, within half of it.
+        pub period_ms: f64 = 1.0, "ms", Range::WHOLE_US;
+    }
 }
 
 /// The unit of time of the threshold's decay B.
@@ -71,32 +74,7 @@ pub enum Decay {
 /// Length of the ramp of the preset 5.2 kHz, ticks (wire.md, section 3).
 const RAMP: f64 = 150.0;
 
-impl Default for Fa1 {
-    fn default() -> Self {
-        Self {
-            alpha: 0.7,
-            a: 20.0,
-            b: 0.05,
-            decay: Decay::default(),
-            theta_0: None,
-            range: None,
-            bits: 1,
-            period_ms: 1.0,
-        }
-    }
-}
-
 impl Fa1 {
-    ranges! {
-        alpha: "", Range::ABOVE_0.at_most(4.0);
-        a: "1/ms", Range::FROM_0;
-        b: "", Range::FROM_0;
-        theta_0: "", Range::FROM_0;
-        range: "", Range::ABOVE_0;
-        bits: "", Range::within(1.0, 10.0);
-        period_ms: "ms", Range::WHOLE_US;
-    }
-
     /// The baseline threshold, in compressed units.
     #[must_use]
     pub fn baseline(&self) -> f64 {
@@ -104,11 +82,7 @@ impl Fa1 {
     }
 }
 
-impl Law for Fa1 {
-    fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
+impl Encoding for Fa1 {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.range.is_some() && self.theta_0.is_some() {
@@ -336,7 +310,7 @@ impl Rule for Afferents {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         /// Number of entries that are always written, needed or not: a branch on the count would cost more.
         const AT_ONCE: usize = 4;
         let (mut near, mut n) = (std::mem::take(&mut self.near), 0);
@@ -453,7 +427,7 @@ mod tests {
             afferents.begin(0, &pictures[..1], &mut out);
             for (t, picture) in (1..).zip(pictures[1..].chunks(1)) {
                 let changed = picture != &pictures[t as usize - 1..t as usize];
-                afferents.sample(t, picture, &[changed], &mut Next::unknown(), &mut out);
+                afferents.sample(t, picture, &[changed], &mut NextPicture::unknown(), &mut out);
             }
             assert!(out == plainly(&parameters, &pictures), "round {round}: {parameters:?}");
         }

@@ -4,72 +4,49 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::BLOCK;
 use super::channels::Channels;
-use super::law::Law;
+use super::encoding::Encoding;
 use super::receptor::{ByTaxel, Filter, Firing, Lanes, LowPass};
 use super::sampled::Sampled;
 use super::stream::Stream;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::{Array, Result, SpikeKind};
 
-/// The FA-2 afferent (Pacini): silent while pressure is constant or changes slowly; one spike per cycle at 200 to 250
-/// Hz.
-///
-/// Two high-pass filters with `corner_ms` and a low-pass filter with `membrane_ms`, for x the pressure as a fraction of
-/// `range`: `u = lowpass(highpass(highpass(x)))`. Thresholds therefore fall by 12 dB per octave up to the best
-/// frequency, as those of the Pacinian channel do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). The threshold
-/// adapts as that of [`Sa1`](super::Sa1). We fitted `corner_ms`, `membrane_ms`, `jump` and `recovery_ms` so that the
-/// amplitude for one spike per cycle is least between 200 and 250 Hz. `threshold` is limited by the sensor: a step of
-/// one tick in 150 stays below it; a finger is far more sensitive. Negative pressure counts as 0. One unsigned train
-/// per taxel, at most one spike per sample. The initial state is that of a constant input equal to the first sample.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Fa2 {
-    /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
-    pub range: f64,
-    /// Threshold of the potential for a spike, as a fraction of `range`.
-    pub threshold: f64,
-    /// Time constant of the two high-pass filters, ms.
-    pub corner_ms: f64,
-    /// Time constant of the membrane, ms.
-    pub membrane_ms: f64,
-    /// Amount by which a spike raises the threshold, as a fraction of `range`.
-    pub jump: f64,
-    /// Time constant with which the threshold decays again, ms.
-    pub recovery_ms: f64,
-    /// Refractory time after a spike, ms.
-    pub refractory_ms: f64,
-    /// Sampling period of events, ms, at most 1; frames must arrive at this period, within half of it.
-    pub period_ms: f64,
-}
-
-impl Default for Fa2 {
-    fn default() -> Self {
-        Self {
-            range: 150.0,
-            threshold: 0.003,
-            corner_ms: 0.9,
-            membrane_ms: 1.5,
-            jump: 0.003,
-            recovery_ms: 1.5,
-            refractory_ms: 2.0,
-            period_ms: 0.2,
-        }
+parameters! {
+    /// The FA-2 afferent (Pacini): silent while pressure is constant or changes slowly; one spike per cycle at 200 to
+    /// 250 Hz.
+    ///
+    /// Two high-pass filters with `corner_ms` and a low-pass filter with `membrane_ms`, for x the pressure as a
+    /// fraction of `range`: `u = lowpass(highpass(highpass(x)))`. Thresholds therefore fall by 12 dB per octave up to
+    /// the best frequency, as those of the Pacinian channel do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680).
+    /// The threshold adapts as that of [`Sa1`](super::Sa1). We fitted `corner_ms`, `membrane_ms`, `jump` and
+    /// `recovery_ms` so that the amplitude for one spike per cycle is least between 200 and 250 Hz. `threshold` is
+    /// limited by the sensor: a step of one tick in 150 stays below it; a finger is far more sensitive. Negative
+    /// pressure counts as 0. One unsigned train per taxel, at most one spike per sample. The initial state is that of a
+    /// constant input equal to the first sample.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Fa2 {
+        /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
+        pub range: f64 = 150.0, "", Range::ABOVE_0;
+        /// Threshold of the potential for a spike, as a fraction of `range`.
+        pub threshold: f64 = 0.003, "", Range::ABOVE_0;
+        /// Time constant of the two high-pass filters, ms.
+        pub corner_ms: f64 = 0.9, "ms", Range::ABOVE_0;
+        /// Time constant of the membrane, ms.
+        pub membrane_ms: f64 = 1.5, "ms", Range::ABOVE_0;
+        /// Amount by which a spike raises the threshold, as a fraction of `range`.
+        pub jump: f64 = 0.003, "", Range::ABOVE_0;
+        /// Time constant with which the threshold decays again, ms.
+        pub recovery_ms: f64 = 1.5, "ms", Range::ABOVE_0;
+        /// Refractory time after a spike, ms.
+        pub refractory_ms: f64 = 2.0, "ms", Range::FROM_0;
+        /// Sampling period of events, ms, at most 1; frames must arrive at this period, within half of it.
+        pub period_ms: f64 = 0.2, "ms", Range::WHOLE_US.at_most(1.0);
     }
 }
 
 impl Fa2 {
-    ranges! {
-        range: "", Range::ABOVE_0;
-        threshold: "", Range::ABOVE_0;
-        corner_ms: "ms", Range::ABOVE_0;
-        membrane_ms: "ms", Range::ABOVE_0;
-        jump: "", Range::ABOVE_0;
-        recovery_ms: "ms", Range::ABOVE_0;
-        refractory_ms: "ms", Range::FROM_0;
-        period_ms: "ms", Range::WHOLE_US.at_most(1.0);
-    }
-
     pub(super) fn filter(&self) -> Fast {
         let low_pass = |tau| LowPass::new(tau, self.period_ms);
         Fast { corner: low_pass(self.corner_ms), membrane: low_pass(self.membrane_ms) }
@@ -86,11 +63,7 @@ impl Fa2 {
     }
 }
 
-impl Law for Fa2 {
-    fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
+impl Encoding for Fa2 {
     fn check(&self) -> Result<()> {
         self.check_ranges()
     }

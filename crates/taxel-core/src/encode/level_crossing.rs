@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next, blocks};
+use super::blocks::{BLOCK, Block, NextPicture, blocks};
 use super::bracket::{Bracket, check_levels};
 use super::channels::Channels;
-use super::law::Law;
+use super::encoding::Encoding;
 use super::periods::micros;
 use super::running_range::{RunningRange, Window};
 use super::sampled::{Rule, Sampled};
@@ -60,6 +60,12 @@ impl LevelCrossing {
         period_ms: "ms", Range::WHOLE_US;
     }
 
+    /// The parameters with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
+    }
+
     /// An encoder with these levels, without hysteresis.
     #[must_use]
     pub fn at(levels: Vec<f64>) -> Self {
@@ -84,11 +90,7 @@ impl LevelCrossing {
     }
 }
 
-impl Law for LevelCrossing {
-    fn described() -> Described {
-        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
-    }
-
+impl Encoding for LevelCrossing {
     fn check(&self) -> Result<()> {
         check_levels(&self.levels)?;
         self.check_ranges()?;
@@ -346,7 +348,7 @@ impl Rule for Crossings {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextPicture, out: &mut Vec<Spike>) {
         let Some(mut window) = self.window.take() else { return self.cross(t, held, changed, out) };
         let everything = vec![true; held.len()];
         let first = window.first_full(t);

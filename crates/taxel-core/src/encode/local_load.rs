@@ -2,17 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{Block, Next};
+use super::blocks::{Block, NextPicture};
 use super::by_stamp::{ByStamp, Measure};
-use super::law::Law;
+use super::encoding::Encoding;
 use super::loaded::{Loaded, given};
 use super::local_sums::{LocalSums, Sums, Values};
 use super::recent::{Recent, Window};
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, spikes_of_events, spikes_of_frames};
 use super::tare::Tare;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::spikes::{ms, us};
 use crate::{Array, EventsView, FramesView, Result, Spike, SpikeKind, Stop, problem};
 
@@ -39,58 +39,45 @@ pub enum LocalRest {
     Tare,
 }
 
-/// Quantities of a touch in units of each taxel's own noise, as graded spikes: one each `period_ms` and quantity, with
-/// the value log(1 + quantity); none where the quantity is 0.
-///
-/// With u a value less its rest, `sigma` the taxel's standard deviation in the tare (at least `least_noise`) and
-/// `s = sqrt(sigma^2 + noise_floor^2 / 4)`, the quantities are
-/// - area: the number of taxels with `u >= max(noise_floor + 0.5, 3 sigma)` and such a neighbour among the 8,
-/// - largest: the largest sum of u, clipped to +-3 s, over 3 x 3 taxels, divided by `sqrt(sum s^2)`; at least 0,
-/// - places: the number of taxels around which that sum is above 4,
-/// - total: the sum of all u of `5 sigma` or more.
-///
-/// For each running mean of `local_ms`, with u a value less its running mean: area (with `4 sigma`), largest, the two
-/// below instead of above (largest below, area below), total and total below. Then the means of all these over the last
-/// 3 ms and from 10 to 2 ms ago; of the first four over the last 10 and 50 ms; and 1 (clock). A taxel that is 0 from
-/// the first sample on has no value yet: it counts as at rest.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LocalLoad {
-    /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
-    pub noise_floor: f64,
-    /// The smallest noise of a taxel, in the sensor's unit. Default 0.3, the deviation within a tick.
-    pub least_noise: f64,
-    /// The rest from which a load is measured.
-    pub rest: LocalRest,
-    /// Time constants of the running means, ms, each with six more quantities; none by default.
-    pub local_ms: Vec<f64>,
-    /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    pub period_ms: f64,
-    /// Levels of the largest sums, in units of noise, ascending; none by default.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub levels: Vec<f64>,
-    /// The part of a level below which it is left, from 0.01 to 1; default 1. Below 1, noise near a level does not
-    /// cross it again and again.
-    #[serde(skip_serializing_if = "is_one")]
-    pub release: f64,
-    /// The taxels' rest and noise. It is valid for one board on one day: a saved readout has none and receives one when
-    /// it is used.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tare: Option<Tare>,
-}
-
-impl Default for LocalLoad {
-    fn default() -> Self {
-        Self {
-            noise_floor: 3.0,
-            least_noise: 0.3,
-            rest: LocalRest::default(),
-            local_ms: vec![],
-            period_ms: super::periods::stamp_period(),
-            levels: vec![],
-            release: 1.0,
-            tare: None,
-        }
+parameters! {
+    /// Quantities of a touch in units of each taxel's own noise, as graded spikes: one each `period_ms` and quantity,
+    /// with the value log(1 + quantity); none where the quantity is 0.
+    ///
+    /// With u a value less its rest, `sigma` the taxel's standard deviation in the tare (at least `least_noise`) and
+    /// `s = sqrt(sigma^2 + noise_floor^2 / 4)`, the quantities are
+    /// - area: the number of taxels with `u >= max(noise_floor + 0.5, 3 sigma)` and such a neighbour among the 8,
+    /// - largest: the largest sum of u, clipped to +-3 s, over 3 x 3 taxels, divided by `sqrt(sum s^2)`; at least 0,
+    /// - places: the number of taxels around which that sum is above 4,
+    /// - total: the sum of all u of `5 sigma` or more.
+    ///
+    /// For each running mean of `local_ms`, with u a value less its running mean: area (with `4 sigma`), largest, the
+    /// two below instead of above (largest below, area below), total and total below. Then the means of all these over
+    /// the last 3 ms and from 10 to 2 ms ago; of the first four over the last 10 and 50 ms; and 1 (clock). A taxel that
+    /// is 0 from the first sample on has no value yet: it counts as at rest.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct LocalLoad {
+        /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
+        pub noise_floor: f64 = 3.0, "", Range::FROM_0;
+        /// The smallest noise of a taxel, in the sensor's unit. Default 0.3, the deviation within a tick.
+        pub least_noise: f64 = 0.3, "", Range::within(1e-9, 1e9);
+        /// The rest from which a load is measured.
+        pub rest: LocalRest = LocalRest::default();
+        /// Time constants of the running means, ms, each with six more quantities; none by default.
+        pub local_ms: Vec<f64> = vec![], "ms", Range::ABOVE_0;
+        /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+        pub period_ms: f64 = super::periods::stamp_period(), "ms", Range::WHOLE_US;
+        /// Levels of the largest sums, in units of noise, ascending; none by default.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub levels: Vec<f64> = vec![], "", Range::ABOVE_0;
+        /// The part of a level below which it is left, from 0.01 to 1; default 1. Below 1, noise near a level does not
+        /// cross it again and again.
+        #[serde(skip_serializing_if = "is_one")]
+        pub release: f64 = 1.0, "", Range::within(0.01, 1.0);
+        /// The taxels' rest and noise. It is valid for one board on one day: a saved readout has none and receives one
+        /// when it is used.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub tare: Option<Tare> = None;
     }
 }
 
@@ -101,15 +88,6 @@ fn is_one(release: &f64) -> bool {
 }
 
 impl LocalLoad {
-    ranges! {
-        noise_floor: "", Range::FROM_0;
-        least_noise: "", Range::within(1e-9, 1e9);
-        local_ms: "ms", Range::ABOVE_0;
-        period_ms: "ms", Range::WHOLE_US;
-        levels: "", Range::ABOVE_0;
-        release: "", Range::within(0.01, 1.0);
-    }
-
     /// The names of the quantities, a train each.
     #[must_use]
     pub fn quantities(&self) -> Vec<String> {
@@ -193,12 +171,7 @@ fn quantities(spikes: &[Spike]) -> Vec<f64> {
     spikes.iter().map(|spike| f64::from(spike.value)).collect()
 }
 
-impl Law for LocalLoad {
-    fn described() -> Described {
-        let of_levels = Described::by(&Self::default(), &[], Self::RANGES).or("levels", Vec::<f64>::new());
-        of_levels.or("release", 1.0).or_nothing("tare")
-    }
-
+impl Encoding for LocalLoad {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if let Some(k) = self.levels.windows(2).position(|pair| pair[0] >= pair[1]) {
@@ -354,7 +327,7 @@ impl Rule for Load {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], _changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], _changed: &[bool], _next: &mut NextPicture, out: &mut Vec<Spike>) {
         self.take(t, held, out);
     }
 

@@ -5,108 +5,81 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{Block, Next};
-use super::law::Law;
+use super::blocks::{Block, NextPicture};
+use super::encoding::Encoding;
 use super::loaded::{Loaded, Sums};
 use super::periods::micros;
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;
-use crate::allowed::{Range, ranges};
+use crate::allowed::Range;
 use crate::array::{Pitch, PlaceUnit, Places};
-use crate::parameters::Described;
+use crate::parameters::parameters;
 use crate::spikes::{ms, us};
 use crate::{Array, Result, Spike, SpikeKind, problem};
 
-/// Moments of the current values above rest, each with levels in a geometric series.
-///
-/// The moments are computed over the taxels that count for [`ContactArea`](super::ContactArea): their number (area),
-/// the sum and the largest of their values above rest (total, peak), and the displacement of their centre, weighted by
-/// these values, to the right and downwards since the current touch began, mm. A touch begins when the area rises above
-/// 0 and ends when it is 0; between touches all moments are 0. Each level of the displacement exists on both sides of 0
-/// and is crossed outwards.
-///
-/// Trains, unsigned; levels in the order area, total, peak, x right, x left, y down, y up, ascending within each. First
-/// a train per level that spikes when the level is reached, then one per level that spikes when it is left, then, with
-/// `tonic_ms`, one that spikes while the level is exceeded. The first sample causes no spike of the first two kinds.
-///
-/// With `graded` all trains are graded: those of the levels, with the value 1, are followed by one per moment in the
-/// order area, total, peak, x, y. During a touch it spikes at every sample (each frame; of events every `period_ms` from
-/// the first stamp) with the value `log(1 + moment)`, of a displacement `log(1 + |moment|)` with its sign; never with 0.
-///
-/// With `centre` four more follow, with the column of the centre, -1 in the first to 1 in the last, its square, and its
-/// row and that one's square, as they are.
-///
-/// With `ages_ms` the last trains are one per age. During a touch, at every sample, the train of the largest of these
-/// ages that the touch has reached spikes; its age is counted from the sample at which it began.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Moments {
-    /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
-    pub noise_floor: f64,
-    /// Number of levels of each moment, for a displacement on each side of 0; with 0 there are no trains of levels.
-    /// Default 20.
-    pub levels: usize,
-    /// Smallest and largest level of the number of taxels; `None` omits the moment.
-    pub area: Option<[f64; 2]>,
-    /// Smallest and largest level of the sum above rest, in the sensor's unit.
-    pub total: Option<[f64; 2]>,
-    /// Smallest and largest level of the largest value above rest, in the sensor's unit.
-    pub peak: Option<[f64; 2]>,
-    /// Smallest and largest level of the centre's displacement in x and in y, mm.
-    pub displacement_mm: Option<[f64; 2]>,
-    /// Period of the tonic spikes while a level is exceeded, ms, the first when it is reached; `None` for none. Default
-    /// 0.5.
-    pub tonic_ms: Option<f64>,
-    /// Whether the moments themselves are emitted, as graded spikes.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub graded: bool,
-    /// Whether the place of the centre is emitted too, as graded spikes.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub centre: bool,
-    /// The ages of a touch that have a train each, ms, ascending, each rounded to a whole us; `None` for none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ages_ms: Option<Vec<f64>>,
-    /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    pub period_ms: f64,
-    /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
-    /// used.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tare: Option<Tare>,
-}
-
-impl Default for Moments {
-    fn default() -> Self {
-        Self {
-            noise_floor: 3.0,
-            levels: 20,
-            area: Some([2.0, 500.0]),
-            total: Some([8.0, 20_000.0]),
-            peak: Some([4.0, 120.0]),
-            displacement_mm: Some([0.2, 20.0]),
-            tonic_ms: Some(0.5),
-            graded: false,
-            centre: false,
-            ages_ms: None,
-            period_ms: super::periods::stamp_period(),
-            tare: None,
-        }
+parameters! {
+    /// Moments of the current values above rest, each with levels in a geometric series.
+    ///
+    /// The moments are computed over the taxels that count for [`ContactArea`](super::ContactArea): their number
+    /// (area), the sum and the largest of their values above rest (total, peak), and the displacement of their centre,
+    /// weighted by these values, to the right and downwards since the current touch began, mm. A touch begins when the
+    /// area rises above 0 and ends when it is 0; between touches all moments are 0. Each level of the displacement
+    /// exists on both sides of 0 and is crossed outwards.
+    ///
+    /// Trains, unsigned; levels in the order area, total, peak, x right, x left, y down, y up, ascending within each.
+    /// First a train per level that spikes when the level is reached, then one per level that spikes when it is left,
+    /// then, with `tonic_ms`, one that spikes while the level is exceeded. The first sample causes no spike of the
+    /// first two kinds.
+    ///
+    /// With `graded` all trains are graded: those of the levels, with the value 1, are followed by one per moment in
+    /// the order area, total, peak, x, y. During a touch it spikes at every sample (each frame; of events every
+    /// `period_ms` from the first stamp) with the value `log(1 + moment)`, of a displacement `log(1 + |moment|)` with
+    /// its sign; never with 0.
+    ///
+    /// With `centre` four more follow, with the column of the centre, -1 in the first to 1 in the last, its square, and
+    /// its row and that one's square, as they are.
+    ///
+    /// With `ages_ms` the last trains are one per age. During a touch, at every sample, the train of the largest of
+    /// these ages that the touch has reached spikes; its age is counted from the sample at which it began.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Moments {
+        /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
+        pub noise_floor: f64 = 3.0, "", Range::FROM_0;
+        /// Number of levels of each moment, for a displacement on each side of 0; with 0 there are no trains of levels.
+        /// Default 20.
+        pub levels: usize = 20, "", Range::within(0.0, 1000.0);
+        /// Smallest and largest level of the number of taxels; `None` omits the moment.
+        pub area: Option<[f64; 2]> = Some([2.0, 500.0]), "", Range::ABOVE_0;
+        /// Smallest and largest level of the sum above rest, in the sensor's unit.
+        pub total: Option<[f64; 2]> = Some([8.0, 20_000.0]), "", Range::ABOVE_0;
+        /// Smallest and largest level of the largest value above rest, in the sensor's unit.
+        pub peak: Option<[f64; 2]> = Some([4.0, 120.0]), "", Range::ABOVE_0;
+        /// Smallest and largest level of the centre's displacement in x and in y, mm.
+        pub displacement_mm: Option<[f64; 2]> = Some([0.2, 20.0]), "mm", Range::ABOVE_0;
+        /// Period of the tonic spikes while a level is exceeded, ms, the first when it is reached; `None` for none.
+        /// Default 0.5.
+        pub tonic_ms: Option<f64> = Some(0.5), "ms", Range::WHOLE_US;
+        /// Whether the moments themselves are emitted, as graded spikes.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        pub graded: bool = false;
+        /// Whether the place of the centre is emitted too, as graded spikes.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        pub centre: bool = false;
+        /// The ages of a touch that have a train each, ms, ascending, each rounded to a whole us; `None` for none.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub ages_ms: Option<Vec<f64>> = None, "ms", Range::FROM_0;
+        /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+        pub period_ms: f64 = super::periods::stamp_period(), "ms", Range::WHOLE_US;
+        /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
+        /// used.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub tare: Option<Tare> = None;
     }
 }
 
 impl Moments {
-    ranges! {
-        noise_floor: "", Range::FROM_0;
-        levels: "", Range::within(0.0, 1000.0);
-        area: "", Range::ABOVE_0;
-        total: "", Range::ABOVE_0;
-        peak: "", Range::ABOVE_0;
-        displacement_mm: "mm", Range::ABOVE_0;
-        tonic_ms: "ms", Range::WHOLE_US;
-        ages_ms: "ms", Range::FROM_0;
-        period_ms: "ms", Range::WHOLE_US;
-    }
-
     fn ranges(&self) -> [(&'static str, Option<[f64; 2]>); 4] {
         [("area", self.area), ("total", self.total), ("peak", self.peak), ("displacement_mm", self.displacement_mm)]
     }
@@ -149,15 +122,7 @@ impl Moments {
     }
 }
 
-impl Law for Moments {
-    fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-            .or_nothing("tare")
-            .or_nothing("ages_ms")
-            .or("graded", false)
-            .or("centre", false)
-    }
-
+impl Encoding for Moments {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         let ranges = self.ranges();
@@ -390,7 +355,7 @@ impl Rule for Passing {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextPicture, out: &mut Vec<Spike>) {
         let changes = changed.contains(&true);
         if !changes && !self.at_every_sample() {
             return;

@@ -8,7 +8,7 @@
 //! within a sample is found by linear interpolation of `u` as well, and the threshold's rise decays from that time.
 //! Therefore rates do not depend on the sampling period as long as it is short compared with the filter.
 
-use super::blocks::{BLOCK, Block, Next, blocks};
+use super::blocks::{BLOCK, Block, NextPicture, blocks};
 use super::sampled::Rule;
 use crate::Spike;
 use crate::spikes::ms;
@@ -210,7 +210,7 @@ impl<F: Filter> Rule for ByTaxel<F> {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
             next.fetch();
             let x = |lane: usize| share(self.scale, values[lane]);
@@ -301,7 +301,7 @@ mod tests {
         for (t, pair) in (1..).zip(pictures.windows(2)) {
             let changed: Vec<bool> = pair[0].iter().zip(&pair[1]).map(|(a, b)| a != b).collect();
             left_out += (0..changed.len()).filter(|&block| !changed[block] && rule.afferents.is_still(block)).count();
-            rule.sample(t, &pair[1], &changed, &mut Next::unknown(), &mut out);
+            rule.sample(t, &pair[1], &changed, &mut NextPicture::unknown(), &mut out);
         }
         let shares = |picture: &Vec<Block>| -> Vec<f64> {
             picture.as_flattened()[..channels].iter().map(|&value| share(rule.scale, value)).collect()

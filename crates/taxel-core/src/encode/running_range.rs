@@ -6,28 +6,30 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::{BLOCK, Block};
 use super::periods::micros;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::{Result, problem};
 
-/// Levels as fractions of a channel's running range, y = (x - low) / (high - low), which compensates drift and unknown
-/// gain.
-///
-/// `low` and `high` are percentiles (linear between ranks) of the samples in the window that ends, exclusive, at the
-/// last update. Updates take place at the time of the first sample plus the window plus multiples of `renew_s`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RunningRange {
-    /// The percentile that maps to 0, from 0; default 10.
-    pub low: f64,
-    /// The percentile that maps to 1, to 100; default 95.
-    pub high: f64,
-    /// Length of the window, s; default 10.
-    pub window_s: f64,
-    /// Interval between updates of the percentiles, s; default 1.
-    pub renew_s: f64,
-    /// How samples before the end of the first window are treated.
-    pub first_window: FirstWindow,
+parameters! {
+    /// Levels as fractions of a channel's running range, y = (x - low) / (high - low), which compensates drift and
+    /// unknown gain.
+    ///
+    /// `low` and `high` are percentiles (linear between ranks) of the samples in the window that ends, exclusive, at
+    /// the last update. Updates take place at the time of the first sample plus the window plus multiples of `renew_s`.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct RunningRange {
+        /// The percentile that maps to 0, from 0; default 10.
+        pub low: f64 = 10.0, "%", Range::within(0.0, 100.0);
+        /// The percentile that maps to 1, to 100; default 95.
+        pub high: f64 = 95.0, "%", Range::within(0.0, 100.0);
+        /// Length of the window, s; default 10.
+        pub window_s: f64 = 10.0, "s", Range::WHOLE_US_IN_S;
+        /// Interval between updates of the percentiles, s; default 1.
+        pub renew_s: f64 = 1.0, "s", Range::WHOLE_US_IN_S;
+        /// How samples before the end of the first window are treated.
+        pub first_window: FirstWindow = FirstWindow::default();
+    }
 }
 
 /// How a running range treats the samples before the end of its first window.
@@ -42,26 +44,7 @@ pub enum FirstWindow {
     Itself,
 }
 
-impl Default for RunningRange {
-    fn default() -> Self {
-        Self { low: 10.0, high: 95.0, window_s: 10.0, renew_s: 1.0, first_window: FirstWindow::default() }
-    }
-}
-
 impl RunningRange {
-    ranges! {
-        low: "%", Range::within(0.0, 100.0);
-        high: "%", Range::within(0.0, 100.0);
-        window_s: "s", Range::WHOLE_US_IN_S;
-        renew_s: "s", Range::WHOLE_US_IN_S;
-    }
-
-    /// The parameters, with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter.
     ///
     /// # Errors

@@ -3,9 +3,9 @@
 //! A [`Rule`] implements one encoder and does not depend on events or pieces; [`Sampled`] passes it the samples and
 //! marks the blocks that did not change since the last sample, which a rule can skip.
 
-use super::blocks::{BLOCK, Block, Next, blocks, in_blocks};
+use super::blocks::{BLOCK, Block, NextPicture, blocks, in_blocks};
 use super::channels::{Channels, FARTHEST};
-use super::law::Law;
+use super::encoding::Encoding;
 use super::periods::micros;
 use super::stream::Stream;
 use super::tare::Tare;
@@ -26,7 +26,7 @@ pub(super) trait Rule: Send + Clone + 'static {
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
 
     /// Processes a later sample; only blocks that `changed` differ from the last one. `pass` was called up to `t`.
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>);
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>);
 
     /// Whether a block takes so long to compute that the rule prefetches parts of the `next` picture between blocks.
     const ASKS: bool = false;
@@ -60,7 +60,7 @@ wide! {
         t: i64,
         held: &[Block],
         changed: &[bool],
-        next: &mut Next,
+        next: &mut NextPicture,
         out: &mut Vec<Spike>,
     ) {
         rule.pass(t, out);
@@ -172,17 +172,17 @@ impl Above {
 }
 
 impl<R: Rule> Sampled<R> {
-    /// Feeds a rule with samples; `law` defines the number of trains, their kind, and the latency.
-    pub(super) fn new(law: &impl Law, rule: R, array: &Array, period_ms: f64) -> Result<Self> {
+    /// Feeds a rule with samples; `encoding` defines the number of trains, their kind, and the latency.
+    pub(super) fn new(encoding: &impl Encoding, rule: R, array: &Array, period_ms: f64) -> Result<Self> {
         let channels = Channels::new(array);
         let n = blocks(channels.len());
         Ok(Self {
             rule,
             channels,
             period: micros("period_ms", period_ms)?,
-            trains: law.trains(array),
-            kind: law.kind(),
-            latency_ms: law.latency_ms(),
+            trains: encoding.trains(array),
+            kind: encoding.kind(),
+            latency_ms: encoding.latency_ms(),
             held: Held::all(n * BLOCK, 0.0),
             changed: vec![false; n],
             quiet: true,
@@ -210,7 +210,7 @@ impl<R: Rule> Sampled<R> {
         self
     }
 
-    fn sample(&mut self, t: i64, mut next: Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, mut next: NextPicture, out: &mut Vec<Spike>) {
         let held = in_blocks(self.held.values());
         if self.begun {
             take_sample(&mut self.rule, t, held, &self.changed, &mut next, out);
@@ -231,7 +231,7 @@ impl<R: Rule> Sampled<R> {
                 self.next = self.next.saturating_add_unsigned(left.saturating_mul(self.period.unsigned_abs()));
                 return;
             }
-            self.sample(self.next, Next::unknown(), out);
+            self.sample(self.next, NextPicture::unknown(), out);
             self.next += self.period;
         }
     }
@@ -332,7 +332,7 @@ impl<R: Rule> Stream for Sampled<R> {
             let (since, period) = (ms(t - self.last), ms(self.period));
             return Err(problem!("frame at {t} us, {since} ms after the last: must come every period_ms, {period}"));
         }
-        let (now, later) = (Next::after(values), Next::unknown());
+        let (now, later) = (NextPicture::after(values), NextPicture::unknown());
         let (mut now, later) = if R::ASKS { (later, now) } else { (now, later) };
         let values = match &mut self.above {
             Some(above) if values.len() == above.picture.len() => {

@@ -4,12 +4,12 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next, blocks};
+use super::blocks::{BLOCK, Block, NextPicture, blocks};
 use super::channels::Channels;
+use super::encoding::Encoding;
 use super::fa1::{self, Decay, Fa1};
 use super::fa2::{Fa2, Fast};
 use super::fields::Fields;
-use super::law::Law;
 use super::receptor::ByTaxel;
 use super::sa1::Sa1;
 use super::sa2::Sa2;
@@ -17,70 +17,54 @@ use super::sampled::{Rule, Sampled};
 use super::slow::Slow;
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;
-use crate::allowed::{Range, ranges};
+use crate::allowed::Range;
 use crate::array::Pitch;
-use crate::parameters::Described;
+use crate::parameters::parameters;
 use crate::{Array, Result, Spike, SpikeKind, problem};
 
-/// SA-1, FA-1, SA-2 and FA-2 afferents with given densities, at positions drawn by a seed; each has a field of taxels.
-///
-/// The densities are those of a fingertip: 70, 140 and 25 per cm^2 for SA-1, FA-1 and FA-2, and for SA-2 the remainder
-/// of a total of 241 (Johansson and Vallbo 1979, J. Physiol. 286:283; the three as used by Saal et al. 2017, PNAS
-/// 114:E5693). Field areas: medians of 11.0 mm^2 for SA-1 and 12.6 for FA-1, some 5 times as much for SA-2 and 10 times
-/// for FA-2 (Johansson and Vallbo 1980, Brain Res. 184:353). The input of an afferent is the mean of the taxels in its
-/// field, a disc, weighted by a Gaussian whose second standard deviation is the field's edge; this shape is our choice.
-/// If the field contains no taxel's centre, the input is the taxel at the afferent's position. Each type is the encoder
-/// of its name with its defaults and this `range`; FA-1's threshold decays per ms, so that the sampling period matters
-/// as little as possible.
-///
-/// Trains, unsigned as a nerve's spikes: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to the last.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Skin {
-    /// Density of SA-1 afferents, per cm^2 of taxels.
-    pub sa1_per_cm2: f64,
-    /// Density of FA-1 afferents, per cm^2.
-    pub fa1_per_cm2: f64,
-    /// Density of SA-2 afferents, per cm^2.
-    pub sa2_per_cm2: f64,
-    /// Density of FA-2 afferents, per cm^2.
-    pub fa2_per_cm2: f64,
-    /// Area of an SA-1 afferent's field, mm^2.
-    pub sa1_field_mm2: f64,
-    /// Area of an FA-1 afferent's field, mm^2.
-    pub fa1_field_mm2: f64,
-    /// Area of an SA-2 afferent's field, mm^2.
-    pub sa2_field_mm2: f64,
-    /// Area of an FA-2 afferent's field, mm^2.
-    pub fa2_field_mm2: f64,
-    /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
-    pub range: f64,
-    /// Seed of the positions.
-    pub seed: u64,
-    /// Sampling period of events, ms, at most 1; frames must arrive at this period, within half of it.
-    pub period_ms: f64,
-    /// The taxels' rest, from which pressure is measured; 0 if there is none. It is valid for one board on one day: a
-    /// saved readout has none and receives one when it is used.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tare: Option<Tare>,
-}
-
-impl Default for Skin {
-    fn default() -> Self {
-        Self {
-            sa1_per_cm2: 70.0,
-            fa1_per_cm2: 140.0,
-            sa2_per_cm2: 6.0,
-            fa2_per_cm2: 25.0,
-            sa1_field_mm2: 11.0,
-            fa1_field_mm2: 12.6,
-            sa2_field_mm2: 60.0,
-            fa2_field_mm2: 120.0,
-            range: 150.0,
-            seed: 1,
-            period_ms: 0.2,
-            tare: None,
-        }
+parameters! {
+    /// SA-1, FA-1, SA-2 and FA-2 afferents with given densities, at positions drawn by a seed; each has a field of
+    /// taxels.
+    ///
+    /// The densities are those of a fingertip: 70, 140 and 25 per cm^2 for SA-1, FA-1 and FA-2, and for SA-2 the
+    /// remainder of a total of 241 (Johansson and Vallbo 1979, J. Physiol. 286:283; the three as used by Saal et al.
+    /// 2017, PNAS 114:E5693). Field areas: medians of 11.0 mm^2 for SA-1 and 12.6 for FA-1, some 5 times as much for
+    /// SA-2 and 10 times for FA-2 (Johansson and Vallbo 1980, Brain Res. 184:353). The input of an afferent is the mean
+    /// of the taxels in its field, a disc, weighted by a Gaussian whose second standard deviation is the field's edge;
+    /// this shape is our choice. If the field contains no taxel's centre, the input is the taxel at the afferent's
+    /// position. Each type is the encoder of its name with its defaults and this `range`; FA-1's threshold decays per
+    /// ms, so that the sampling period matters as little as possible.
+    ///
+    /// Trains, unsigned as a nerve's spikes: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to the last.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Skin {
+        /// Density of SA-1 afferents, per cm^2 of taxels.
+        pub sa1_per_cm2: f64 = 70.0, "", Range::FROM_0;
+        /// Density of FA-1 afferents, per cm^2.
+        pub fa1_per_cm2: f64 = 140.0, "", Range::FROM_0;
+        /// Density of SA-2 afferents, per cm^2.
+        pub sa2_per_cm2: f64 = 6.0, "", Range::FROM_0;
+        /// Density of FA-2 afferents, per cm^2.
+        pub fa2_per_cm2: f64 = 25.0, "", Range::FROM_0;
+        /// Area of an SA-1 afferent's field, mm^2.
+        pub sa1_field_mm2: f64 = 11.0, "", Range::ABOVE_0;
+        /// Area of an FA-1 afferent's field, mm^2.
+        pub fa1_field_mm2: f64 = 12.6, "", Range::ABOVE_0;
+        /// Area of an SA-2 afferent's field, mm^2.
+        pub sa2_field_mm2: f64 = 60.0, "", Range::ABOVE_0;
+        /// Area of an FA-2 afferent's field, mm^2.
+        pub fa2_field_mm2: f64 = 120.0, "", Range::ABOVE_0;
+        /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
+        pub range: f64 = 150.0, "", Range::ABOVE_0;
+        /// Seed of the positions.
+        pub seed: u64 = 1;
+        /// Sampling period of events, ms, at most 1; frames must arrive at this period, within half of it.
+        pub period_ms: f64 = 0.2, "ms", Range::WHOLE_US.at_most(1.0);
+        /// The taxels' rest, from which pressure is measured; 0 if there is none. It is valid for one board on one day:
+        /// a saved readout has none and receives one when it is used.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub tare: Option<Tare> = None;
     }
 }
 
@@ -129,19 +113,6 @@ pub struct Placed {
 const MOST: usize = 1_000_000;
 
 impl Skin {
-    ranges! {
-        sa1_per_cm2: "", Range::FROM_0;
-        fa1_per_cm2: "", Range::FROM_0;
-        sa2_per_cm2: "", Range::FROM_0;
-        fa2_per_cm2: "", Range::FROM_0;
-        sa1_field_mm2: "", Range::ABOVE_0;
-        fa1_field_mm2: "", Range::ABOVE_0;
-        sa2_field_mm2: "", Range::ABOVE_0;
-        fa2_field_mm2: "", Range::ABOVE_0;
-        range: "", Range::ABOVE_0;
-        period_ms: "ms", Range::WHOLE_US.at_most(1.0);
-    }
-
     /// Type, density per cm^2 and field in mm^2, in the order of the trains.
     fn types(&self) -> [(ReceptorKind, f64, f64); 4] {
         [
@@ -165,12 +136,12 @@ impl Skin {
     ///
     /// # Errors
     ///
-    /// `Problem` if a parameter is out of range, if the pitch of the array is not known, or if there would be more than a
-    /// million afferents.
+    /// `Problem` if a parameter is out of range, if the pitch of the array is not known, or if there would be more than
+    /// a million afferents.
     pub fn afferents(&self, array: &Array) -> Result<Vec<Placed>> {
         self.check()?;
         let pitch = array.pitch("skin")?;
-        let count = Law::trains(self, array);
+        let count = Encoding::trains(self, array);
         if count > MOST {
             let (array, Pitch { rows, columns }) = (&array.name, pitch);
             return Err(problem!(
@@ -206,11 +177,7 @@ fn places(array: &Array) -> Vec<[f64; 2]> {
         .collect()
 }
 
-impl Law for Skin {
-    fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
-    }
-
+impl Encoding for Skin {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         self.tare.as_ref().map_or(Ok(()), Tare::check)
@@ -308,7 +275,7 @@ impl<R: Rule> Type<R> {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         self.take(held, changed);
         let from = out.len();
         self.rule.sample(t, &self.held, &self.changed, next, out);
@@ -370,7 +337,7 @@ impl Rule for Afferents {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         let from = out.len();
         self.sa1.sample(t, held, changed, next, out);
         self.fa1.sample(t, held, changed, next, out);

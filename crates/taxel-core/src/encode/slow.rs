@@ -67,82 +67,52 @@ impl Filter for Slow {
 macro_rules! slowly_adapting {
     ($(#[$about:meta])* $Kind:ident, threshold: $threshold:expr, onset: $onset:expr, loss: $loss:expr) => {
         use super::channels::Channels;
-        use super::law::Law;
+        use super::encoding::Encoding;
         use super::receptor::{ByTaxel, Firing};
         use super::sampled::Sampled;
         use super::slow::Slow;
         use super::stream::Stream;
         use super::tare::Tare;
-        use $crate::allowed::{Range, ranges};
-        use $crate::parameters::Described;
+        use $crate::allowed::Range;
+        use $crate::parameters::parameters;
         use $crate::{Array, Result, SpikeKind};
 
-        $(#[$about])*
-        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(default, deny_unknown_fields)]
-        pub struct $Kind {
-            /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
-            pub range: f64,
-            /// Threshold of the potential for a spike, as a fraction of `range`.
-            pub threshold: f64,
-            /// Additional weight of a pressure while it is new.
-            pub onset: f64,
-            /// Time constant with which a pressure stops counting as new, ms.
-            pub onset_ms: f64,
-            /// Fraction of a lasting pressure that adaptation removes in the end.
-            pub loss: f64,
-            /// Time constant of this adaptation, ms.
-            pub loss_ms: f64,
-            /// Time constant of the membrane, ms.
-            pub membrane_ms: f64,
-            /// Amount by which a spike raises the threshold, as a fraction of `range`.
-            pub jump: f64,
-            /// Time constant with which the threshold decays again, ms.
-            pub recovery_ms: f64,
-            /// Refractory time after a spike, ms.
-            pub refractory_ms: f64,
-            /// Sampling period of events, ms; frames must arrive at this period, within half of it.
-            pub period_ms: f64,
-            /// The taxels' rest, from which pressure is measured; 0 if there is none. It is valid for one board on one
-            /// day: a saved readout has none and receives one when it is used.
-            #[serde(skip_serializing_if = "Option::is_none")]
-            pub tare: Option<Tare>,
-        }
-
-        impl Default for $Kind {
-            fn default() -> Self {
-                Self {
-                    range: 150.0,
-                    threshold: $threshold,
-                    onset: $onset,
-                    onset_ms: 200.0,
-                    loss: $loss,
-                    loss_ms: 5000.0,
-                    membrane_ms: 5.0,
-                    jump: 0.15,
-                    recovery_ms: 30.0,
-                    refractory_ms: 2.0,
-                    period_ms: 1.0,
-                    tare: None,
-                }
+        parameters! {
+            $(#[$about])*
+            #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+            #[serde(default, deny_unknown_fields)]
+            pub struct $Kind {
+                /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz
+                /// preset.
+                pub range: f64 = 150.0, "", Range::ABOVE_0;
+                /// Threshold of the potential for a spike, as a fraction of `range`.
+                pub threshold: f64 = $threshold, "", Range::ABOVE_0;
+                /// Additional weight of a pressure while it is new.
+                pub onset: f64 = $onset, "", Range::FROM_0;
+                /// Time constant with which a pressure stops counting as new, ms.
+                pub onset_ms: f64 = 200.0, "ms", Range::ABOVE_0;
+                /// Fraction of a lasting pressure that adaptation removes in the end.
+                pub loss: f64 = $loss, "", Range::within(0.0, 1.0);
+                /// Time constant of this adaptation, ms.
+                pub loss_ms: f64 = 5000.0, "ms", Range::ABOVE_0;
+                /// Time constant of the membrane, ms.
+                pub membrane_ms: f64 = 5.0, "ms", Range::ABOVE_0;
+                /// Amount by which a spike raises the threshold, as a fraction of `range`.
+                pub jump: f64 = 0.15, "", Range::ABOVE_0;
+                /// Time constant with which the threshold decays again, ms.
+                pub recovery_ms: f64 = 30.0, "ms", Range::ABOVE_0;
+                /// Refractory time after a spike, ms.
+                pub refractory_ms: f64 = 2.0, "ms", Range::FROM_0;
+                /// Sampling period of events, ms; frames must arrive at this period, within half of it.
+                pub period_ms: f64 = 1.0, "ms", Range::WHOLE_US;
+                /// The taxels' rest, from which pressure is measured; 0 if there is none. It is valid for one board on
+                /// one day: a saved readout has none and receives one when it is used.
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub tare: Option<Tare> = None;
             }
         }
 
         impl $Kind {
-            ranges! {
-                range: "", Range::ABOVE_0;
-                threshold: "", Range::ABOVE_0;
-                onset: "", Range::FROM_0;
-                onset_ms: "ms", Range::ABOVE_0;
-                loss: "", Range::within(0.0, 1.0);
-                loss_ms: "ms", Range::ABOVE_0;
-                membrane_ms: "ms", Range::ABOVE_0;
-                jump: "", Range::ABOVE_0;
-                recovery_ms: "ms", Range::ABOVE_0;
-                refractory_ms: "ms", Range::FROM_0;
-                period_ms: "ms", Range::WHOLE_US;
-            }
-
             pub(super) fn filter(&self) -> Slow {
                 Slow::new(
                     [self.onset, self.onset_ms],
@@ -163,11 +133,7 @@ macro_rules! slowly_adapting {
             }
         }
 
-        impl Law for $Kind {
-            fn described() -> Described {
-                Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
-            }
-
+        impl Encoding for $Kind {
             fn check(&self) -> Result<()> {
                 self.check_ranges()?;
                 self.tare.as_ref().map_or(Ok(()), Tare::check)

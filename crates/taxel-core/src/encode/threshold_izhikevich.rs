@@ -3,10 +3,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next, blocks};
+use super::blocks::{BLOCK, Block, NextPicture, blocks};
 use super::bracket::{Bracket, check_levels};
 use super::channels::Channels;
-use super::law::Law;
+use super::encoding::Encoding;
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
 use crate::allowed::{Range, ranges};
@@ -79,6 +79,12 @@ impl ThresholdIzhikevich {
         period_ms: "ms", Range::WHOLE_US;
     }
 
+    /// The parameters with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
+    }
+
     /// An encoder with the neurons of 6.5.1 and these levels.
     #[must_use]
     pub fn at(levels: Vec<f64>) -> Self {
@@ -87,11 +93,7 @@ impl ThresholdIzhikevich {
     }
 }
 
-impl Law for ThresholdIzhikevich {
-    fn described() -> Described {
-        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
-    }
-
+impl Encoding for ThresholdIzhikevich {
     fn check(&self) -> Result<()> {
         check_levels(&self.levels)?;
         self.check_ranges()
@@ -337,7 +339,7 @@ impl Rule for Pairs {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
             next.fetch();
             if changed[block] && self.bracket.left(block, values) {

@@ -11,5 +11,5 @@ mod touched;
 
 pub(crate) use augmented::Start;
 pub(crate) use cone_program::{ConeProgram, HardRows, Hinges};
-pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
+pub use dual_active_set::{DualActiveSet, Multipliers, Outcome, Ray, RowId};
 pub(crate) use nearest::nearest;

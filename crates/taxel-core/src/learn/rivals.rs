@@ -48,7 +48,7 @@ macro_rules! batches {
             #[must_use]
             pub fn described(name: &str) -> Option<Described> {
                 $(if name == stringify!($module) {
-                    return Some(<$Kind as BatchRule>::described());
+                    return Some($Kind::described());
                 })*
                 None
             }
@@ -102,32 +102,32 @@ impl Batch {
     }
 }
 
-/// The registry of rules by epochs: a line each, its file `learn/rivals/NAME.rs`, which is also its name in JSON, and the
-/// laws in it.
+/// The registry of rules by epochs: a line each, its file `learn/rivals/NAME.rs`, which is also its name in JSON, and
+/// the kinds in it.
 macro_rules! rules {
-    ($($module:ident: $($law:ident),+;)*) => {
+    ($($module:ident: $($Kind:ident),+;)*) => {
         $(mod $module;)*
-        $(pub use $module::{$($law),+};)*
+        $(pub use $module::{$($Kind),+};)*
 
         /// The published defaults of all rules by epochs.
         const SOURCES: &[Source] = &[$($module::SOURCE),*];
 
-        /// Which rule, with its own constants.
+        /// Any of the rules, with its own constants.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
-        pub enum Law {
-            $($(#[doc = concat!("[`", stringify!($law), "`].")] $law($law),)+)*
+        pub enum AnyRule {
+            $($(#[doc = concat!("[`", stringify!($Kind), "`].")] $Kind($Kind),)+)*
         }
 
-        impl Law {
+        impl AnyRule {
             /// The name of the rule.
             fn name(&self) -> &'static str {
-                match self { $($(Self::$law(_) => stringify!($module),)+)* }
+                match self { $($(Self::$Kind(_) => stringify!($module),)+)* }
             }
 
             fn check(&self, neuron: &SteppedNeuron) -> Result<()> {
                 match self {
-                    $($(Self::$law(law) => law.rule(neuron).map(drop),)+)*
+                    $($(Self::$Kind(constants) => constants.rule(neuron).map(drop),)+)*
                 }
             }
 
@@ -140,7 +140,9 @@ macro_rules! rules {
                 stop: Stop<'_>,
             ) -> Result<Trained> {
                 match self {
-                    $($(Self::$law(law) => training.train(&law.rule(neuron)?, neuron, examples, report, stop),)+)*
+                    $($(Self::$Kind(constants) => {
+                        training.train(&constants.rule(neuron)?, neuron, examples, report, stop)
+                    })+)*
                 }
             }
 
@@ -152,7 +154,9 @@ macro_rules! rules {
                 targets: &[f64],
             ) -> Result<(Vec<f64>, Vec<f64>)> {
                 match self {
-                    $($(Self::$law(law) => change_of(&law.rule(neuron)?, neuron, weights, pattern, targets),)+)*
+                    $($(Self::$Kind(constants) => {
+                        change_of(&constants.rule(neuron)?, neuron, weights, pattern, targets)
+                    })+)*
                 }
             }
         }

@@ -14,74 +14,40 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{Range, one_weight_a_train, ranges};
-use crate::parameters::Described;
+use crate::allowed::{Range, one_weight_a_train};
+use crate::parameters::parameters;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// Parameters of the rule and its neuron; the defaults are the published ones, for about 2000 inputs of 64 spikes/s.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Stdp {
-    /// The threshold T, in units of weights.
-    pub threshold: f64,
-    /// The membrane time constant, ms.
-    pub tau_m: f64,
-    /// The synaptic time constant, ms.
-    pub tau_s: f64,
-    /// Amplitude of the spike itself (the factor k1), in thresholds.
-    pub k1: f64,
-    /// Amplitude of the after-potential (the factor k2), in thresholds.
-    pub k2: f64,
-    /// The largest increase of a weight by one pair of spikes.
-    pub a_plus: f64,
-    /// The largest decrease of a weight by one pair of spikes.
-    pub a_minus: f64,
-    /// Time constant of increases, ms.
-    pub tau_plus: f64,
-    /// Time constant of decreases, ms.
-    pub tau_minus: f64,
-    /// The initial value of all weights.
-    pub initial: f64,
-}
-
-impl Default for Stdp {
-    fn default() -> Self {
-        let a_plus = 0.03125;
-        Self {
-            threshold: 500.0,
-            tau_m: 10.0,
-            tau_s: 2.5,
-            k1: 2.0,
-            k2: 4.0,
-            a_plus,
-            a_minus: 0.85 * a_plus,
-            tau_plus: 16.8,
-            tau_minus: 33.7,
-            initial: 0.475,
-        }
+parameters! {
+    /// Parameters of the rule and its neuron; the defaults are the published ones, for about 2000 inputs of 64
+    /// spikes/s.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Stdp {
+        /// The threshold T, in units of weights.
+        pub threshold: f64 = 500.0, "", Range::ABOVE_0;
+        /// The membrane time constant, ms.
+        pub tau_m: f64 = 10.0, "ms", Range::ABOVE_0;
+        /// The synaptic time constant, ms.
+        pub tau_s: f64 = 2.5, "ms", Range::ABOVE_0;
+        /// Amplitude of the spike itself (the factor k1), in thresholds.
+        pub k1: f64 = 2.0, "", Range::FROM_0;
+        /// Amplitude of the after-potential (the factor k2), in thresholds.
+        pub k2: f64 = 4.0, "", Range::FROM_0;
+        /// The largest increase of a weight by one pair of spikes.
+        pub a_plus: f64 = 0.03125, "", Range::within(0.0, 1.0);
+        /// The largest decrease of a weight by one pair of spikes.
+        pub a_minus: f64 = 0.85 * 0.03125, "", Range::within(0.0, 1.0);
+        /// Time constant of increases, ms.
+        pub tau_plus: f64 = 16.8, "ms", Range::ABOVE_0;
+        /// Time constant of decreases, ms.
+        pub tau_minus: f64 = 33.7, "ms", Range::ABOVE_0;
+        /// The initial value of all weights.
+        pub initial: f64 = 0.475, "", Range::within(0.0, 1.0);
     }
 }
 
 impl Stdp {
-    ranges! {
-        threshold: "", Range::ABOVE_0;
-        tau_m: "ms", Range::ABOVE_0;
-        tau_s: "ms", Range::ABOVE_0;
-        k1: "", Range::FROM_0;
-        k2: "", Range::FROM_0;
-        a_plus: "", Range::within(0.0, 1.0);
-        a_minus: "", Range::within(0.0, 1.0);
-        tau_plus: "ms", Range::ABOVE_0;
-        tau_minus: "ms", Range::ABOVE_0;
-        initial: "", Range::within(0.0, 1.0);
-    }
-
-    /// The parameters with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks the range of every parameter, and that `tau_s` is below `tau_m`.
     ///
     /// # Errors

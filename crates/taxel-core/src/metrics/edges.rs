@@ -1,6 +1,6 @@
 //! The window of the ISI and SPIKE distances, and the intervals before the first and after the last spike.
 
-use super::law::{One, Ready, summed};
+use super::distance::{Pattern, Ready, summed};
 use super::patterns::Patterns;
 use crate::{Result, Stop, problem};
 
@@ -18,7 +18,7 @@ pub(super) struct Within {
 }
 
 impl Ready for Within {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         summed(a, b, stop, |a, b| Ok((self.between)(a, b, self.window)))
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::distance::{Distance, Ready};
 use super::edges::{Window, Within, begun, distinct, interval};
-use super::law::{Law, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
 use crate::Result;
@@ -22,7 +22,7 @@ pub struct IsiDistance {
     pub window: Option<(f64, f64)>,
 }
 
-impl Law for IsiDistance {
+impl Distance for IsiDistance {
     fn described() -> Described {
         Described::by(&Self { window: None }, &[], &[])
     }

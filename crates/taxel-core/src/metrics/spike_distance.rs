@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::distance::{Distance, Ready};
 use super::edges::{Window, Within, begun, distinct, interval};
 use super::isi_distance::mean;
-use super::law::{Law, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
 use crate::Result;
@@ -23,7 +23,7 @@ pub struct SpikeDistance {
     pub window: Option<(f64, f64)>,
 }
 
-impl Law for SpikeDistance {
+impl Distance for SpikeDistance {
     fn described() -> Described {
         Described::by(&Self { window: None }, &[], &[])
     }

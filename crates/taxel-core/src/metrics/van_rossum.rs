@@ -4,13 +4,12 @@ mod matrix;
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{Law, One, Ready, summed};
+use super::distance::{Distance, Ready};
 use super::merged::merged;
-use super::pairwise::{Matrix, Work};
 use super::patterns::Patterns;
+use crate::Result;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
-use crate::{Result, Stop};
 
 /// The Euclidean distance between two trains, in which each spike becomes `exp(-(t - t_i) / tau)` from its time on.
 ///
@@ -52,7 +51,7 @@ impl Normalisation {
     }
 }
 
-impl Law for VanRossum {
+impl Distance for VanRossum {
     fn described() -> Described {
         Described::by(&Self { tau: 1.0, normalisation: Normalisation::default() }, &["tau"], Self::RANGES)
     }
@@ -61,25 +60,8 @@ impl Law for VanRossum {
         self.check_ranges()
     }
 
-    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        let _ = (a, b);
+    fn ready<'m>(&'m self, _: &Patterns<'_>, _: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
         Ok(Box::new(self))
-    }
-}
-
-impl Ready for &VanRossum {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
-        summed(a, b, stop, |a, b| Ok(VanRossum::between(self, a, b)))
-    }
-
-    fn fill(
-        &self,
-        matrix: &Matrix,
-        a: &Patterns<'_>,
-        b: Option<&Patterns<'_>>,
-        work: &mut Work<'_>,
-    ) -> Option<Result<()>> {
-        Some(VanRossum::fill(self, matrix, a, b, work))
     }
 }
 

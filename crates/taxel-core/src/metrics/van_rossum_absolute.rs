@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{Law, One, Ready, summed};
+use super::distance::{Distance, Pattern, Ready, summed};
 use super::merged::merged;
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
@@ -29,7 +29,7 @@ pub struct VanRossumAbsolute {
     pub step_ms: Option<f64>,
 }
 
-impl Law for VanRossumAbsolute {
+impl Distance for VanRossumAbsolute {
     fn described() -> Described {
         Described::by(&Self { tau: 1.0, window: None, step_ms: None }, &["tau"], Self::RANGES)
     }
@@ -39,14 +39,13 @@ impl Law for VanRossumAbsolute {
         Exposure::check(self.window)
     }
 
-    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        let _ = (a, b);
+    fn ready<'m>(&'m self, _: &Patterns<'_>, _: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
         Ok(Box::new(self))
     }
 }
 
 impl Ready for &VanRossumAbsolute {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         summed(a, b, stop, |a, b| Ok(VanRossumAbsolute::between(self, a, b)))
     }
 }

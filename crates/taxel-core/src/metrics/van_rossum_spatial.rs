@@ -4,8 +4,7 @@ mod matrix;
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{Law, One, Ready};
-use super::pairwise::{Matrix, Work};
+use super::distance::{Distance, Pattern, Ready};
 use super::patterns::Patterns;
 use super::van_rossum::Normalisation;
 use crate::allowed::{Range, ranges};
@@ -108,11 +107,9 @@ pub struct VanRossumSpatial {
     pub normalisation: Normalisation,
 }
 
-impl Law for VanRossumSpatial {
+impl Distance for VanRossumSpatial {
     fn described() -> Described {
-        let mut described = Smoothing::described();
-        described.defaults.insert("normalisation".into(), serde_json::json!(Normalisation::default()));
-        described
+        Smoothing::described().or("normalisation", serde_json::json!(Normalisation::default()))
     }
 
     fn check(&self) -> Result<()> {
@@ -126,30 +123,14 @@ impl Law for VanRossumSpatial {
 
 struct Smoothed<'m>(&'m VanRossumSpatial, Kernel);
 
-impl Ready for Smoothed<'_> {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
-        self.0.between(&self.1, a, b, stop)
-    }
-
-    fn fill(
-        &self,
-        matrix: &Matrix,
-        a: &Patterns<'_>,
-        b: Option<&Patterns<'_>>,
-        work: &mut Work<'_>,
-    ) -> Option<Result<()>> {
-        Some(self.0.fill(&self.1, matrix, a, b, work))
-    }
-}
-
 impl VanRossumSpatial {
     /// The distance between two patterns.
-    pub(super) fn between(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    pub(super) fn between(&self, kernel: &Kernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         Ok(self.normalisation.root(self.square(kernel, a, b, stop)?, self.smoothing.tau))
     }
 
     /// The squared distance between two patterns, in units of tau / 2.
-    fn square(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn square(&self, kernel: &Kernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         let tau = self.smoothing.tau;
         let mut square = 0.0;
         kernel.walk(tau, a, b, Gauge::Squares, stop, |sum, from, to| {
@@ -214,8 +195,8 @@ impl Kernel {
     pub(super) fn walk(
         &self,
         tau: f64,
-        (a, p): One<'_>,
-        (b, q): One<'_>,
+        (a, p): Pattern<'_>,
+        (b, q): Pattern<'_>,
         gauge: Gauge,
         stop: Stop<'_>,
         mut stretch: impl FnMut(f64, f64, f64),

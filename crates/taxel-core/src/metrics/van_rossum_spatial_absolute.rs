@@ -1,8 +1,9 @@
 //! 5.12 with the formula printed in 5.10: absolute differences summed over taxels and time.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use super::law::{Law, One, Ready};
+use super::distance::{Distance, Pattern, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
 use super::van_rossum_spatial::{Gauge, Kernel, Smoothing};
@@ -28,11 +29,11 @@ pub struct VanRossumSpatialAbsolute {
     pub step_ms: Option<f64>,
 }
 
-impl Law for VanRossumSpatialAbsolute {
+impl Distance for VanRossumSpatialAbsolute {
     fn described() -> Described {
         Described { ranges: [Smoothing::RANGES, Self::RANGES].concat(), ..Smoothing::described() }
-            .or_nothing("window")
-            .or_nothing("step_ms")
+            .or("window", Value::Null)
+            .or("step_ms", Value::Null)
     }
 
     fn check(&self) -> Result<()> {
@@ -49,7 +50,7 @@ impl Law for VanRossumSpatialAbsolute {
 struct Smoothed<'m>(&'m VanRossumSpatialAbsolute, Kernel);
 
 impl Ready for Smoothed<'_> {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         self.0.between(&self.1, a, b, stop)
     }
 }
@@ -60,7 +61,7 @@ impl VanRossumSpatialAbsolute {
     }
 
     /// The distance between two patterns.
-    pub(super) fn between(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    pub(super) fn between(&self, kernel: &Kernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         let tau = self.smoothing.tau;
         let exposure = Exposure::new(tau, self.window, self.step_ms);
         let mut sum = 0.0;

@@ -4,7 +4,7 @@ mod lanes;
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{Law, One, Ready, number_or_name, summed};
+use super::distance::{Distance, Pattern, Ready, number_or_name, summed};
 use super::pairwise::{Matrix, Work};
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
@@ -26,7 +26,7 @@ pub struct VictorPurpura {
     pub q: f64,
 }
 
-impl Law for VictorPurpura {
+impl Distance for VictorPurpura {
     fn described() -> Described {
         Described::by(&Self { q: 0.0 }, &["q"], Self::RANGES)
     }
@@ -35,26 +35,51 @@ impl Law for VictorPurpura {
         self.check_ranges()
     }
 
-    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        let _ = (a, b);
+    fn ready<'m>(&'m self, _: &Patterns<'_>, _: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
         Ok(Box::new(self))
     }
 }
 
 impl Ready for &VictorPurpura {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         summed(a, b, stop, |a, b| VictorPurpura::between(self, a, b, stop))
     }
 
-    fn fill(
-        &self,
-        matrix: &Matrix,
-        a: &Patterns<'_>,
-        b: Option<&Patterns<'_>>,
-        work: &mut Work<'_>,
-    ) -> Option<Result<()>> {
-        let quicker = self.has_reach() && work.instructions != Instructions::Plain;
-        quicker.then(|| VictorPurpura::fill(self, matrix, a, b, work))
+    /// Fills a matrix with the sums of distances over trains, many pairs side by side.
+    ///
+    /// Train after train, the columns' trains are sorted by length, so that trains processed side by side have similar
+    /// lengths.
+    fn fill(&self, matrix: &Matrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
+        if !self.has_reach() || work.instructions == Instructions::Plain {
+            return Ok(false);
+        }
+        let (set, lanes) = (work.instructions, lanes(work.instructions));
+        let others = b.unwrap_or(a);
+        let (pairs, reach) = (matrix.pairs(), self.reach());
+        for n in 0..a.trains {
+            let mut order: Vec<usize> = (0..others.count).collect();
+            order.sort_by_key(|&p| others.train(p, n).len());
+            let blocks: Vec<Block> = order
+                .chunks(lanes)
+                .map(|chunk| Block::new(lanes, &chunk.iter().map(|&p| others.train(p, n)).collect::<Vec<_>>()))
+                .collect();
+            // For patterns against each other, a row is compared with those that follow in the order.
+            let row = |at: usize| if b.is_some() { (at, 0) } else { (order[at], at + 1) };
+            let report = |rows: usize| ((pairs * n + pairs * rows / a.count) / a.trains, pairs);
+            work.each(a.count, &report, |at, stop| {
+                let (i, first) = row(at);
+                let mut cost = Vec::new();
+                for (block, from) in blocks.iter().zip((0..).step_by(lanes)).skip(first / lanes) {
+                    stop.check()?;
+                    let distances = block.distances(set, a.train(i, n), self.q, reach, &mut cost, stop)?;
+                    for (at, distance) in (from..others.count).zip(distances).skip(first.saturating_sub(from)) {
+                        matrix.add(i, order[at], distance);
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        Ok(true)
     }
 }
 
@@ -110,46 +135,6 @@ impl VictorPurpura {
             }
         }
         Ok(cost[hi] + count(b.len() - hi))
-    }
-
-    /// Fills a matrix with the sums of distances over trains, many pairs side by side.
-    ///
-    /// Train after train, the columns' trains are sorted by length, so that trains processed side by side have similar
-    /// lengths.
-    pub(super) fn fill(
-        &self,
-        matrix: &Matrix,
-        a: &Patterns<'_>,
-        b: Option<&Patterns<'_>>,
-        work: &mut Work<'_>,
-    ) -> Result<()> {
-        let (set, lanes) = (work.instructions, lanes(work.instructions));
-        let others = b.unwrap_or(a);
-        let (pairs, reach) = (matrix.pairs(), self.reach());
-        for n in 0..a.trains {
-            let mut order: Vec<usize> = (0..others.count).collect();
-            order.sort_by_key(|&p| others.train(p, n).len());
-            let blocks: Vec<Block> = order
-                .chunks(lanes)
-                .map(|chunk| Block::new(lanes, &chunk.iter().map(|&p| others.train(p, n)).collect::<Vec<_>>()))
-                .collect();
-            // For patterns against each other, a row is compared with those that follow in the order.
-            let row = |at: usize| if b.is_some() { (at, 0) } else { (order[at], at + 1) };
-            let report = |rows: usize| ((pairs * n + pairs * rows / a.count) / a.trains, pairs);
-            work.each(a.count, &report, |at, stop| {
-                let (i, first) = row(at);
-                let mut cost = Vec::new();
-                for (block, from) in blocks.iter().zip((0..).step_by(lanes)).skip(first / lanes) {
-                    stop.check()?;
-                    let distances = block.distances(set, a.train(i, n), self.q, reach, &mut cost, stop)?;
-                    for (at, distance) in (from..others.count).zip(distances).skip(first.saturating_sub(from)) {
-                        matrix.add(i, order[at], distance);
-                    }
-                }
-                Ok(())
-            })?;
-        }
-        Ok(())
     }
 }
 

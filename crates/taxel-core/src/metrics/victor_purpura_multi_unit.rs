@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{Law, One, Ready, number_or_name};
+use super::distance::{Distance, Pattern, Ready, number_or_name};
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
@@ -37,7 +37,7 @@ struct Labelled {
     unit: usize,
 }
 
-impl Law for VictorPurpuraMultiUnit {
+impl Distance for VictorPurpuraMultiUnit {
     fn described() -> Described {
         Described::by(&Self { q: 0.0, k: 0.0 }, &["q", "k"], Self::RANGES)
     }
@@ -46,14 +46,13 @@ impl Law for VictorPurpuraMultiUnit {
         self.check_ranges()
     }
 
-    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        let _ = (a, b);
+    fn ready<'m>(&'m self, _: &Patterns<'_>, _: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
         Ok(Box::new(self))
     }
 }
 
 impl Ready for &VictorPurpuraMultiUnit {
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         VictorPurpuraMultiUnit::between(self, a, b, stop)
     }
 }
@@ -65,7 +64,7 @@ impl VictorPurpuraMultiUnit {
     }
 
     /// The distance between two patterns.
-    pub(super) fn between(&self, (a, p): One<'_>, (b, q): One<'_>, stop: Stop<'_>) -> Result<f64> {
+    pub(super) fn between(&self, (a, p): Pattern<'_>, (b, q): Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         for unit in 0..a.trains {
             // Equal spikes of both patterns match at no cost, and some cheapest matching contains these pairs: the

@@ -19,12 +19,12 @@ pub(super) struct ContinuousStream {
     at: f64,
     /// The end of the refractory time (or the start of the printed first rise), until it has passed.
     edge: Option<f64>,
-    next: Next,
+    next: NextCrossing,
 }
 
 /// The next crossing if no input comes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Next {
+enum NextCrossing {
     Unknown,
     Never,
     At(f64),
@@ -35,7 +35,7 @@ impl ContinuousStream {
         let threshold = Threshold::new(neuron, factor, start);
         let edge = threshold.edge();
         let (shape, state) = (neuron.shape(), KernelSum::default());
-        Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: Next::Never }
+        Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: NextCrossing::Never }
     }
 
     /// Continues from `state` at time `at`, which the caller computed, up to an input or the end at `until`, and
@@ -48,7 +48,7 @@ impl ContinuousStream {
         input: bool,
         out: &mut Vec<OutputSpike>,
     ) -> KernelSum {
-        (self.state, self.at, self.next) = (state, at, Next::Unknown);
+        (self.state, self.at, self.next) = (state, at, NextCrossing::Unknown);
         if input {
             self.settle_at_input(until, until + AT_EDGE, out);
         } else {
@@ -86,7 +86,7 @@ impl ContinuousStream {
         self.settle(t, horizon, out);
         // A trained potential touches the threshold only to within rounding, so its computed crossing may be shortly
         // after an input that is simultaneous with it. Such an input comes too late to suppress the spike.
-        if let Next::At(crossing) = self.next
+        if let NextCrossing::At(crossing) = self.next
             && crossing - t <= AT_EDGE
             && self.edge.is_none_or(|edge| crossing < edge)
             && self.below(t) <= ROUNDED * self.threshold.touch
@@ -107,7 +107,7 @@ impl ContinuousStream {
             self.state = self.shape.after(self.state, t - self.at);
             self.at = t;
         }
-        self.next = Next::Unknown;
+        self.next = NextCrossing::Unknown;
     }
 
     /// Fires at every crossing up to and including `until`. Crossings after `horizon` may be left out.
@@ -115,11 +115,13 @@ impl ContinuousStream {
         loop {
             let waiting = self.edge.is_some() && self.threshold.fired.is_some();
             // The potential at the state's own time has been compared before: an input contributes 0 at its own time.
-            if !waiting && until > self.at && self.next == Next::Unknown {
+            if !waiting && until > self.at && self.next == NextCrossing::Unknown {
                 self.next = self.crossing(horizon);
             }
             match (self.next, self.edge) {
-                (Next::At(t), edge) if !waiting && t <= until && edge.is_none_or(|e| t < e) => self.fire(t, out),
+                (NextCrossing::At(t), edge) if !waiting && t <= until && edge.is_none_or(|e| t < e) => {
+                    self.fire(t, out)
+                }
                 (_, Some(edge)) if edge <= until => {
                     self.move_to(edge);
                     self.edge = None;
@@ -131,12 +133,12 @@ impl ContinuousStream {
         }
     }
 
-    fn crossing(&self, horizon: f64) -> Next {
+    fn crossing(&self, horizon: f64) -> NextCrossing {
         // The printed first rise is 0 until it starts; its start is an edge, which `settle` handles by itself.
         let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(self.at) };
         let Threshold { base, touch, tau_rec, .. } = self.threshold;
         let found = next_crossing(&self.shape, self.state, (base, touch), rise, tau_rec, horizon - self.at);
-        found.map_or(Next::Never, |s| Next::At(self.at + s))
+        found.map_or(NextCrossing::Never, |s| NextCrossing::At(self.at + s))
     }
 
     fn fire(&mut self, t: f64, out: &mut Vec<OutputSpike>) {

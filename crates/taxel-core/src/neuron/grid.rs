@@ -2,7 +2,7 @@
 
 use super::kernel::{KernelSum, Shape, Step};
 use super::model::{AfterSpike, Neuron};
-use super::points::{Grid, Place};
+use super::points::{Grid, GridTime};
 use super::threshold::{OutputSpike, Threshold};
 
 /// The state of a neuron on a grid.
@@ -53,7 +53,7 @@ impl GridStream {
             self.jump(point);
         }
         if !self.neuron.loses(t, self.threshold.fired) {
-            let age = self.grid.between(place, Place::at(self.point));
+            let age = self.grid.between(place, GridTime::at(self.point));
             if age > 0.0 {
                 self.shape.add(&mut self.state, weight, value, age);
             } else {
@@ -71,7 +71,7 @@ impl GridStream {
     }
 
     pub(super) fn potential(&self, t: f64) -> f64 {
-        let since = self.grid.between(Place::at(self.point), self.grid.place(t));
+        let since = self.grid.between(GridTime::at(self.point), self.grid.place(t));
         // An input exactly at the point contributes nothing at the point itself.
         if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
     }

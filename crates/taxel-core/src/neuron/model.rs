@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::kernel::{Kernel, Shape};
 use super::points::{Grid, MOST_LAID_OUT, check_points, points_between};
 use super::rounding_ms;
-use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
+use crate::allowed::Range;
+use crate::parameters::parameters;
 use crate::{Result, problem};
 
 /// The inputs that still contribute after the neuron's own spike.
@@ -52,35 +52,37 @@ pub enum Time {
     Grid,
 }
 
-/// Parameters of an SRM0 neuron; the defaults are those of Table 6.1.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Neuron {
-    /// The effect of an input spike on the potential.
-    pub kernel: Kernel,
-    /// Membrane time constant, ms.
-    pub tau: f64,
-    /// Synaptic time constant of the double exponential kernel, ms; by default `tau/4`, as for the Tempotron.
-    pub tau_s: Option<f64>,
-    /// Baseline threshold, mV.
-    pub theta_0: f64,
-    /// Rise of the threshold after a spike, mV.
-    pub theta_plus: f64,
-    /// Time constant with which that rise decays, ms; by default `2 tau`, as in Tables 6.1 and 6.2.
-    pub tau_rec: Option<f64>,
-    /// Absolute refractory time, ms.
-    pub refractory: f64,
-    /// The inputs that still contribute after a spike.
-    pub after_spike: AfterSpike,
-    /// The threshold before the first spike.
-    pub first_threshold: FirstThreshold,
-    /// After a spike, none until the potential was below this share of the threshold; on a grid only.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rearm: Option<f64>,
-    /// Continuous time or a grid.
-    pub time: Time,
-    /// Step of the grid, ms.
-    pub step_ms: f64,
+parameters! {
+    /// Parameters of an SRM0 neuron; the defaults are those of Table 6.1.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Neuron {
+        /// The effect of an input spike on the potential.
+        pub kernel: Kernel = Kernel::Alpha;
+        /// Membrane time constant, ms.
+        pub tau: f64 = 15.0, "ms", Range::ABOVE_0;
+        /// Synaptic time constant of the double exponential kernel, ms; by default `tau/4`, as for the Tempotron.
+        pub tau_s: Option<f64> = None, "ms", Range::ABOVE_0, or tau_s;
+        /// Baseline threshold, mV.
+        pub theta_0: f64 = 0.3, "mV", Range::ABOVE_0;
+        /// Rise of the threshold after a spike, mV.
+        pub theta_plus: f64 = 0.2, "mV", Range::FROM_0;
+        /// Time constant with which that rise decays, ms; by default `2 tau`, as in Tables 6.1 and 6.2.
+        pub tau_rec: Option<f64> = None, "ms", Range::ABOVE_0, or tau_rec;
+        /// Absolute refractory time, ms.
+        pub refractory: f64 = 3.0, "ms", Range::FROM_0;
+        /// The inputs that still contribute after a spike.
+        pub after_spike: AfterSpike = AfterSpike::Keep;
+        /// The threshold before the first spike.
+        pub first_threshold: FirstThreshold = FirstThreshold::Base;
+        /// After a spike, none until the potential was below this share of the threshold; on a grid only.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub rearm: Option<f64> = None, "", Range::ABOVE_0.at_most(1.0);
+        /// Continuous time or a grid.
+        pub time: Time = Time::Continuous;
+        /// Step of the grid, ms.
+        pub step_ms: f64 = 1.0, "ms", Range::ABOVE_0;
+    }
 }
 
 /// An input at most this far from the end of a refractory time counts as exactly there, ms: trained neurons fire within
@@ -98,43 +100,7 @@ pub(super) fn left_of_rise(plus: f64, recovering: f64, tau_rec: f64, t: f64) -> 
     if plus == 0.0 || recovering < -rounding_ms(t) { 0.0 } else { plus * (-recovering / tau_rec).exp() }
 }
 
-impl Default for Neuron {
-    fn default() -> Self {
-        Self {
-            kernel: Kernel::Alpha,
-            tau: 15.0,
-            tau_s: None,
-            theta_0: 0.3,
-            theta_plus: 0.2,
-            tau_rec: None,
-            refractory: 3.0,
-            after_spike: AfterSpike::Keep,
-            first_threshold: FirstThreshold::Base,
-            rearm: None,
-            time: Time::Continuous,
-            step_ms: 1.0,
-        }
-    }
-}
-
 impl Neuron {
-    ranges! {
-        tau: "ms", Range::ABOVE_0;
-        theta_0: "mV", Range::ABOVE_0;
-        theta_plus: "mV", Range::FROM_0;
-        tau_rec(tau_rec): "ms", Range::ABOVE_0;
-        refractory: "ms", Range::FROM_0;
-        step_ms: "ms", Range::ABOVE_0;
-        tau_s(tau_s): "ms", Range::ABOVE_0;
-        rearm: "", Range::ABOVE_0.at_most(1.0);
-    }
-
-    /// The parameters with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("rearm")
-    }
-
     /// Checks the range of every parameter, and that `tau_s` is below `tau`.
     ///
     /// # Errors

@@ -20,14 +20,14 @@ pub(crate) struct Grid {
 
 /// A time relative to the nearest point of a grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct GridTime {
     /// The number of the nearest point.
     point: f64,
     /// The time since that point, ms; 0 at the point itself, negative before it.
     rest: f64,
 }
 
-impl Place {
+impl GridTime {
     /// The point with number `point` itself.
     pub(crate) fn at(point: f64) -> Self {
         Self { point, rest: 0.0 }
@@ -66,18 +66,18 @@ impl Grid {
 
     /// The place of a time. The nearest point's rounded time decides whether `t` is before or after it; the distance is
     /// exact.
-    pub(crate) fn place(&self, t: f64) -> Place {
+    pub(crate) fn place(&self, t: f64) -> GridTime {
         let since = t - self.start;
         let point = (since / self.step_ms).round();
         let rounded = self.time(point);
         if t == rounded {
-            return Place::at(point);
+            return GridTime::at(point);
         }
         // The rounding error of `t - start`.
         let back = since + self.start;
         let lost = (t - back) + ((back - since) - self.start);
         let rest = (-point).mul_add(self.step_ms, since) + lost;
-        Place { point, rest: if t > rounded { rest.max(f64::MIN_POSITIVE) } else { rest.min(-f64::MIN_POSITIVE) } }
+        GridTime { point, rest: if t > rounded { rest.max(f64::MIN_POSITIVE) } else { rest.min(-f64::MIN_POSITIVE) } }
     }
 
     /// Whether a time is at or before a point, within rounding.
@@ -98,7 +98,7 @@ impl Grid {
     }
 
     /// The time from `from` to `to`, ms.
-    pub(crate) fn between(&self, from: Place, to: Place) -> f64 {
+    pub(crate) fn between(&self, from: GridTime, to: GridTime) -> f64 {
         (to.point - from.point) * self.step_ms + (to.rest - from.rest)
     }
 

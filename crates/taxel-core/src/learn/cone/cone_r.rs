@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{Range, one_weight_a_train, ranges};
+use crate::allowed::{Range, one_weight_a_train};
 use crate::learn::engines::Start;
 use crate::learn::fit::{Engine, Fit, Left, Round, Status};
 use crate::learn::statement::{
@@ -10,93 +10,53 @@ use crate::learn::statement::{
     bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
 };
 use crate::neuron::{Neuron, Time};
-use crate::parameters::Described;
+use crate::parameters::parameters;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// Parameters of CONE-R; defaults from Tables 6.1 and 6.2.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ConeR {
-    /// The neuron; its grid step is also the step of the silent rows.
-    pub neuron: Neuron,
-    /// The potential that B requires after a target, in thresholds.
-    pub kappa: f64,
-    /// The delay after the target at which B requires that potential, ms; by default `0.1 tau`, as in Tables 6.1 and
-    /// 6.2.
-    pub delta_t_ms: Option<f64>,
-    /// `lambda_1` to `lambda_5`: the factors of l1, l2, B, C and D.
-    pub lambdas: [f64; 5],
-    /// Least weight, mV.
-    pub lb: Bound,
-    /// Largest weight, mV.
-    pub ub: Bound,
-    /// The normaliser of B.
-    pub divide_b_by: Divisor,
-    /// The normaliser of C.
-    pub divide_c_by: DivisorC,
-    /// The normaliser of D.
-    pub divide_d_by: DivisorD,
-    /// The potentials after a target that count as a miss in B.
-    pub sides_b: Sides,
-    /// The potentials at a target that count as a miss in C.
-    pub sides_c: Sides,
-    /// Whether the l2 term is the norm or its square.
-    pub norm: Norm,
-    /// The distance that silence must keep below the threshold, mV.
-    pub margin: f64,
-    /// The end of the silent rows, ms; by default the later of the pattern's end and its last target + `tau`.
-    pub horizon: Option<f64>,
-    /// The relative gap between objective and proven bound at which a fit counts as solved.
-    pub tolerance: f64,
-    /// The solver to begin with.
-    pub engine: Engine,
-    /// The time after which the caller requests the best weights so far, s; this crate reads no clock.
-    pub max_seconds: Option<f64>,
-}
-
-impl Default for ConeR {
-    fn default() -> Self {
-        Self {
-            neuron: Neuron { time: Time::Grid, ..Neuron::default() },
-            kappa: 1.2,
-            delta_t_ms: None,
-            lambdas: [2.8, 1.2, 100.0, 100.0, 80.0],
-            lb: Bound::All(-0.3),
-            ub: Bound::All(0.3),
-            divide_b_by: Divisor::Largest,
-            divide_c_by: DivisorC::Largest,
-            divide_d_by: DivisorD::Largest,
-            sides_b: Sides::Both,
-            sides_c: Sides::Both,
-            norm: Norm::Norm,
-            margin: 0.0,
-            horizon: None,
-            tolerance: 1e-6,
-            engine: Engine::Native,
-            max_seconds: None,
-        }
+parameters! {
+    /// Parameters of CONE-R; defaults from Tables 6.1 and 6.2.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct ConeR {
+        /// The neuron; its grid step is also the step of the silent rows.
+        pub neuron: Neuron = Neuron { time: Time::Grid, ..Neuron::default() };
+        /// The potential that B requires after a target, in thresholds.
+        pub kappa: f64 = 1.2, "", Range::ABOVE_0;
+        /// The delay after the target at which B requires that potential, ms; by default `0.1 tau`, as in Tables 6.1
+        /// and 6.2.
+        pub delta_t_ms: Option<f64> = None, "ms", Range::FROM_0, or delta_t;
+        /// `lambda_1` to `lambda_5`: the factors of l1, l2, B, C and D.
+        pub lambdas: [f64; 5] = [2.8, 1.2, 100.0, 100.0, 80.0], "", Range::FROM_0;
+        /// Least weight, mV.
+        pub lb: Bound = Bound::All(-0.3), "mV", Range::FINITE;
+        /// Largest weight, mV.
+        pub ub: Bound = Bound::All(0.3), "mV", Range::FINITE;
+        /// The normaliser of B.
+        pub divide_b_by: Divisor = Divisor::Largest;
+        /// The normaliser of C.
+        pub divide_c_by: DivisorC = DivisorC::Largest;
+        /// The normaliser of D.
+        pub divide_d_by: DivisorD = DivisorD::Largest;
+        /// The potentials after a target that count as a miss in B.
+        pub sides_b: Sides = Sides::Both;
+        /// The potentials at a target that count as a miss in C.
+        pub sides_c: Sides = Sides::Both;
+        /// Whether the l2 term is the norm or its square.
+        pub norm: Norm = Norm::Norm;
+        /// The distance that silence must keep below the threshold, mV.
+        pub margin: f64 = 0.0, "mV", Range::FROM_0;
+        /// The end of the silent rows, ms; by default the later of the pattern's end and its last target + `tau`.
+        pub horizon: Option<f64> = None, "ms", Range::FINITE;
+        /// The relative gap between objective and proven bound at which a fit counts as solved.
+        pub tolerance: f64 = 1e-6, "", Range::within(1e-10, 0.1);
+        /// The solver to begin with.
+        pub engine: Engine = Engine::Native;
+        /// The time after which the caller requests the best weights so far, s; this crate reads no clock.
+        pub max_seconds: Option<f64> = None, "s", Range::ABOVE_0;
     }
 }
 
 impl ConeR {
-    ranges! {
-        kappa: "", Range::ABOVE_0;
-        delta_t_ms(delta_t): "ms", Range::FROM_0;
-        lambdas: "", Range::FROM_0;
-        lb: "mV", Range::FINITE;
-        ub: "mV", Range::FINITE;
-        margin: "mV", Range::FROM_0;
-        horizon: "ms", Range::FINITE;
-        tolerance: "", Range::within(1e-10, 0.1);
-        max_seconds: "s", Range::ABOVE_0;
-    }
-
-    /// The parameters with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter, and that the neuron runs on a grid.
     ///
     /// # Errors

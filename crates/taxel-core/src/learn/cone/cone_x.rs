@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::cone_r::GapMultipliers;
 use super::exact::{Best, Exact};
 use super::shortest::{End, Shortest};
-use crate::allowed::{Numbers, Range, ranges};
+use crate::allowed::{Numbers, Range};
 use crate::learn::fit::{Engine, Fit, Round, Status};
 use crate::learn::statement::{
     Bound, Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, Margin, NOTHING, Norm, Objective, Parts, Row,
@@ -18,7 +18,7 @@ use crate::learn::statement::{
     relative_gap,
 };
 use crate::neuron::{Neuron, Time};
-use crate::parameters::Described;
+use crate::parameters::parameters;
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// The default margin and slope in continuous time, mV and mV/ms at the default threshold, in proportion to it
@@ -28,40 +28,42 @@ const MARGIN: f64 = 1e-3;
 const SMALLER: f64 = 0.1;
 const LEAST_SHARE: f64 = 0.99e-3;
 
-/// Parameters of CONE-X; defaults from Table 6.1 and 6.4.3.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ConeX {
-    /// The neuron; on the grid its step is also the step of the silent rows.
-    pub neuron: Neuron,
-    /// The potential that B aims at after a target, in thresholds.
-    pub kappa: f64,
-    /// The delay after the target at which B evaluates the potential, ms; by default `0.1 tau`, as in Table 6.1.
-    pub delta_t_ms: Option<f64>,
-    /// `lambda_1` to `lambda_3`: the factors of l1, l2 and B; only their ratios matter. All 0: any weights that satisfy
-    /// the rows.
-    pub lambdas: [f64; 3],
-    /// Least weight, mV, one for all or one per synapse.
-    pub lb: Bound,
-    /// Largest weight, mV, one for all or one per synapse.
-    pub ub: Bound,
-    /// The normaliser of B.
-    pub divide_b_by: Divisor,
-    /// Whether the l2 term is the norm or its square.
-    pub norm: Norm,
-    /// The distance that silence must keep below the threshold, mV; by default `theta_0` / 300 in continuous time, 0 on
-    /// the grid.
-    pub margin: Option<f64>,
-    /// The slope with which that margin falls to 0 towards a target, mV/ms; continuous time only, by default
-    /// `theta_0` / 300 per ms.
-    pub slope: Option<f64>,
-    /// The end of silence, ms, one for all or one per pattern; by default the later of a pattern's end and its last
-    /// target + `tau`.
-    pub horizon: Option<Horizon>,
-    /// The relative gap between objective and proven bound at which a fit counts as solved.
-    pub tolerance: f64,
-    /// The time after which the caller requests the best weights so far, s; this crate reads no clock.
-    pub max_seconds: Option<f64>,
+parameters! {
+    /// Parameters of CONE-X; defaults from Table 6.1 and 6.4.3.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct ConeX {
+        /// The neuron; on the grid its step is also the step of the silent rows.
+        pub neuron: Neuron = Neuron::default();
+        /// The potential that B aims at after a target, in thresholds.
+        pub kappa: f64 = 1.2, "", Range::ABOVE_0;
+        /// The delay after the target at which B evaluates the potential, ms; by default `0.1 tau`, as in Table 6.1.
+        pub delta_t_ms: Option<f64> = None, "ms", Range::FROM_0, or delta_t;
+        /// `lambda_1` to `lambda_3`: the factors of l1, l2 and B; only their ratios matter. All 0: any weights that
+        /// satisfy the rows.
+        pub lambdas: [f64; 3] = [0.0, 1.0, 0.0], "", Range::FROM_0;
+        /// Least weight, mV, one for all or one per synapse.
+        pub lb: Bound = Bound::All(-0.3), "mV", Range::FINITE;
+        /// Largest weight, mV, one for all or one per synapse.
+        pub ub: Bound = Bound::All(0.3), "mV", Range::FINITE;
+        /// The normaliser of B.
+        pub divide_b_by: Divisor = Divisor::Largest;
+        /// Whether the l2 term is the norm or its square.
+        pub norm: Norm = Norm::Norm;
+        /// The distance that silence must keep below the threshold, mV; by default `theta_0` / 300 in continuous time,
+        /// 0 on the grid.
+        pub margin: Option<f64> = None, "mV", Range::FROM_0;
+        /// The slope with which that margin falls to 0 towards a target, mV/ms; continuous time only, by default
+        /// `theta_0` / 300 per ms.
+        pub slope: Option<f64> = None, "mV/ms", Range::FROM_0;
+        /// The end of silence, ms, one for all or one per pattern; by default the later of a pattern's end and its last
+        /// target + `tau`.
+        pub horizon: Option<Horizon> = None, "ms", Range::FINITE;
+        /// The relative gap between objective and proven bound at which a fit counts as solved.
+        pub tolerance: f64 = 1e-8, "", Range::within(1e-12, 0.1);
+        /// The time after which the caller requests the best weights so far, s; this crate reads no clock.
+        pub max_seconds: Option<f64> = None, "s", Range::ABOVE_0;
+    }
 }
 
 /// The end of silence, ms.
@@ -102,46 +104,7 @@ impl Horizon {
     }
 }
 
-impl Default for ConeX {
-    fn default() -> Self {
-        Self {
-            neuron: Neuron::default(),
-            kappa: 1.2,
-            delta_t_ms: None,
-            lambdas: [0.0, 1.0, 0.0],
-            lb: Bound::All(-0.3),
-            ub: Bound::All(0.3),
-            divide_b_by: Divisor::Largest,
-            norm: Norm::Norm,
-            margin: None,
-            slope: None,
-            horizon: None,
-            tolerance: 1e-8,
-            max_seconds: None,
-        }
-    }
-}
-
 impl ConeX {
-    ranges! {
-        kappa: "", Range::ABOVE_0;
-        delta_t_ms(delta_t): "ms", Range::FROM_0;
-        lambdas: "", Range::FROM_0;
-        lb: "mV", Range::FINITE;
-        ub: "mV", Range::FINITE;
-        margin: "mV", Range::FROM_0;
-        slope: "mV/ms", Range::FROM_0;
-        horizon: "ms", Range::FINITE;
-        tolerance: "", Range::within(1e-12, 0.1);
-        max_seconds: "s", Range::ABOVE_0;
-    }
-
-    /// The parameters with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter.
     ///
     /// # Errors

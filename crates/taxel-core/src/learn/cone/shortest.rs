@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::cone_r::GapMultipliers;
 use super::exact::{Exact, MOST_ROUNDS, Slopes};
-use crate::learn::engines::{DualActiveSet, Multipliers, RowId, Verdict};
+use crate::learn::engines::{DualActiveSet, Multipliers, Outcome, RowId};
 use crate::learn::fit::{Left, Round};
 use crate::learn::statement::{Bounds, Certificate, Norm, Peak, Row, Statement};
 use crate::vectors::dot;
@@ -50,11 +50,11 @@ impl Exact {
             let verdict = working.engine.solve(stop)?;
             let before = std::mem::replace(&mut weights, working.engine.weights().to_vec());
             let end = match verdict {
-                Verdict::Infeasible(ray) => {
+                Outcome::Infeasible(ray) => {
                     self.refutation(working.named(&ray.multipliers), stop)?.map_or(End::Stopped, End::Infeasible)
                 }
-                Verdict::Stopped => End::Stopped,
-                Verdict::Optimal => {
+                Outcome::Stopped => End::Stopped,
+                Outcome::Optimal => {
                     let broken = self.broken(&weights, ASKED_SHARE, self.rounding(&weights));
                     let rows = working.rows();
                     let objective = self.parts(&weights).sum();
@@ -120,7 +120,7 @@ impl Exact {
                 others.push(row);
             }
         }
-        let Verdict::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
+        let Outcome::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
         Certificate::check(&self.statement, &self.objective.bounds, named(&targets, &others, &ray.multipliers))
     }
 

@@ -46,7 +46,7 @@ const MOST_FALLS: usize = 3;
 
 /// How a call of [`DualActiveSet::solve`] ended.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Verdict {
+pub enum Outcome {
     /// The weights satisfy all rows and bounds, and no shorter weights do.
     Optimal,
     /// No weights within the bounds satisfy all rows; the proof has been checked.
@@ -238,7 +238,7 @@ impl DualActiveSet {
     /// # Errors
     ///
     /// None at present; a stop is a verdict.
-    pub fn solve(&mut self, stop: Stop<'_>) -> Result<Verdict> {
+    pub fn solve(&mut self, stop: Stop<'_>) -> Result<Outcome> {
         let fresh = self.extend_gram();
         self.replace_similar(&fresh);
         let (mut exchanges, mut falls_left) = (EXCHANGES, MOST_FALLS);
@@ -247,7 +247,7 @@ impl DualActiveSet {
         let mut rounds = MOST_ROUNDS * (self.live.len() + self.lower.len());
         loop {
             if stop.asked() || rounds == 0 {
-                return Ok(Verdict::Stopped);
+                return Ok(Outcome::Stopped);
             }
             rounds -= 1;
             self.update_weights(false);
@@ -256,13 +256,13 @@ impl DualActiveSet {
             if candidates.is_empty() {
                 self.update_weights(true);
                 return Ok(if undecided.iter().any(|&slot| !self.is_met(slot)) {
-                    Verdict::Stopped
+                    Outcome::Stopped
                 } else {
-                    Verdict::Optimal
+                    Outcome::Optimal
                 });
             }
             if let Some(ray) = self.proof(self.multipliers.clone()) {
-                return Ok(Verdict::Infeasible(ray));
+                return Ok(Outcome::Infeasible(ray));
             }
             if exchanges > 0 && candidates.len() > 1 {
                 exchanges -= 1;
@@ -313,7 +313,7 @@ impl DualActiveSet {
                 }
                 if let Some(ray) = self.step(slot, sign, violation) {
                     if let Some(ray) = self.proof(ray) {
-                        return Ok(Verdict::Infeasible(ray));
+                        return Ok(Outcome::Infeasible(ray));
                     }
                     if self.dependent + 1 < DEPENDENT.len() {
                         self.dependent += 1;

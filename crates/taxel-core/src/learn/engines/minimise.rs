@@ -8,7 +8,7 @@ use crate::vectors::dot;
 use crate::{Result, Stop};
 
 /// The weights found, and the engine that proved them.
-pub(crate) struct Found {
+pub(crate) struct Minimum {
     pub(crate) weights: Vec<f64>,
     pub(crate) objective: f64,
     pub(crate) parts: Parts,
@@ -36,7 +36,7 @@ impl Relaxed {
         start: Start,
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
-    ) -> Result<Found> {
+    ) -> Result<Minimum> {
         let limits = objective.bounds.lower.iter().zip(&objective.bounds.upper);
         let zero: Vec<f64> = limits.map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
         let at_zero = self.point(objective, zero.clone()).parts.sum();
@@ -73,7 +73,7 @@ impl Relaxed {
         let gap = found.best.gap(found.proof.bound);
         let mut proof = found.proof;
         proof.divide(scale, 1.0);
-        Ok(Found {
+        Ok(Minimum {
             gap,
             weights: found.best.weights,
             objective: least,

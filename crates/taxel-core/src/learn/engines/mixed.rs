@@ -18,7 +18,7 @@ use super::cone_program::HardRows;
 use crate::learn::fit::Engine;
 use crate::learn::statement::Bounds;
 use crate::{Error, Result, Stop};
-use best::{Best, Found, Start};
+use best::{Best, MixedMinimum, Start};
 use interior::Interior;
 use program::Program;
 pub(crate) use program::Proof;
@@ -48,7 +48,7 @@ pub(crate) fn minimise(
     start: Option<&Start>,
     tolerance: f64,
     stop: Stop<'_>,
-) -> Result<Found> {
+) -> Result<MixedMinimum> {
     let program = Program::new(terms, rows, bounds, size);
     let interior = Interior::new(&program);
     let mut best = Best::new(&program);

@@ -2,7 +2,7 @@
 //! rows.
 
 use super::cone_program::HardRows;
-use super::minimise::Found;
+use super::minimise::Minimum;
 use super::nearest::nearest;
 use crate::learn::statement::{Objective, Relaxed, relative_gap};
 use crate::{Result, Stop};
@@ -29,7 +29,7 @@ impl Relaxed {
         &self,
         objective: &Objective,
         tolerance: f64,
-        found: &mut Found,
+        found: &mut Minimum,
         stop: Stop<'_>,
     ) -> Result<bool> {
         let (silent, theta) = (self.silent.len(), self.theta_0);

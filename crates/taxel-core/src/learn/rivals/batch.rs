@@ -2,7 +2,6 @@
 
 use serde_json::{Map, Value};
 
-use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop};
 
 /// What was learnt.
@@ -16,11 +15,6 @@ pub struct Learnt {
 
 /// The interface of a learner that is fitted to all examples at once.
 pub(super) trait BatchRule {
-    /// Its parameters, with their defaults and ranges.
-    fn described() -> Described
-    where
-        Self: Sized;
-
     /// Checks every parameter.
     fn check(&self) -> Result<()>;
 

@@ -53,7 +53,7 @@ pub(super) const SOURCE: Source = Source {
         let (tau_q, gamma_r) = (given["tau_q"].clone(), given["gamma_r"].clone());
         let gamma_r = if gamma_r.is_null() { tau_q.clone() } else { gamma_r };
         let e_learning = json!({ "e_learning": { "tau_q": tau_q, "gamma_r": gamma_r } });
-        given.insert("law".into(), if i_learning { json!({ "i_learning": {} }) } else { e_learning });
+        given.insert("constants".into(), if i_learning { json!({ "i_learning": {} }) } else { e_learning });
         Ok(())
     },
 };

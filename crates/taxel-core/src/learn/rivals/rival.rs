@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use super::epochs::{Examples, Trained, Training};
 use super::source::Source;
 use super::stepped::SteppedNeuron;
-use super::{Law, SOURCES};
+use super::{AnyRule, SOURCES};
 use crate::allowed::one_weight_a_train;
 use crate::neuron::Neuron;
 use crate::parameters::Described;
@@ -17,7 +17,7 @@ use crate::{Result, SpikeTrains, Stop, problem};
 #[serde(deny_unknown_fields)]
 pub struct Rival {
     /// The rule.
-    pub law: Law,
+    pub rule: AnyRule,
     /// The neuron.
     pub neuron: SteppedNeuron,
     /// How it is trained.
@@ -94,12 +94,12 @@ impl Rival {
         let take = |all: &Map<String, Value>, names: &[&str]| -> Value {
             names.iter().filter_map(|name| all.get(*name).map(|value| ((*name).to_owned(), value.clone()))).collect()
         };
-        let law = all.remove("law").unwrap_or_else(|| json!({ name: take(&all, source.own) }));
+        let rule = all.remove("constants").unwrap_or_else(|| json!({ name: take(&all, source.own) }));
         let current = all.remove("current").unwrap_or_else(|| json!({ "exponential": take(&all, &["tau_s"]) }));
         let mut neuron = take(&all, &["tau", "theta_0", "after_spike", "step_ms"]);
         neuron["refractory"] = all.remove("refractory").unwrap_or(json!(0.0));
         neuron["current"] = current;
-        Ok(json!({ "law": law, "neuron": neuron, "training": take(&all, &TRAINING) }))
+        Ok(json!({ "rule": rule, "neuron": neuron, "training": take(&all, &TRAINING) }))
     }
 
     /// Checks every parameter.
@@ -110,7 +110,7 @@ impl Rival {
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
         self.training.check()?;
-        self.law.check(&self.neuron)
+        self.rule.check(&self.neuron)
     }
 
     /// Trains on patterns of the same trains, with one list of targets (ms, ascending) a pattern.
@@ -136,8 +136,8 @@ impl Rival {
             targets,
         )?;
         crate::learn::statement::check_some_target(targets)?;
-        patterns.iter().try_for_each(|pattern| pattern.check_ungraded(self.law.name()))?;
-        self.law.train(&self.neuron, &self.training, Examples { patterns, targets, start }, report, stop)
+        patterns.iter().try_for_each(|pattern| pattern.check_ungraded(self.rule.name()))?;
+        self.rule.train(&self.neuron, &self.training, Examples { patterns, targets, start }, report, stop)
     }
 
     /// The change of weights by one presentation, over the learning rate, and the output spikes in it (ms).
@@ -153,9 +153,9 @@ impl Rival {
             let neuron = Neuron { refractory: self.neuron.refractory, ..Neuron::default() };
             crate::learn::statement::check_examples(&neuron, std::slice::from_ref(pattern), &[targets.to_vec()])?;
         }
-        pattern.check_ungraded(self.law.name())?;
+        pattern.check_ungraded(self.rule.name())?;
         one_weight_a_train(weights, pattern.len())?;
-        self.law.change(&self.neuron, weights, pattern, targets)
+        self.rule.change(&self.neuron, weights, pattern, targets)
     }
 
     /// The output spikes of the rule's neuron with these weights, ms.
@@ -164,7 +164,7 @@ impl Rival {
     ///
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn run(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
-        pattern.check_ungraded(self.law.name())?;
+        pattern.check_ungraded(self.rule.name())?;
         self.neuron.run(weights, pattern, stop)
     }
 }

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::batch::{BatchRule, Learnt};
-use crate::allowed::{Range, one_weight_a_train, ranges};
+use crate::allowed::{Range, one_weight_a_train};
 use crate::metrics::matching::matched;
 use crate::neuron::{Grid, Kernel, KernelSum, MOST_LAID_OUT, Shape, check_points};
-use crate::parameters::Described;
+use crate::parameters::parameters;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -36,55 +36,38 @@ struct Layer {
     delay_ms: f64,
 }
 
-/// Parameters of SKIM.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Skim {
-    /// The kernel of a branch, which filters its inputs.
-    pub kernel: Kernel,
-    /// Its time constant, ms; that of Table 6.1.
-    pub tau: f64,
-    /// Its second one, ms, where it has one; `tau / 4` where left out.
-    pub tau_s: Option<f64>,
-    /// Time between rows, ms; 1 as the thesis samples.
-    pub step_ms: f64,
-    /// How long the wanted output is 1 from a target on, ms; ten steps of 1 ms.
-    pub pulse_ms: f64,
-    /// Added to the sum of squares, times the squares of the weights.
-    pub ridge: f64,
-    /// How many branches the layer between has; without one every train is a branch of its own, its kernel not compressed.
-    pub branches: Option<usize>,
-    /// The layer's fixed weights are drawn evenly from minus this to this; none was published.
-    pub spread: Option<f64>,
-    /// Its fixed delays are drawn evenly from 0 to this, ms; none was published.
-    pub delay_ms: Option<f64>,
-    /// The nonlinearity after its kernels.
-    pub nonlinearity: Nonlinearity,
-    /// The thresholds to choose from; those of 6.5.4.
-    pub thresholds: Vec<f64>,
-    /// How far from a target an output spike may lie, ms; 50 as in 6.5.2.
-    pub within_ms: f64,
-    /// Of weights and delays of the layer.
-    pub seed: u64,
-}
-
-impl Default for Skim {
-    fn default() -> Self {
-        Self {
-            kernel: Kernel::Alpha,
-            tau: 15.0,
-            tau_s: None,
-            step_ms: 1.0,
-            pulse_ms: 10.0,
-            ridge: 0.0,
-            branches: None,
-            spread: None,
-            delay_ms: None,
-            nonlinearity: Nonlinearity::Tanh,
-            thresholds: vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9],
-            within_ms: 50.0,
-            seed: 0,
-        }
+parameters! {
+    /// Parameters of SKIM.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Skim {
+        /// The kernel of a branch, which filters its inputs.
+        pub kernel: Kernel = Kernel::Alpha;
+        /// Its time constant, ms; that of Table 6.1.
+        pub tau: f64 = 15.0, "ms", Range::ABOVE_0;
+        /// Its second one, ms, where it has one; `tau / 4` where left out.
+        pub tau_s: Option<f64> = None, "ms", Range::ABOVE_0, or tau_s;
+        /// Time between rows, ms; 1 as the thesis samples.
+        pub step_ms: f64 = 1.0, "ms", Range::ABOVE_0;
+        /// How long the wanted output is 1 from a target on, ms; ten steps of 1 ms.
+        pub pulse_ms: f64 = 10.0, "ms", Range::ABOVE_0;
+        /// Added to the sum of squares, times the squares of the weights.
+        pub ridge: f64 = 0.0, "", Range::FROM_0;
+        /// How many branches the layer between has; without one every train is a branch of its own, its kernel not
+        /// compressed.
+        pub branches: Option<usize> = None, "", Range::within(1.0, 100_000.0);
+        /// The layer's fixed weights are drawn evenly from minus this to this; none was published.
+        pub spread: Option<f64> = None, "", Range::ABOVE_0;
+        /// Its fixed delays are drawn evenly from 0 to this, ms; none was published.
+        pub delay_ms: Option<f64> = None, "ms", Range::FROM_0;
+        /// The nonlinearity after its kernels.
+        pub nonlinearity: Nonlinearity = Nonlinearity::Tanh;
+        /// The thresholds to choose from; those of 6.5.4.
+        pub thresholds: Vec<f64> = vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9], "", Range::FINITE;
+        /// How far from a target an output spike may lie, ms; 50 as in 6.5.2.
+        pub within_ms: f64 = 50.0, "ms", Range::ABOVE_0;
+        /// Of weights and delays of the layer.
+        pub seed: u64 = 0;
     }
 }
 
@@ -125,7 +108,8 @@ impl Normal {
 
     /// The shortest weights of the least sum of squares, and that sum.
     ///
-    /// By singular values, as `numpy.linalg.lstsq` with `rcond=None`: those below rounding times the largest count as 0.
+    /// By singular values, as `numpy.linalg.lstsq` with `rcond=None`: those below rounding times the largest count as
+    /// 0.
     fn solve(&self) -> Result<(Vec<f64>, f64)> {
         let (m, r, z) = (self.columns, self.r(), self.z());
         let r = MatRef::from_row_major_slice(&r, m, m);
@@ -183,19 +167,6 @@ struct Branch {
 }
 
 impl Skim {
-    ranges! {
-        tau: "ms", Range::ABOVE_0;
-        tau_s(tau_s): "ms", Range::ABOVE_0;
-        step_ms: "ms", Range::ABOVE_0;
-        pulse_ms: "ms", Range::ABOVE_0;
-        ridge: "", Range::FROM_0;
-        branches: "", Range::within(1.0, 100_000.0);
-        spread: "", Range::ABOVE_0;
-        delay_ms: "ms", Range::FROM_0;
-        thresholds: "", Range::FINITE;
-        within_ms: "ms", Range::ABOVE_0;
-    }
-
     fn layer(&self) -> Option<Layer> {
         let (Some(count), Some(spread), Some(delay_ms)) = (self.branches, self.spread, self.delay_ms) else {
             return None;
@@ -353,10 +324,6 @@ fn crossings(output: &[f64], threshold: f64, grid: Grid) -> Vec<f64> {
 }
 
 impl BatchRule for Skim {
-    fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {

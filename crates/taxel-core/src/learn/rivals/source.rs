@@ -15,6 +15,6 @@ pub struct Source {
     pub(super) ranges: &'static [&'static [Parameter]],
     /// The published defaults; a parameter without a default here or among those of all rules is required.
     pub(super) defaults: fn() -> Value,
-    /// Computes parameters that are left out; may name `law` and `current` itself.
+    /// Computes parameters that are left out; may name `constants` (the rule's kind with its own) and `current` itself.
     pub(super) arrange: fn(&mut Map<String, Value>) -> Result<()>,
 }

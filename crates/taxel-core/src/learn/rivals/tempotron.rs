@@ -7,48 +7,34 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use super::epochs::{Ended, Trained};
-use crate::allowed::{Range, one_weight_a_train, ranges};
+use crate::allowed::{Range, one_weight_a_train};
 use crate::neuron::{Kernel, KernelSum, Shape, Step};
-use crate::parameters::Described;
+use crate::parameters::parameters;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// Parameters of the Tempotron.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Tempotron {
-    /// Membrane time constant, ms.
-    pub tau: f64,
-    /// Synaptic time constant, ms; `tau / 4` where left out.
-    pub tau_s: Option<f64>,
-    /// Threshold, in peaks of one input of weight 1.
-    pub theta_0: f64,
-    /// Learning rate; `3e-3 T / (tau N V0)` where left out, T being the patterns' mean length.
-    pub eta: Option<f64>,
-    /// Momentum: the share of the last change that is added to the next one.
-    pub momentum: f64,
-    /// Spread of the first weights, drawn normally around 0.
-    pub initial_sd: f64,
-    /// Epochs at most.
-    pub epochs: usize,
-    /// Of the first weights and the order of patterns.
-    pub seed: u64,
-    /// The time after which the caller requests the best so far, s; this crate reads no clock.
-    pub max_seconds: Option<f64>,
-}
-
-impl Default for Tempotron {
-    fn default() -> Self {
-        Self {
-            tau: 15.0,
-            tau_s: None,
-            theta_0: 1.0,
-            eta: None,
-            momentum: 0.99,
-            initial_sd: 1e-3,
-            epochs: 2000,
-            seed: 0,
-            max_seconds: None,
-        }
+parameters! {
+    /// Parameters of the Tempotron.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Tempotron {
+        /// Membrane time constant, ms.
+        pub tau: f64 = 15.0, "ms", Range::ABOVE_0;
+        /// Synaptic time constant, ms; `tau / 4` where left out.
+        pub tau_s: Option<f64> = None, "ms", Range::ABOVE_0, or tau_s;
+        /// Threshold, in peaks of one input of weight 1.
+        pub theta_0: f64 = 1.0, "", Range::ABOVE_0;
+        /// Learning rate; `3e-3 T / (tau N V0)` where left out, T being the patterns' mean length.
+        pub eta: Option<f64> = None, "", Range::ABOVE_0;
+        /// Momentum: the share of the last change that is added to the next one.
+        pub momentum: f64 = 0.99, "", Range::FROM_0.below(1.0);
+        /// Spread of the first weights, drawn normally around 0.
+        pub initial_sd: f64 = 1e-3, "", Range::FROM_0;
+        /// Epochs at most.
+        pub epochs: usize = 2000;
+        /// Of the first weights and the order of patterns.
+        pub seed: u64 = 0;
+        /// The time after which the caller requests the best so far, s; this crate reads no clock.
+        pub max_seconds: Option<f64> = None, "s", Range::ABOVE_0;
     }
 }
 
@@ -79,22 +65,6 @@ struct Reached {
 }
 
 impl Tempotron {
-    ranges! {
-        tau: "ms", Range::ABOVE_0;
-        tau_s(tau_s): "ms", Range::ABOVE_0;
-        theta_0: "", Range::ABOVE_0;
-        eta: "", Range::ABOVE_0;
-        momentum: "", Range::FROM_0.below(1.0);
-        initial_sd: "", Range::FROM_0;
-        max_seconds: "s", Range::ABOVE_0;
-    }
-
-    /// Its parameters, with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
     /// Checks every parameter.
     ///
     /// # Errors

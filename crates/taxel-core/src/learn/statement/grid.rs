@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 use super::peak::{Peak, exceeds};
 use super::rows::{Example, Statement, lost};
-use crate::neuron::{AfterSpike, Grid, KernelSum, Place, Shape, Step};
+use crate::neuron::{AfterSpike, Grid, GridTime, KernelSum, Shape, Step};
 use crate::vectors::{add, dot};
 use crate::{Result, Spike, Stop};
 
@@ -135,7 +135,7 @@ impl SilentRows {
             // An input exactly at a point acts after it; with a kernel that jumps at 0, from the next point on.
             let acts_at = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
             if acts_at < points as f64 && !lost(neuron, targets, t, grid.time(acts_at)) {
-                let age = grid.between(place, Place::at(acts_at)).max(0.0);
+                let age = grid.between(place, GridTime::at(acts_at)).max(0.0);
                 let mut one = KernelSum::default();
                 self.shape.add(&mut one, 1.0, f64::from(value), age);
                 inputs.push(GridInput { point: acts_at as u32, train, a: one.a, b: one.b });

@@ -3,23 +3,22 @@
 use std::sync::OnceLock;
 
 use super::{NEAR, VanRossum};
-use crate::Result;
+use crate::metrics::distance::{Pattern, Ready, summed};
 use crate::metrics::pairwise::Matrix;
 use crate::metrics::stored::{Entries, Frame, Query};
 use crate::metrics::{Patterns, Work};
+use crate::{Result, Stop};
 
 /// The number of rows processed together: each column's spikes are loaded once for all of them.
 const ROWS: usize = 4;
 
-impl VanRossum {
+impl Ready for &VanRossum {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
+        summed(a, b, stop, |a, b| Ok(VanRossum::between(self, a, b)))
+    }
+
     /// Fills a matrix with the sums of distances over trains.
-    pub(in crate::metrics) fn fill(
-        &self,
-        matrix: &Matrix,
-        a: &Patterns<'_>,
-        b: Option<&Patterns<'_>>,
-        work: &mut Work<'_>,
-    ) -> Result<()> {
+    fn fill(&self, matrix: &Matrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
         let others = b.unwrap_or(a);
         let pairs = matrix.pairs();
         for n in 0..a.trains {
@@ -39,7 +38,7 @@ impl VanRossum {
                         let far = rows[i].get().zip(column.get()).and_then(|(row, column)| row.far(column));
                         let distance = match far {
                             Some(square) => self.normalisation.root(square, self.tau),
-                            None => self.between(a.train(i, n), others.train(j, n)),
+                            None => VanRossum::between(self, a.train(i, n), others.train(j, n)),
                         };
                         matrix.add(i, j, distance);
                     }
@@ -47,7 +46,7 @@ impl VanRossum {
                 Ok(())
             })?;
         }
-        Ok(())
+        Ok(true)
     }
 }
 

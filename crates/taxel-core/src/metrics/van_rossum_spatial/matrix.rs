@@ -4,7 +4,8 @@
 //! the overlap of the taxels' spatial kernels. For each row and taxel n, the row's whole pattern is stored with the
 //! weights of taxel n; then each column's spikes at n are looked up once.
 
-use super::{Kernel, VanRossumSpatial};
+use super::{Kernel, Smoothed, VanRossumSpatial};
+use crate::metrics::distance::{Pattern, Ready};
 use crate::metrics::pairwise::Matrix;
 use crate::metrics::stored::{Entries, Frame, Query};
 use crate::metrics::van_rossum::NEAR;
@@ -17,16 +18,14 @@ const HELD: usize = 1 << 24;
 /// The cost of a look-up, in steps of a traversal of both patterns.
 const LOOK_UP: usize = 8;
 
-impl VanRossumSpatial {
-    /// Fills a matrix, by stored exponentials if that is faster.
-    pub(in crate::metrics) fn fill(
-        &self,
-        kernel: &Kernel,
-        matrix: &Matrix,
-        a: &Patterns<'_>,
-        b: Option<&Patterns<'_>>,
-        work: &mut Work<'_>,
-    ) -> Result<()> {
+impl Ready for Smoothed<'_> {
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
+        self.0.between(&self.1, a, b, stop)
+    }
+
+    /// Fills a matrix by stored exponentials, if that is faster.
+    fn fill(&self, matrix: &Matrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
+        let Self(metric, kernel) = self;
         let others = b.unwrap_or(a);
         let spikes = (a.times.len() / a.count.max(1)).max(others.times.len() / others.count.max(1));
         let active = kernel.active(a, others);
@@ -34,20 +33,11 @@ impl VanRossumSpatial {
         let storing = active.len().pow(2) * kernel.taxels()
             + a.count * spikes * active.len() * LOOK_UP
             + matrix.pairs() * spikes * LOOK_UP;
-        let frame = Frame::around(self.smoothing.tau, &[a, others], None);
-        match frame {
-            Some(frame) if storing < walking => Stored {
-                metric: self,
-                kernel,
-                frame,
-                weights: kernel.common(&active),
-                active,
-                rows: a,
-                columns: others,
-            }
-            .fill(matrix, b.is_none(), work),
-            _ => matrix.each_pair(work, |i, j, stop| self.between(kernel, (a, i), (others, j), stop)),
-        }
+        let frame = Frame::around(metric.smoothing.tau, &[a, others], None);
+        let Some(frame) = frame.filter(|_| storing < walking) else { return Ok(false) };
+        let weights = kernel.common(&active);
+        Stored { metric, kernel, frame, active, weights, rows: a, columns: others }.fill(matrix, b.is_none(), work)?;
+        Ok(true)
     }
 }
 

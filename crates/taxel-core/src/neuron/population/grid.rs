@@ -3,7 +3,7 @@
 use super::lanes::{FADED, LANES, LOOK, Lanes, Weight, slack};
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AfterSpike, Neuron};
-use crate::neuron::points::{Grid, Place};
+use crate::neuron::points::{Grid, GridTime};
 use crate::neuron::rounding_ms;
 use crate::neuron::threshold::Threshold;
 use crate::vectors::wide;
@@ -103,7 +103,7 @@ impl Script {
             let t = grid.time(point);
             let mut arriving = vec![];
             while let Some(spike) = rest.next_if(|s| grid.place(s.t).from() <= point) {
-                let age = grid.between(grid.place(spike.t), Place::at(point));
+                let age = grid.between(grid.place(spike.t), GridTime::at(point));
                 let mut one = KernelSum::default();
                 shape.add(&mut one, 1.0, f64::from(spike.value), age.max(0.0));
                 let to = if age > 0.0 { &mut inputs } else { &mut arriving };

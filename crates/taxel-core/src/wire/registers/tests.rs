@@ -208,3 +208,12 @@ fn any_set_leads_to_any_other_without_a_refusal() {
         assert_eq!(board, target);
     }
 }
+
+#[test]
+fn the_power_law_is_rounded_to_the_nearest() {
+    let scale = f64::from(1 << POWER_LAW_FRACTION);
+    for (tick, &entry) in POWER_LAW.iter().enumerate() {
+        assert!((f64::from(entry) - (tick as f64).powf(0.7) * scale).abs() <= 0.5, "{tick}");
+    }
+    assert_eq!((POWER_LAW[3], POWER_LAW[2047]), (141_405, 13_622_676), "as the logic has them");
+}

@@ -31,7 +31,7 @@ impl Start {
 
 /// The result of a minimisation.
 #[derive(Debug, Clone)]
-pub(crate) struct Found {
+pub(crate) struct MixedMinimum {
     pub(crate) weights: Vec<f64>,
     /// The multipliers of the inequality rows, at least 0.
     pub(crate) inequality: Vec<f64>,
@@ -121,10 +121,10 @@ impl<'a> Best<'a> {
         }
     }
 
-    pub(super) fn found(self, engine: Engine, stopped: bool, state: PrimalDual) -> Found {
+    pub(super) fn found(self, engine: Engine, stopped: bool, state: PrimalDual) -> MixedMinimum {
         let program = self.program;
         let multipliers = self.point.inequality.iter().zip(&program.of_below);
-        Found {
+        MixedMinimum {
             weights: self.point.weights.iter().map(|w| w * program.weight).collect(),
             inequality: multipliers.map(|(z, scale)| z * program.cost / scale).collect(),
             bound: self.bound * program.cost,

@@ -7,7 +7,7 @@
 use faer::Mat;
 
 use super::dense::{Lu, add_gram, add_sum, times};
-use super::program::{Guess, MET, Place, Point, Program};
+use super::program::{Guess, MET, Point, Program, WeightState};
 use crate::Stop;
 use crate::learn::statement::Norm;
 use crate::vectors::dot;
@@ -90,10 +90,10 @@ impl<'a> Polish<'a> {
     fn snap(&mut self) {
         for (k, place) in self.guess.places.iter().enumerate() {
             match place {
-                Place::Free => {}
-                Place::Zero => self.w[k] = 0.0,
-                Place::Lower => self.w[k] = self.program.lower[k],
-                Place::Upper => self.w[k] = self.program.upper[k],
+                WeightState::Free => {}
+                WeightState::Zero => self.w[k] = 0.0,
+                WeightState::Lower => self.w[k] = self.program.lower[k],
+                WeightState::Upper => self.w[k] = self.program.upper[k],
             }
         }
         for (z, binding) in self.inequality.iter_mut().zip(&self.guess.binding) {
@@ -135,7 +135,7 @@ impl<'a> Polish<'a> {
     fn solve(&mut self) -> Option<()> {
         let program = self.program;
         let n = program.width();
-        let free: Vec<usize> = (0..n).filter(|&k| self.guess.places[k] == Place::Free).collect();
+        let free: Vec<usize> = (0..n).filter(|&k| self.guess.places[k] == WeightState::Free).collect();
         let binding: Vec<usize> = (0..program.limit.len()).filter(|&i| self.guess.binding[i]).collect();
         let (f, p) = (free.len(), program.equal_to.len());
         let size = f + p + binding.len();
@@ -234,20 +234,20 @@ impl<'a> Polish<'a> {
             let split = program.l1 > 0.0 && lower < 0.0 && upper > 0.0;
             let place = self.guess.places[k];
             let next = match place {
-                Place::Free if self.w[k] < lower => Place::Lower,
-                Place::Free if self.w[k] > upper => Place::Upper,
-                Place::Free if split && self.w[k] * self.sign[k] < 0.0 => Place::Zero,
-                Place::Zero if g.abs() > program.l1 + WRONG => {
+                WeightState::Free if self.w[k] < lower => WeightState::Lower,
+                WeightState::Free if self.w[k] > upper => WeightState::Upper,
+                WeightState::Free if split && self.w[k] * self.sign[k] < 0.0 => WeightState::Zero,
+                WeightState::Zero if g.abs() > program.l1 + WRONG => {
                     self.sign[k] = -g.signum();
-                    Place::Free
+                    WeightState::Free
                 }
-                Place::Lower if g + program.l1 * if lower < 0.0 { -1.0 } else { 1.0 } < -WRONG => {
+                WeightState::Lower if g + program.l1 * if lower < 0.0 { -1.0 } else { 1.0 } < -WRONG => {
                     self.sign[k] = if lower < 0.0 { -1.0 } else { 1.0 };
-                    Place::Free
+                    WeightState::Free
                 }
-                Place::Upper if g + program.l1 * if upper > 0.0 { 1.0 } else { -1.0 } > WRONG => {
+                WeightState::Upper if g + program.l1 * if upper > 0.0 { 1.0 } else { -1.0 } > WRONG => {
                     self.sign[k] = if upper > 0.0 { 1.0 } else { -1.0 };
-                    Place::Free
+                    WeightState::Free
                 }
                 same => same,
             };

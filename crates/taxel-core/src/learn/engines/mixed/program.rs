@@ -32,7 +32,7 @@ pub(crate) struct Point {
 
 /// Whether a weight is free, 0, or at a bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum WeightState {
     Free,
     Zero,
     Lower,
@@ -49,7 +49,7 @@ pub(super) struct Iterate {
 /// A guess of the binding rows and bounds.
 #[derive(Debug, Clone)]
 pub(super) struct Guess {
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<WeightState>,
     pub(super) binding: Vec<bool>,
 }
 
@@ -269,10 +269,10 @@ impl Program {
     pub(super) fn guess(&self, point: &Point) -> Guess {
         const NEAR: f64 = 1e-7;
         let place = |(w, (l, u)): (&f64, (&f64, &f64))| match *w {
-            w if w - l <= NEAR => Place::Lower,
-            w if u - w <= NEAR => Place::Upper,
-            w if self.l1 > 0.0 && w.abs() <= NEAR => Place::Zero,
-            _ => Place::Free,
+            w if w - l <= NEAR => WeightState::Lower,
+            w if u - w <= NEAR => WeightState::Upper,
+            w if self.l1 > 0.0 && w.abs() <= NEAR => WeightState::Zero,
+            _ => WeightState::Free,
         };
         let below = times(&self.below, &point.weights);
         let rows = below.iter().zip(&self.limit).zip(&point.inequality);

@@ -8,7 +8,7 @@
 
 use super::best::Best;
 use super::program::{Point, Program, power_of_2};
-use crate::learn::engines::{DualActiveSet, Verdict};
+use crate::learn::engines::{DualActiveSet, Outcome};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -77,7 +77,7 @@ impl Program {
             let (row, left) = state(coefficients, limit, None);
             engine.inequality(&row, left)?;
         }
-        if engine.solve(stop)? != Verdict::Optimal {
+        if engine.solve(stop)? != Outcome::Optimal {
             return Ok(None);
         }
         let moved = centre.iter().zip(engine.weights()).map(|(w, step)| w + step);

@@ -73,11 +73,11 @@ impl Problem {
         HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit }
     }
 
-    fn solve(&self) -> Found {
+    fn solve(&self) -> MixedMinimum {
         self.go_on(None, 1e-8)
     }
 
-    fn go_on(&self, start: Option<&Start>, tolerance: f64) -> Found {
+    fn go_on(&self, start: Option<&Start>, tolerance: f64) -> MixedMinimum {
         minimise(&self.terms(), &self.rows(), &self.bounds(), SIZE, start, tolerance, Stop::never()).unwrap()
     }
 
@@ -89,7 +89,7 @@ impl Problem {
             + self.lift * behind.map(|(row, m)| (dot(row, w) - m).powi(2)).sum::<f64>()
     }
 
-    fn gap(&self, found: &Found) -> f64 {
+    fn gap(&self, found: &MixedMinimum) -> f64 {
         relative_gap(self.objective(&found.weights), found.bound)
     }
 
@@ -100,7 +100,7 @@ impl Problem {
         program.objective(&point.weights) * program.cost
     }
 
-    fn assert_exact(&self, found: &Found) {
+    fn assert_exact(&self, found: &MixedMinimum) {
         for (row, value) in self.equal.chunks(self.lower.len()).zip(&self.equal_to) {
             assert!((dot(row, &found.weights) - value).abs() <= 1e-12, "a target is missed");
         }
@@ -113,7 +113,7 @@ impl Problem {
         assert!(found.bound <= self.objective(&found.weights), "the bound lies above");
     }
 
-    fn assert_best(&self, found: &Found) {
+    fn assert_best(&self, found: &MixedMinimum) {
         self.assert_exact(found);
         assert!(self.gap(found) <= 1e-8, "gap {:e}", self.gap(found));
         let (objective, oracle) = (self.objective(&found.weights), self.oracle());

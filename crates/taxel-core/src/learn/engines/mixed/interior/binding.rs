@@ -1,6 +1,6 @@
 //! The rows and bounds that appear to bind at an interior point.
 
-use super::super::program::{Guess, Iterate, Place, Point};
+use super::super::program::{Guess, Iterate, Point, WeightState};
 use super::{Interior, PrimalDual};
 use crate::vectors::dot;
 
@@ -15,11 +15,11 @@ impl Interior<'_> {
         let (far, force) = (typical(&state.x).clamp(1e-3, 1.0), typical(&state.low).max(1.0));
         let (room, press) = (typical(&state.slack).clamp(1e-3, 1.0), typical(&state.inequality).max(1.0));
         let mut at_low = vec![true; n];
-        let mut places: Vec<Place> = program
+        let mut places: Vec<WeightState> = program
             .lower
             .iter()
             .zip(&program.upper)
-            .map(|(l, u)| if l == u { Place::Lower } else { Place::Free })
+            .map(|(l, u)| if l == u { WeightState::Lower } else { WeightState::Free })
             .collect();
         for (j, part) in self.parts.iter().enumerate() {
             let k = part.synapse;
@@ -27,13 +27,13 @@ impl Interior<'_> {
                 at_low[k] = false;
             }
             if (part.range - state.x[j]) / far < state.high[j] / force {
-                places[k] = if part.sign > 0.0 { Place::Upper } else { Place::Lower };
+                places[k] = if part.sign > 0.0 { WeightState::Upper } else { WeightState::Lower };
             }
         }
         for (k, place) in places.iter_mut().enumerate() {
-            if at_low[k] && *place == Place::Free {
+            if at_low[k] && *place == WeightState::Free {
                 let split = program.l1 > 0.0 && program.lower[k] < 0.0 && program.upper[k] > 0.0;
-                *place = if split { Place::Zero } else { Place::Lower };
+                *place = if split { WeightState::Zero } else { WeightState::Lower };
             }
         }
         let binding = state.slack.iter().zip(&state.inequality).map(|(s, z)| s / room < z / press).collect();

@@ -70,7 +70,7 @@ struct Words {
 
 /// The events of a block, moved to the first lanes.
 #[derive(Clone, Copy)]
-struct Found {
+struct BlockEvents {
     n: usize,
     /// Mask of the first `n` lanes.
     given: u32,
@@ -164,7 +164,7 @@ impl Constants {
     /// The events among the words, whose positions count from 1; none if an event is outside the array.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    fn found(&self, words: &Words, events: u32, from_1: __m512i) -> Option<Found> {
+    fn found(&self, words: &Words, events: u32, from_1: __m512i) -> Option<BlockEvents> {
         let n = events.count_ones() as usize;
         let position = _mm512_maskz_compress_epi16(events, _mm512_sub_epi16(from_1, _mm512_set1_epi16(1)));
         let ticks = _mm512_maskz_compress_epi16(events, words.value);
@@ -172,7 +172,7 @@ impl Constants {
         let given = _bzhi_u32(u32::MAX, n as u32);
         let (x, y) = (_mm512_srl_epi16(position, self.stride), _mm512_and_si512(position, self.row_mask));
         let outside = _mm512_cmpge_epu16_mask(x, self.columns) | _mm512_cmpge_epu16_mask(y, self.rows);
-        (outside & given == 0).then_some(Found { n, given, position, x, y, ticks, p })
+        (outside & given == 0).then_some(BlockEvents { n, given, position, x, y, ticks, p })
     }
 
     /// Stores the taxels' new values, of one or more events at time `t`.
@@ -182,7 +182,7 @@ impl Constants {
     /// `found` must come from [`Self::found`], with positions in `held`.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    unsafe fn hold(&self, found: &Found, t: i64, held: &mut Held) {
+    unsafe fn hold(&self, found: &BlockEvents, t: i64, held: &mut Held) {
         held.newest = t;
         // Lanes without an event repeat the last one, so that the loop has one of two lengths, which a processor can
         // predict.
@@ -239,7 +239,7 @@ unsafe fn hold_neighbours(begin: usize, given: u32, ticks: __m512i, t: i64, held
     }
 }
 
-impl Found {
+impl BlockEvents {
     /// Writes the events, from row `first` on.
     ///
     /// # Safety

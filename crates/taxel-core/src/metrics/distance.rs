@@ -8,7 +8,7 @@ use crate::parameters::Described;
 use crate::{Result, Stop};
 
 /// The operations that every metric implements.
-pub(super) trait Law {
+pub(super) trait Distance {
     /// The metric's parameters with their defaults and ranges.
     fn described() -> Described
     where
@@ -24,27 +24,21 @@ pub(super) trait Law {
 /// A metric with the data that all pairs share.
 pub(super) trait Ready: Sync {
     /// The distance between two patterns.
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64>;
+    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64>;
 
-    /// Fills a whole matrix; metrics with a faster method than pair by pair override it.
-    fn fill(
-        &self,
-        _matrix: &Matrix,
-        _a: &Patterns<'_>,
-        _b: Option<&Patterns<'_>>,
-        _work: &mut Work<'_>,
-    ) -> Option<Result<()>> {
-        None
+    /// Fills a whole matrix if there is a faster way than pair by pair, and returns whether there is.
+    fn fill(&self, _: &Matrix, _: &Patterns<'_>, _: Option<&Patterns<'_>>, _: &mut Work<'_>) -> Result<bool> {
+        Ok(false)
     }
 }
 
 /// One of several patterns, by its index.
-pub(super) type One<'p> = (&'p Patterns<'p>, usize);
+pub(super) type Pattern<'p> = (&'p Patterns<'p>, usize);
 
 /// The sum over trains of a distance between trains.
 pub(super) fn summed(
-    (a, p): One<'_>,
-    (b, q): One<'_>,
+    (a, p): Pattern<'_>,
+    (b, q): Pattern<'_>,
     stop: Stop<'_>,
     between: impl Fn(&[f64], &[f64]) -> Result<f64>,
 ) -> Result<f64> {

@@ -3,16 +3,10 @@
 use super::channels::Channels;
 use super::stream::Stream;
 use super::tare::Tare;
-use crate::parameters::Described;
 use crate::{Array, Result, SpikeKind};
 
-/// An encoder's parameters, checks, stream and number of trains.
-pub(super) trait Law {
-    /// The encoder's parameters, with their defaults and ranges.
-    fn described() -> Described
-    where
-        Self: Sized;
-
+/// An encoder's checks, stream and number of trains.
+pub(super) trait Encoding {
     /// Checks every parameter.
     fn check(&self) -> Result<()>;
 
