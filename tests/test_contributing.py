@@ -138,7 +138,7 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("tests/panel/test_page_clients.py", False),
     ]
     assert [(p.path, bool(p.after)) for p in of(OPTION)] == [
-        *2 * [("crates/taxel-live/src/pipeline/options.rs", True)],
+        ("crates/taxel-live/src/pipeline/options.rs", True),
         ("tests/panel/test_page_mounted.py", False),
     ]
     every = [*of(FORMAT), *of(STUDY), *of(ENCODER), *of(LEARNER), *of(PAGE), *of(OPTION)]

@@ -253,7 +253,7 @@ def docs(requests: Schema, messages: Schema, root: Path = ROOT) -> str:
 
 def in_order(schema: Schema) -> list[tuple[str, Schema]]:
     """Return the options by name, in the order of the struct, which a schema has not."""
-    order = re.findall(r"^    pub (\w+):", (ROOT / STRUCT).read_text("utf-8"), re.MULTILINE)
+    order = re.findall(r"^        (\w+): .* = ", (ROOT / STRUCT).read_text("utf-8"), re.MULTILINE)
     return sorted(schema["properties"].items(), key=lambda one: order.index(one[0]) if one[0] in order else len(order))
 
 
@@ -273,7 +273,13 @@ def stated(name: str, schema: Schema) -> str:
     lines += [f"{key}={schema[word]:_}" for key, word in (("least", "minimum"), ("most", "maximum")) if word in schema]
     words = ("commands", "flag", "metavar", "typed")
     lines += [f"{key}={json.dumps(schema[key])}" for key in words if key in schema]
-    return f"    {name}: {kind} = option(\n" + "".join(f"        {line},\n" for line in lines) + "    )\n"
+    # As ruff breaks lines.
+    head, inside = f"    {name}: {kind} = option(", ", ".join(lines)
+    if len(parts) > 1 or len(inside) > 112:
+        inside = "".join(f"\n        {line}," for line in lines) + "\n    "
+    elif len(head) + len(inside) > 119:
+        inside = f"\n        {inside}\n    "
+    return f"{head}{inside})\n"
 
 
 def options(schema: Schema) -> str:

@@ -24,17 +24,11 @@ class StatedOptions:
     """Hold the options of a `Live`, which documents each, with their defaults."""
 
     port: int = option(
-        5208,
-        "The UDP port that the board sends to.",
-        least=0,
-        most=65_535,
-        commands="live record bridge",
+        5208, "The UDP port that the board sends to.", least=0, most=65_535, commands="live record bridge"
     )
     _: KW_ONLY
     host: str = option(
-        "0.0.0.0",
-        "The address of this machine to listen on; 0.0.0.0: all.",
-        commands="live record bridge",
+        "0.0.0.0", "The address of this machine to listen on; 0.0.0.0: all.", commands="live record bridge"
     )
     remote: Remote | None = option(
         None,
@@ -57,11 +51,7 @@ class StatedOptions:
         commands="live record bridge",
         flag="--preset",
     )
-    differences: bool = option(
-        False,
-        "The board sends intensity differences.",
-        commands="live record bridge",
-    )
+    differences: bool = option(False, "The board sends intensity differences.", commands="live record bridge")
     readout: Readout | PlainRule | None = option(
         None,
         "A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.",
@@ -74,20 +64,12 @@ class StatedOptions:
         commands="live bridge",
     )
     record: str | os.PathLike[str] | None = option(
-        None,
-        "Record in a new file (.mcap or .lsa).",
-        commands="live bridge",
+        None, "Record in a new file (.mcap or .lsa).", commands="live bridge"
     )
     record_later: bool = option(
-        False,
-        "Recordings begin and end while it runs (`record`, `end_recording`).",
-        commands="",
+        False, "Recordings begin and end while it runs (`record`, `end_recording`).", commands=""
     )
-    name: str = option(
-        "board",
-        "The board's name among the sources of the recording.",
-        commands="record",
-    )
+    name: str = option("board", "The board's name among the sources of the recording.", commands="record")
     sources: Mapping[str, str] | None = option(
         None,
         "Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU "
@@ -96,60 +78,27 @@ class StatedOptions:
         flag="--source",
         metavar="NAME=WHAT",
     )
-    compression: str = option(
-        "none",
-        "Compression of a .mcap: none, lz4 or zstd.",
-        commands="record",
-    )
-    overwrite: bool = option(
-        False,
-        "Replace the file if it exists.",
-        commands="record",
-    )
+    compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
+    overwrite: bool = option(False, "Replace the file if it exists.", commands="record")
     guard_frames: float = option(
-        5.0,
-        "How far, in frames, a readout stays behind the host's clock while no events arrive.",
-        least=0,
+        5.0, "How far, in frames, a readout stays behind the host's clock while no events arrive.", least=0
     )
     gap_frames: float = option(
-        1.0,
-        "At a gap in the sequence of version 2, frames to wait for what may only be late.",
-        least=0,
-        commands="",
+        1.0, "At a gap in the sequence of version 2, frames to wait for what may only be late.", least=0, commands=""
     )
-    lines: bool = option(
-        False,
-        "Print one line of JSON for each detection, and nothing else.",
-        flag="--json",
-    )
+    lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.", flag="--json")
     send: str | Sequence[str] = option(
         (),
         "Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.",
         metavar="WHERE",
     )
     kernel_buffer_bytes: int = option(
-        33554432,
-        "How much may wait in the kernel, bytes.",
-        least=0,
-        most=2_147_483_647,
-        commands="",
+        33554432, "How much may wait in the kernel, bytes.", least=0, most=2_147_483_647, commands=""
     )
     queue_bytes: int = option(
-        67108864,
-        "How much may wait for the decoder, bytes.",
-        least=0,
-        most=2_147_483_647,
-        commands="",
+        67108864, "How much may wait for the decoder, bytes.", least=0, most=2_147_483_647, commands=""
     )
     readout_events: int = option(
-        1048576,
-        "How many events may wait for the readout.",
-        least=0,
-        most=2_147_483_647,
-        commands="",
+        1048576, "How many events may wait for the readout.", least=0, most=2_147_483_647, commands=""
     )
-    gro: bool = option(
-        True,
-        "Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`).",
-        commands="",
-    )
+    gro: bool = option(True, "Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`).", commands="")

@@ -15,129 +15,121 @@ use taxel_core::wire::Registers;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
 
-/// The options of a [`Live`](super::Live).
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct LiveOptions {
-    /// The UDP port that the board sends to.
-    ///
-    /// 0 finds a free one, see `address`.
-    #[cfg_attr(feature = "schema", schemars(extend("commands" = "live record bridge")))]
-    pub port: u16,
-    /// The address of this machine to listen on; 0.0.0.0: all.
-    #[cfg_attr(feature = "schema", schemars(extend("commands" = "live record bridge")))]
-    pub host: String,
-    /// Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.
-    ///
-    /// Stop the `Live` before the `Remote`.
-    #[cfg_attr(feature = "schema", schemars(extend(
-        "commands" = "live record", "flag" = "--from", "metavar" = "ADDRESS", "python" = "Remote | None",
-    )))]
-    pub remote: Option<String>,
-    /// Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
-    #[cfg_attr(feature = "schema", schemars(with = "Option<String>", extend(
-        "commands" = "live record bridge", "metavar" = "ROWSxCOLUMNS[xMM]", "python" = "Array | None",
-        "typed" = "As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.",
-    )))]
-    #[serde(skip_serializing)]
-    pub array: Array,
-    /// The board's registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its own.
-    ///
-    /// The contents of the registers, or the name of a preset, of which a smaller array drives fewer lines. Default: those
-    /// of a board of this array at reset.
-    #[cfg_attr(feature = "schema", schemars(with = "Option<String>", extend(
-        "commands" = "live record bridge", "flag" = "--preset", "python" = "str | Registers | None",
-    )))]
-    #[serde(skip_serializing)]
-    pub registers: Registers,
-    /// The board sends intensity differences.
-    ///
-    /// The panel's "delta intensity".
-    #[cfg_attr(feature = "schema", schemars(extend("commands" = "live record bridge")))]
-    pub differences: bool,
-    /// A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.
-    ///
-    /// Without one nothing is detected.
-    #[cfg_attr(feature = "schema", schemars(extend(
-        "commands" = "live bridge", "metavar" = "FILE", "python" = "Readout | PlainRule | None",
-    )))]
-    #[serde(skip_serializing)]
-    pub readout: Option<String>,
-    /// Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).
-    ///
-    /// For a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
-    /// on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
-    #[cfg_attr(feature = "schema", schemars(with = "Option<String>", extend(
-        "commands" = "live bridge", "python" = "Tare | float | None",
-    )))]
-    #[serde(skip_serializing)]
-    pub tare: Option<StatedTare>,
-    /// Record in a new file (.mcap or .lsa).
-    ///
-    /// `.mcap` holds all data, `.lsa` the raw bytes of the manual.
-    #[cfg_attr(feature = "schema", schemars(extend(
-        "commands" = "live bridge", "python" = "str | os.PathLike[str] | None",
-    )))]
-    #[serde(serialize_with = "shown")]
-    pub record: Option<PathBuf>,
-    /// Recordings begin and end while it runs (`record`, `end_recording`).
-    ///
-    /// Then none begins here, and `sources` are recorded while one runs.
-    #[cfg_attr(feature = "schema", schemars(extend("commands" = "")))]
-    pub record_later: bool,
-    /// The board's name among the sources of the recording.
-    #[cfg_attr(feature = "schema", schemars(extend("commands" = "record")))]
-    pub name: String,
-    /// Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
-    /// (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.
-    ///
-    /// By name, in a `.mcap`, each with its own clock: "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which
-    /// sends to that address of this machine; "serial:PATH@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard
-    /// input); "given" are numbers that a program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of
-    /// a line (default: those of the first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called
-    /// `t_us`, `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its
-    /// arrival.
-    #[cfg_attr(feature = "schema", schemars(extend(
-        "commands" = "record", "flag" = "--source", "metavar" = "NAME=WHAT", "python" = "Mapping[str, str] | None",
-    )))]
-    pub sources: Vec<(String, String)>,
-    /// Compression of a .mcap: none, lz4 or zstd.
-    #[cfg_attr(feature = "schema", schemars(extend("commands" = "record")))]
-    pub compression: String,
-    /// Replace the file if it exists.
-    #[cfg_attr(feature = "schema", schemars(extend("commands" = "record")))]
-    pub overwrite: bool,
-    /// How far, in frames, a readout stays behind the host's clock while no events arrive.
-    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
-    pub guard_frames: f64,
-    /// At a gap in the sequence of version 2, frames to wait for what may only be late.
-    #[cfg_attr(feature = "schema", schemars(range(min = 0), extend("commands" = "")))]
-    pub gap_frames: f64,
-    /// Print one line of JSON for each detection, and nothing else.
-    #[cfg_attr(feature = "schema", schemars(extend("flag" = "--json")))]
-    pub lines: bool,
-    /// Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.
-    ///
-    /// UDP sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
-    /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
-    /// counted.
-    #[cfg_attr(feature = "schema", schemars(extend("metavar" = "WHERE", "python" = "str | Sequence[str]")))]
-    pub send: Vec<String>,
-    /// How much may wait in the kernel, bytes.
-    #[cfg_attr(feature = "schema", schemars(range(max = 2_147_483_647), extend("commands" = "")))]
-    pub kernel_buffer_bytes: usize,
-    /// How much may wait for the decoder, bytes.
-    #[cfg_attr(feature = "schema", schemars(range(max = 2_147_483_647), extend("commands" = "")))]
-    pub queue_bytes: usize,
-    /// How many events may wait for the readout.
-    #[cfg_attr(feature = "schema", schemars(range(max = 2_147_483_647), extend("commands" = "")))]
-    pub readout_events: usize,
-    /// Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`).
-    ///
-    /// It then counts its drops in trains.
-    #[cfg_attr(feature = "schema", schemars(extend("commands" = "")))]
-    pub gro: bool,
+/// Declares the options with their defaults; `KEY = VALUE` after one is what its schema says beside.
+macro_rules! options {
+    ($(#[$about:meta])* pub struct $name:ident {
+        $($(#[$of:meta])* $field:ident: $kind:ty = $default:expr $(, $key:literal = $value:literal)*;)*
+    }) => {
+        $(#[$about])*
+        pub struct $name {
+            $($(#[$of])* $(#[cfg_attr(feature = "schema", schemars(extend($key = $value)))])* pub $field: $kind,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+    };
+}
+
+options! {
+    /// The options of a [`Live`](super::Live).
+    #[derive(Debug, Clone, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+    pub struct LiveOptions {
+        /// The UDP port that the board sends to.
+        ///
+        /// 0 finds a free one, see `address`.
+        port: u16 = 5208, "commands" = "live record bridge";
+        /// The address of this machine to listen on; 0.0.0.0: all.
+        host: String = "0.0.0.0".to_owned(), "commands" = "live record bridge";
+        /// Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.
+        ///
+        /// Stop the `Live` before the `Remote`.
+        remote: Option<String> = None, "commands" = "live record", "flag" = "--from", "metavar" = "ADDRESS",
+            "python" = "Remote | None";
+        /// Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
+        #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
+        #[serde(skip_serializing)]
+        array: Array = Array::thesis(), "commands" = "live record bridge", "metavar" = "ROWSxCOLUMNS[xMM]",
+            "python" = "Array | None", "typed" = "As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.";
+        /// The board's registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its own.
+        ///
+        /// The contents of the registers, or the name of a preset, of which a smaller array drives fewer lines. Default: those
+        /// of a board of this array at reset.
+        #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
+        #[serde(skip_serializing)]
+        registers: Registers = Registers::default(), "commands" = "live record bridge", "flag" = "--preset",
+            "python" = "str | Registers | None";
+        /// The board sends intensity differences.
+        ///
+        /// The panel's "delta intensity".
+        differences: bool = false, "commands" = "live record bridge";
+        /// A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.
+        ///
+        /// Without one nothing is detected.
+        #[serde(skip_serializing)]
+        readout: Option<String> = None, "commands" = "live bridge", "metavar" = "FILE",
+            "python" = "Readout | PlainRule | None";
+        /// Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).
+        ///
+        /// For a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
+        /// on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
+        #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
+        #[serde(skip_serializing)]
+        tare: Option<StatedTare> = None, "commands" = "live bridge", "python" = "Tare | float | None";
+        /// Record in a new file (.mcap or .lsa).
+        ///
+        /// `.mcap` holds all data, `.lsa` the raw bytes of the manual.
+        #[serde(serialize_with = "shown")]
+        record: Option<PathBuf> = None, "commands" = "live bridge", "python" = "str | os.PathLike[str] | None";
+        /// Recordings begin and end while it runs (`record`, `end_recording`).
+        ///
+        /// Then none begins here, and `sources` are recorded while one runs.
+        record_later: bool = false, "commands" = "";
+        /// The board's name among the sources of the recording.
+        name: String = "board".to_owned(), "commands" = "record";
+        /// Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
+        /// (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.
+        ///
+        /// By name, in a `.mcap`, each with its own clock: "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which
+        /// sends to that address of this machine; "serial:PATH@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard
+        /// input); "given" are numbers that a program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of
+        /// a line (default: those of the first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called
+        /// `t_us`, `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its
+        /// arrival.
+        sources: Vec<(String, String)> = vec![], "commands" = "record", "flag" = "--source", "metavar" = "NAME=WHAT",
+            "python" = "Mapping[str, str] | None";
+        /// Compression of a .mcap: none, lz4 or zstd.
+        compression: String = "none".to_owned(), "commands" = "record";
+        /// Replace the file if it exists.
+        overwrite: bool = false, "commands" = "record";
+        /// How far, in frames, a readout stays behind the host's clock while no events arrive.
+        guard_frames: f64 = 5.0, "minimum" = 0;
+        /// At a gap in the sequence of version 2, frames to wait for what may only be late.
+        gap_frames: f64 = 1.0, "commands" = "", "minimum" = 0;
+        /// Print one line of JSON for each detection, and nothing else.
+        lines: bool = false, "flag" = "--json";
+        /// Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.
+        ///
+        /// UDP sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
+        /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
+        /// counted.
+        send: Vec<String> = vec![], "metavar" = "WHERE", "python" = "str | Sequence[str]";
+        /// How much may wait in the kernel, bytes.
+        kernel_buffer_bytes: usize = ReceiverOptions::default().kernel_buffer_bytes, "commands" = "",
+            "maximum" = 2_147_483_647;
+        /// How much may wait for the decoder, bytes.
+        queue_bytes: usize = ReceiverOptions::default().queue_bytes, "commands" = "", "maximum" = 2_147_483_647;
+        /// How many events may wait for the readout.
+        readout_events: usize = 1 << 20, "commands" = "", "maximum" = 2_147_483_647;
+        /// Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`).
+        ///
+        /// It then counts its drops in trains.
+        gro: bool = ReceiverOptions::default().gro, "commands" = "";
+    }
 }
 
 fn shown<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
@@ -152,37 +144,6 @@ pub enum StatedTare {
     Seconds(f64),
     /// The contents of a tare's file.
     Saved(String),
-}
-
-impl Default for LiveOptions {
-    /// The first preset's registers, 5 frames' guard, no recording.
-    fn default() -> Self {
-        let ReceiverOptions { kernel_buffer_bytes, queue_bytes, gro } = ReceiverOptions::default();
-        Self {
-            port: 5208,
-            host: "0.0.0.0".to_owned(),
-            remote: None,
-            array: Array::thesis(),
-            registers: Registers::default(),
-            differences: false,
-            readout: None,
-            tare: None,
-            record: None,
-            record_later: false,
-            name: "board".to_owned(),
-            sources: vec![],
-            compression: "none".to_owned(),
-            overwrite: false,
-            guard_frames: 5.0,
-            gap_frames: 1.0,
-            lines: false,
-            send: vec![],
-            kernel_buffer_bytes,
-            queue_bytes,
-            readout_events: 1 << 20,
-            gro,
-        }
-    }
 }
 
 impl LiveOptions {
