@@ -3,17 +3,22 @@
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Any, Final, Protocol, Self, TypeAlias, final, type_check_only
+from typing import Any, Final, Literal, Protocol, Self, TypeAlias, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import NDArray
 
-class Error(Exception): ...
+class Error(Exception):
+    argument: str | None
+    hint: str | None
+
 class FormatError(Error): ...
 class ProblemError(Error): ...
 class NotFittedError(ProblemError): ...
 class DeviceError(Error): ...
 class SceneError(Error): ...
+
+def error_line(text: str, argument: str, hint: str | None) -> str: ...
 
 # the door: what it does with a panic, Ctrl-C, each kind of error (for tests)
 
@@ -23,10 +28,10 @@ def test_hook(what: str) -> None: ...
 # JSON schemas of the panel's requests and messages; with the same feature alone.
 def message_schemas() -> str: ...
 
-# parameters as JSON: what is known of a noun's; one's, checked, with every default filled in
+# parameters: what is known of a noun's (defaults, required, ranges); one's, given as JSON, with every default filled in
 
-def parameters(of: str) -> str: ...
-def check_parameters(of: str, parameters: str) -> str: ...
+def parameters(of: str) -> dict[str, Any]: ...
+def check_parameters(of: str, parameters: str) -> dict[str, Any]: ...
 
 # nouns: parts as the nouns' `_parts()` give them, and as their `_from_parts()` take them
 
@@ -49,8 +54,16 @@ _Events = tuple[
 _Frames = tuple[_Array, NDArray[np.int64], NDArray[np.float32]]
 #: times, offsets, values, kind, start, stop; ms
 _Spikes = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float32] | None, str, float, float]
-#: rows of columns that were filled, whether ticks were, which rows states gave, markers
-_Filled = tuple[int, bool, NDArray[np.bool_] | None, list[tuple[int, bool]]]
+
+@type_check_only
+class _Filled(TypedDict):
+    """What was filled of columns: rows, whether ticks were, which rows states gave, markers."""
+
+    rows: int
+    paired: bool
+    repaired: NDArray[np.bool_] | None
+    markers: list[tuple[int, bool]]
+
 #: t, x, y, ticks, and p, present as bytes
 _Columns = tuple[
     NDArray[np.int64],
@@ -65,24 +78,34 @@ def check_spikes(trains: _Spikes) -> None: ...
 def check_events(events: _Events) -> None: ...
 def split_by_sign(trains: _Spikes) -> _Spikes: ...
 
-# detect: detections as (labels, t, known, slope, repaired); a tally as (label, detected, events, missed, false, near,
-# errors, delays)
+# detect: detections as (labels, t, known, slope, repaired)
 
 _Detections = tuple[list[str], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]
-_Tally = tuple[
-    str,
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    int,
-    NDArray[np.float64],
-    NDArray[np.float64],
-]
+
+@final
+class Tally:
+    """One label's detections beside its reference events: places of pairs, missed and false ones; ms."""
+
+    label: Final[str]
+    detected: Final[NDArray[np.int64]]
+    events: Final[NDArray[np.int64]]
+    missed_events: Final[NDArray[np.int64]]
+    false_detections: Final[NDArray[np.int64]]
+    false_near: Final[int]
+    errors_ms: Final[NDArray[np.float64]]
+    delays_ms: Final[NDArray[np.float64]]
+
+@type_check_only
+class _Spread(TypedDict):
+    mean: float
+    sd: float
+    median: float
+    low: float
+    high: float
 
 def check_detections(detections: _Detections) -> None: ...
-def score(found: _Detections, labels: list[str], t: NDArray[np.int64], windows: NDArray[np.int64]) -> list[_Tally]: ...
-def spread(values: NDArray[np.float64]) -> tuple[float, float, float, float, float]: ...
+def score(found: _Detections, labels: list[str], t: NDArray[np.int64], windows: NDArray[np.int64]) -> list[Tally]: ...
+def spread(values: NDArray[np.float64]) -> _Spread: ...
 def make_readout(parts: str) -> str: ...
 def check_readout(text: str) -> str: ...
 def make_plain_rule(parts: str) -> str: ...
@@ -173,7 +196,7 @@ def pairwise(
     progress: Callable[[int, int], object] | None,
 ) -> NDArray[np.float64]: ...
 
-# recording: header, remarks and counts as JSON
+# recording: header and counts as JSON where they are written, as dictionaries where they are read
 
 UNKNOWN: Final = 65_535
 LOADED_TICKS: Final = 8.0
@@ -212,22 +235,64 @@ class RecordingPictures:
     def __next__(self) -> tuple[int, NDArray[np.uint16]]: ...
 
 @final
+class Decoded:
+    """The decoded datagrams of a board.
+
+    Events as parts; the decoder's counts, and those of version 2; what a verdict takes from decoding; of each datagram
+    its arrival (ns), and the earliest time (us) at which it could leave the board.
+    """
+
+    events: Final[_Events]
+    counts: Final[dict[str, Any]]
+    version_2: Final[dict[str, int]]
+    found: Final[dict[str, Any]]
+    arrived_ns: Final[NDArray[np.int64]]
+    left: Final[NDArray[np.int64]]
+
+@final
+class Samples:
+    """The lines of a stream: arrivals, numbers, own times (us), all values, and what a verdict takes from reading."""
+
+    arrived_ns: Final[NDArray[np.int64]]
+    number: Final[NDArray[np.uint64]]
+    t: Final[NDArray[np.int64]]
+    values: Final[NDArray[np.float64]]
+    found: Final[dict[str, Any]]
+
+@final
+class Remarks:
+    """What a recording holds beside its data, as the file has it; `held` by taxel index, ticks."""
+
+    registers: Final[list[tuple[int, dict[str, Any]]]]
+    notes: Final[list[dict[str, Any]]]
+    board: Final[list[tuple[int, dict[str, Any]]]]
+    detections: Final[list[tuple[Any, ...]]]
+    zeroings: Final[list[tuple[int, dict[str, Any]]]]
+    counts: Final[dict[str, Any] | None]
+    condition: Final[dict[str, Any]]
+    datagrams: Final[int]
+    datagram_bytes: Final[int]
+    samples: Final[int]
+    held: Final[list[int] | None]
+
+@type_check_only
+class _Datagrams(TypedDict):
+    arrived_ns: NDArray[np.int64]
+    number: NDArray[np.uint64]
+    offsets: NDArray[np.int64]
+    payload: NDArray[np.uint8]
+
+@final
 class RecordingReader:
     def __new__(cls, path: str | PathLike[str], memory: int, allowed: bool) -> RecordingReader: ...
     def within(self, memory: int) -> RecordingReader: ...
     def sources(self) -> list[str]: ...
     def of_source(self, name: str) -> RecordingReader: ...
-    def about(self) -> str: ...
-    def remarks(self) -> str: ...
-    def samples(
-        self,
-    ) -> tuple[NDArray[np.int64], NDArray[np.uint64], NDArray[np.int64], NDArray[np.float64], str]: ...
-    def decode(
-        self, pairing: str
-    ) -> tuple[
-        _Events, str, NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint64], str, NDArray[np.int64], str
-    ]: ...
-    def datagrams(self) -> tuple[NDArray[np.int64], NDArray[np.uint64], NDArray[np.int64], NDArray[np.uint8]]: ...
+    def about(self) -> tuple[dict[str, Any], Any, dict[str, Any]]: ...
+    def remarks(self) -> Remarks: ...
+    def samples(self) -> Samples: ...
+    def decode(self, pairing: str) -> Decoded: ...
+    def datagrams(self) -> _Datagrams: ...
     def pictures(self) -> tuple[NDArray[np.int64], NDArray[np.float32], int]: ...
 
 @final
@@ -266,15 +331,31 @@ class RecordingWriter:
     def samples(
         self, arrived_ns: NDArray[np.int64], number: NDArray[np.uint64], values: NDArray[np.float64]
     ) -> None: ...
-    def finish(self, counts: str) -> str: ...
+    def finish(self, counts: str) -> None: ...
 
 def whole_pictures(values: NDArray[np.float32]) -> bool: ...
-def recording_verdict(basis: str) -> str: ...
-def recording_damage(counts: str) -> str: ...
-def read_lsa(
-    path: str | PathLike[str], sensor: _Array, pairing: str, differences: bool, memory: int
-) -> tuple[NDArray[np.uint8], _Events, str, bool]: ...
-def clock_lines(own_us: NDArray[np.int64], arrived_ns: NDArray[np.int64]) -> list[tuple[int, int, int, float]]: ...
+def recording_verdict(basis: str) -> dict[str, Any]: ...
+def recording_damage(counts: str) -> dict[str, int]: ...
+
+@final
+class DecodedLsa:
+    """A .lsa: its bytes, events as parts, the decoder's counts and the damage among them, whether its .lss is there."""
+
+    payload: Final[NDArray[np.uint8]]
+    events: Final[_Events]
+    counts: Final[dict[str, Any]]
+    damage: Final[dict[str, int]]
+    complete: Final[bool]
+
+def read_lsa(path: str | PathLike[str], sensor: _Array, pairing: str, differences: bool, memory: int) -> DecodedLsa: ...
+
+@type_check_only
+class _ClockLine(TypedDict):
+    board_us: int
+    host_ns: int
+    drift_ppm: float
+
+def clock_lines(own_us: NDArray[np.int64], arrived_ns: NDArray[np.int64]) -> list[tuple[int, _ClockLine]]: ...
 def clock_doubt(drift_ppm: float, delay_us: float, median_us: float) -> str | None: ...
 def write_lsa(path: str | PathLike[str], payload: bytes) -> None: ...
 def open_regular(path: str | PathLike[str]) -> int: ...
@@ -315,34 +396,71 @@ def circuit_volts(
 def circuit_volts_alone(kind: str, json: str, conductance_us: NDArray[np.float64]) -> NDArray[np.float64]: ...
 def converter_ticks(json: str, shape: tuple[int, int], volts: NDArray[np.float64]) -> NDArray[np.float64]: ...
 def converter_ramp(json: str, given: NDArray[np.float64], back: bool) -> NDArray[np.float64]: ...
-def converter_trace(
-    json: str, line_v: list[float], every_us: float, stop_us: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]: ...
-def adaptive_convert(
-    json: str, shape: tuple[int, int], volts: NDArray[np.float64], period_us: float
-) -> tuple[NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]: ...
+
+@type_check_only
+class _Trace(TypedDict):
+    t_us: NDArray[np.float64]
+    line_v: NDArray[np.float64]
+    input_v: NDArray[np.float64]
+    ramp_v: NDArray[np.float64]
+    high: NDArray[np.bool_]
+
+def converter_trace(json: str, line_v: list[float], every_us: float, stop_us: float) -> _Trace: ...
+
+@final
+class Converted:
+    """Frames that were converted: time and ramp of each; ticks and V of all readings."""
+
+    t_us: Final[NDArray[np.float64]]
+    ramp: Final[NDArray[np.uint32]]
+    ticks: Final[NDArray[np.float64]]
+    volts: Final[NDArray[np.float64]]
+
+def adaptive_convert(json: str, shape: tuple[int, int], volts: NDArray[np.float64], period_us: float) -> Converted: ...
 
 # calibration: the law of fabric, amplifier and ramp
 
-def check_law(json: str) -> str: ...
+def check_law(json: str) -> dict[str, float]: ...
 def law_rest(json: str, ramp: float) -> float: ...
 def law_of(
     json: str, ramp: float, given: NDArray[np.float64], rest: NDArray[np.float64], back: bool
 ) -> NDArray[np.float64]: ...
 
-# simulate: scenes and reports as JSON; acts as ms of silence, a scene, or pictures with their period in us
+# simulate: acts as ms of silence, a scene as JSON, or pictures with their period in us
 
 _Act = float | str | tuple[NDArray[np.float32], float]
-_Contacts = list[tuple[str, float, float, float, float]]
 
-def draw_scene(parts: _Array, seed: int, index: int, left_to_rest: bool) -> str: ...
+@type_check_only
+class _Contact(TypedDict):
+    kind: str
+    start_us: float
+    stop_us: float
+    speed_m_s: float
+    peak_n: float
+
+@type_check_only
+class _Track(TypedDict):
+    x_mm: NDArray[np.float32]
+    y_mm: NDArray[np.float32]
+    depth_mm: NDArray[np.float32]
+    force_n: NDArray[np.float32]
+
+@final
+class Played:
+    """What a host decodes of a board that was played to: events as parts; datagrams, words, bytes; warnings."""
+
+    events: Final[_Events]
+    datagrams: Final[int]
+    words: Final[int]
+    bytes: Final[int]
+    narrow: Final[list[tuple[int, str]]]
+
+def draw_scene(parts: _Array, seed: int, index: int, left_to_rest: bool) -> dict[str, Any]: ...
 def check_scene(parts: _Array, json: str, sensor: str) -> None: ...
-def motion(
-    parts: _Array, json: str, step_us: float
-) -> tuple[list[list[NDArray[np.float32]]], _Contacts, str | None]: ...
+def motion(parts: _Array, json: str, step_us: float) -> tuple[list[_Track], list[_Contact], str | None]: ...
 def truth(
     parts: _Array, registers: str, acts: list[_Act]
-) -> tuple[_Contacts, NDArray[np.float32], list[tuple[int, str]]]: ...
+) -> tuple[list[_Contact], NDArray[np.float32], list[tuple[int, str]]]: ...
 def play(
     parts: _Array,
     registers: str,
@@ -352,7 +470,7 @@ def play(
     tare_ms: float,
     options: str,
     watch: Callable[[float], object],
-) -> tuple[_Events, int, int, int, list[tuple[int, str]]]: ...
+) -> Played: ...
 def emulate(
     to: str,
     parts: _Array,
@@ -361,8 +479,8 @@ def emulate(
     touch: object,
     options: str,
     begun: Callable[[str | None], object],
-    watch: Callable[[str, _Contacts], object],
-) -> str: ...
+    watch: Callable[[dict[str, Any], list[_Contact]], object],
+) -> dict[str, Any]: ...
 
 @final
 class Layer:
@@ -376,9 +494,9 @@ class Layer:
 class Source:
     def __new__(cls, to: str, parts: _Array, registers: str, version_2: str) -> Source: ...
     def push(self, ticks: NDArray[np.uint16]) -> int: ...
-    def counts(self) -> str: ...
+    def counts(self) -> dict[str, int]: ...
 
-# wire and board: columns as (t, x, y, ticks, p, present), registers as JSON, counts in the order of `wire.Counts`
+# wire and board: columns as (t, x, y, ticks, p, present), registers as JSON where they are given
 
 @final
 class WireDecoder:
@@ -387,17 +505,26 @@ class WireDecoder:
     def fill_datagrams(self, data: NDArray[np.uint8], lengths: NDArray[np.int64], columns: _Columns) -> _Filled: ...
     def end_of_datagram(self) -> _Events: ...
     def finish(self) -> _Events: ...
-    def counts(self) -> str: ...
+    def counts(self) -> dict[str, int]: ...
     def last(self) -> tuple[int | None, bool] | None: ...
-    def status(self) -> str | None: ...
+    def status(self) -> dict[str, int] | None: ...
     def held(self) -> NDArray[np.int32]: ...
 
 def wire_rows(version: int, length: int) -> int: ...
 def wire_cut(data: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
-def encode_datagrams(
-    events: _Events, held: NDArray[np.uint16] | None, promised: bool
-) -> tuple[int, NDArray[np.int64], NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]: ...
-def decode_datagrams(data: NDArray[np.uint8], sensor: _Array, columns: _Columns) -> tuple[_Filled, str, int]: ...
+
+@final
+class EncodedDatagrams:
+    """Events as datagrams: what is added to times; where each begins; a time of each; events not marked as repaired."""
+
+    origin_us: Final[int]
+    offsets: Final[NDArray[np.int64]]
+    payload: Final[NDArray[np.uint8]]
+    times: Final[NDArray[np.int64]]
+    unmarked: Final[NDArray[np.int64]]
+
+def encode_datagrams(events: _Events, held: NDArray[np.uint16] | None, promised: bool) -> EncodedDatagrams: ...
+def decode_datagrams(data: NDArray[np.uint8], sensor: _Array, columns: _Columns) -> _Filled: ...
 
 @final
 class DatagramStream:
@@ -411,30 +538,57 @@ class WireBoard:
     def __new__(cls, registers: str, array: _Array, options: str) -> WireBoard: ...
     def reset(self) -> None: ...
     def greeting(self) -> str: ...
-    def registers(self) -> str: ...
+    def registers(self) -> dict[str, Any]: ...
     def time_us(self) -> float: ...
     def command(self, data: NDArray[np.uint8]) -> str: ...
     def record(self, start: bool) -> None: ...
     def faults(self) -> str: ...
     def frame(self, ticks: NDArray[np.uint16], most: int, accepted: NDArray[np.bool_] | None) -> list[bytes]: ...
-    def counts(self) -> str: ...
+    def counts(self) -> dict[str, int]: ...
 
 def wire_encode(events: _Events) -> bytes: ...
 def command_bytes(register: int, value: int) -> bytes: ...
 def command_read(data: NDArray[np.uint8]) -> tuple[int, int]: ...
 def registers_presets() -> list[str]: ...
-def registers_fields() -> str: ...
-def registers_at_reset(array: _Array, channels: int) -> str: ...
-def registers_of_source(array: _Array, rate_hz: float, bits: int) -> tuple[str, int]: ...
-def registers_preset(name: str, array: _Array | None = None) -> str: ...
-def registers_with_preset(registers: str, name: str, array: _Array) -> str: ...
-def registers_with(registers: str, fields: list[tuple[str, int]], array: _Array) -> str: ...
+def registers_fields() -> list[dict[str, Any]]: ...
+def registers_at_reset(array: _Array, channels: int) -> dict[str, Any]: ...
+def registers_of_source(array: _Array, rate_hz: float, bits: int) -> tuple[dict[str, Any], int]: ...
+def registers_preset(name: str, array: _Array | None = None) -> dict[str, Any]: ...
+def registers_with_preset(registers: str, name: str, array: _Array) -> dict[str, Any]: ...
+def registers_with(registers: str, fields: list[tuple[str, int]], array: _Array) -> dict[str, Any]: ...
 def registers_check(registers: str, array: _Array) -> list[str]: ...
 def registers_words(registers: str) -> tuple[list[int], float]: ...
-def registers_of_words(words: list[int], channels: int) -> str: ...
+def registers_of_words(words: list[int], channels: int) -> dict[str, Any]: ...
 def registers_commands(source: str, target: str, array: _Array) -> list[tuple[int, int]]: ...
 
-# live: options, tare, counters and summary as JSON; detections as label, t, known, slope, reported us, reported ns
+# live: options and tare as JSON
+
+@type_check_only
+class _Detection(TypedDict):
+    label: str
+    t: int
+    known: int
+    slope: float
+    reported: int
+    reported_ns: int
+    repaired: bool
+
+@type_check_only
+class _Zeroing(TypedDict):
+    t: int
+    x: int
+    y: int
+    rest: float
+    before: float | None
+
+@final
+class Ended:
+    """How a pipeline, or one of its recordings, ended: counters, verdict, path; the fresh tare as its file's text."""
+
+    counters: Final[dict[str, Any]]
+    verdict: Final[dict[str, Any]]
+    path: Final[Path | None]
+    tare: Final[str | None]
 
 @final
 class Live:
@@ -442,30 +596,30 @@ class Live:
         cls,
         options: str,
         record: str | PathLike[str] | None,
-        say: Callable[[str, int, int, float, int, int], object] | None,
+        say: Callable[[_Detection], object] | None,
         feed: Feed | None,
     ) -> Live: ...
     def address(self) -> tuple[str, int]: ...
     def place(self) -> str: ...
-    def registers(self) -> str: ...
+    def registers(self) -> dict[str, Any]: ...
     def copy(self) -> Copies: ...
-    def next(self, timeout: float) -> tuple[str, int, int, float, int, int, bool] | None: ...
+    def next(self, timeout: float) -> _Detection | None: ...
     def is_over(self) -> bool: ...
     def expect_version(self, version: int) -> None: ...
-    def counters(self) -> str: ...
+    def counters(self) -> dict[str, Any]: ...
     def picture(self) -> NDArray[np.uint16]: ...
     def tare(self) -> str | None: ...
     def take_markers(self) -> list[tuple[int, bool]]: ...
     def source_address(self, name: str) -> tuple[str, int] | None: ...
     def sample(self, name: str, values: list[float], arrived_ns: int | None) -> None: ...
-    def zero(self, taxels: list[tuple[int, int]]) -> list[tuple[int, int, int, float, float | None]]: ...
-    def zeroed(self) -> list[tuple[int, int, int, float, float | None]]: ...
+    def zero(self, taxels: list[tuple[int, int]]) -> list[_Zeroing]: ...
+    def zeroed(self) -> list[_Zeroing]: ...
     def note(self, text: str) -> None: ...
-    def record(self, path: str | PathLike[str], compression: str, overwrite: bool) -> str | None: ...
+    def record(self, path: str | PathLike[str], compression: str, overwrite: bool) -> Ended | None: ...
     def record_again(self) -> bool: ...
-    def end_recording(self) -> str: ...
+    def end_recording(self) -> Ended: ...
     def records(self) -> bool: ...
-    def stop(self) -> str: ...
+    def stop(self) -> Ended: ...
 
 @final
 class Feed:
@@ -473,7 +627,7 @@ class Feed:
     def take(self, parcel: bytes) -> bool: ...
     def begin_session(self) -> None: ...
     def compare(self, asked: int, came: int, answered: int, back: int) -> None: ...
-    def bridged(self) -> str: ...
+    def bridged(self) -> dict[str, Any]: ...
     def fail(self, reason: str) -> None: ...
     def is_over(self) -> bool: ...
 
@@ -482,7 +636,16 @@ class Copies:
     def next(self, timeout: float) -> tuple[str, bytes] | None: ...
     def is_over(self) -> bool: ...
 
-def serial_ports() -> str: ...
+@type_check_only
+class _Port(TypedDict):
+    place: str
+    kind: str
+    product: str | None
+    maker: str | None
+    serial: str | None
+    usb: tuple[int, int] | None
+
+def serial_ports() -> list[_Port]: ...
 def send(
     host: str,
     port: int,
@@ -491,22 +654,31 @@ def send(
     period_us: float,
     seconds: float,
     segment: bool,
-) -> str: ...
+) -> dict[str, Any]: ...
 
-# learn: parameters as JSON; a fit as (weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable,
-# refires), multipliers of a start, (rows of C and D with multipliers, targets of B with multipliers, pull)), and a
-# pending KeyboardInterrupt
+# learn: parameters as JSON
 
-_Fit = tuple[
-    NDArray[np.float64],
-    float,
-    list[float],
-    float,
-    tuple[int, int, bool, bool],
-    tuple[list[tuple[int, int]], int],
-    tuple[NDArray[np.int64], NDArray[np.float64]],
-    tuple[_Weighed, tuple[list[tuple[int, int]], NDArray[np.float64]], NDArray[np.float64]],
-]
+_Status: TypeAlias = Literal["solved", "feasible", "infeasible", "stopped"]
+_Engine: TypeAlias = Literal["native", "cone solver"]
+
+@final
+class ConeRFit:
+    """A fit: parts of l1, l2, B, C and D; multipliers of a start; the proof of the gap."""
+
+    weights: Final[NDArray[np.float64]]
+    objective: Final[float]
+    parts: Final[list[float]]
+    gap: Final[float]
+    status: Final[_Status]
+    engine: Final[_Engine]
+    rounds: Final[int]
+    rows: Final[int]
+    unreachable: Final[list[tuple[int, int]]]
+    refires: Final[int]
+    multipliers: Final[tuple[NDArray[np.int64], NDArray[np.float64]]]
+    proof: Final[_Proof]
+    raised: Final[BaseException | None]
+
 _Start = tuple[NDArray[np.float64], tuple[NDArray[np.int64], NDArray[np.float64]] | None]
 
 @final
@@ -522,9 +694,7 @@ class ConeRProblem:
     def silent_rows(self) -> int: ...
     @property
     def rows(self) -> int: ...
-    def fit(
-        self, parameters: str, silent: NDArray[np.float64], start: _Start | None, progress: Any
-    ) -> tuple[_Fit, BaseException | None]: ...
+    def fit(self, parameters: str, silent: NDArray[np.float64], start: _Start | None, progress: Any) -> ConeRFit: ...
 
 @final
 class OnlineConeR:
@@ -536,7 +706,7 @@ class OnlineConeR:
     def add(
         self, pattern: _Spikes, targets: NDArray[np.float64], silence: NDArray[np.float64] | None = None
     ) -> None: ...
-    def fit(self) -> tuple[_Fit, BaseException | None]: ...
+    def fit(self) -> ConeRFit: ...
 
 @final
 class STDP:
@@ -547,9 +717,17 @@ class STDP:
     def rest(self) -> None: ...
     def push(self, piece: _Spikes, learn: bool) -> NDArray[np.float64]: ...
 
-# rivals: parameters as JSON; training as (weights, right, best epoch, how it ended, a pending KeyboardInterrupt)
+# rivals: parameters as JSON
 
-_Trained = tuple[NDArray[np.float64], NDArray[np.float64], int, str, BaseException | None]
+@final
+class Trained:
+    """What training found: weights, the share of right patterns by epoch, how it ended, a pending KeyboardInterrupt."""
+
+    weights: Final[NDArray[np.float64]]
+    right: Final[NDArray[np.float64]]
+    best_epoch: Final[int]
+    ended: Final[str]
+    raised: Final[BaseException | None]
 
 def rule_names() -> list[str]: ...
 def fit_rival(
@@ -558,7 +736,7 @@ def fit_rival(
     targets: list[NDArray[np.float64]],
     start: NDArray[np.float64] | None,
     progress: Any,
-) -> _Trained: ...
+) -> Trained: ...
 def change_rival(
     parameters: str, weights: NDArray[np.float64], pattern: _Spikes, targets: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]: ...
@@ -566,7 +744,7 @@ def run_rival(parameters: str, weights: NDArray[np.float64], pattern: _Spikes) -
 def batch_names() -> list[str]: ...
 def fit_batch(
     name: str, parameters: str, patterns: list[_Spikes], targets: list[NDArray[np.float64]]
-) -> tuple[NDArray[np.float64], str]: ...
+) -> tuple[NDArray[np.float64], dict[str, Any]]: ...
 def run_batch(
     name: str, parameters: str, weights: NDArray[np.float64], results: str, pattern: _Spikes
 ) -> NDArray[np.float64]: ...
@@ -578,7 +756,7 @@ def fit_tempotron(
     labels: list[bool],
     start: NDArray[np.float64] | None,
     progress: Any,
-) -> _Trained: ...
+) -> Trained: ...
 def peak_tempotron(parameters: str, weights: NDArray[np.float64], pattern: _Spikes) -> tuple[float, float, float]: ...
 def change_tempotron(
     parameters: str, weights: NDArray[np.float64], pattern: _Spikes, label: bool
@@ -588,6 +766,37 @@ def change_tempotron(
 
 _Row = tuple[str, int, float]
 _Weighed = tuple[list[_Row], NDArray[np.float64]]
+#: multipliers that prove a gap: of rows, of B by target, of the l2 term by synapse
+_Proof = tuple[_Weighed, tuple[list[tuple[int, int]], NDArray[np.float64]], NDArray[np.float64]]
+
+@final
+class ConeXCertificate:
+    """Why no weights solve a problem: rows and multipliers, gap, whether it needs no margin, its explanation."""
+
+    rows: Final[_Weighed]
+    gap: Final[float]
+    at_all: Final[bool]
+    text: Final[str]
+
+@final
+class ConeXFit:
+    """A fit: parts of l1, l2 and B; the margin that holds and that was asked for; the proof of the gap."""
+
+    status: Final[_Status]
+    weights: Final[NDArray[np.float64]]
+    objective: Final[float]
+    parts: Final[list[float]]
+    gap: Final[float]
+    violation: Final[float]
+    margin: Final[tuple[float, float]]
+    asked: Final[tuple[float, float]]
+    engine: Final[_Engine]
+    rounds: Final[int]
+    held: Final[_Weighed]
+    certificate: Final[ConeXCertificate | None]
+    reason: Final[str | None]
+    proof: Final[_Proof | None]
+    raised: Final[BaseException | None]
 
 @final
 class ConeXProblem:
@@ -602,12 +811,7 @@ class ConeXProblem:
         start: list[Any],
         multipliers: NDArray[np.float64],
         progress: Any,
-    ) -> tuple[
-        tuple[Any, NDArray[np.float64], float, list[float], float, float],
-        tuple[list[tuple[float, float]], Any, int, _Weighed, tuple[_Weighed, float, bool, str] | None, str | None],
-        Any,
-        Any,
-    ]: ...
+    ) -> ConeXFit: ...
 
 # panel: its server, what that asks of Python, and the files of its page by their names below crates/taxel-panel/web
 
@@ -676,7 +880,7 @@ class LabelRequests(Protocol):
 
 @type_check_only
 class TrainingRequests(Protocol):
-    def train(self, recording: Path, out: Path) -> str: ...
+    def train(self, recording: Path, out: Path) -> tuple[str, str, list[str]]: ...
     def command(self, recording: Path, out: Path) -> str: ...
     def progress(self) -> str: ...
     def end(self) -> None: ...

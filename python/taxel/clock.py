@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import shown
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 
 __all__ = ["Clock", "doubt"]
@@ -52,7 +53,7 @@ class Clock:
     arrived_ns: NDArray[np.int64]
 
     @cached_property
-    def _lines(self) -> list[tuple[int, int, int, float]]:
+    def _lines(self) -> list[tuple[int, _core._ClockLine]]:
         lines = _core.clock_lines(self.board_us, self.arrived_ns)
         if not lines:
             raise ProblemError("clock: no datagram holds a time, so there is nothing to compare")
@@ -62,10 +63,10 @@ class Clock:
     def _knots(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """The midpoints of the intervals, us, and the host's time there, ns, extended by a second on either side."""
         lines = self._lines
-        middles = [line[0] for line in lines]
+        middles = [middle for middle, _ in lines]
         places = [middles[0] - 1_000_000, *middles, middles[-1] + 1_000_000]
         of = [lines[0], *lines, lines[-1]]
-        host = [_at(line, place) for line, place in zip(of, places, strict=True)]
+        host = [_at(line, place) for (_, line), place in zip(of, places, strict=True)]
         return np.array(places, np.int64), np.array(host, np.int64)
 
     @cached_property
@@ -78,7 +79,7 @@ class Clock:
         """How much faster the host's clock runs than the source's, parts per million."""
         lines = self._lines
         if len(lines) == 1:
-            return lines[0][3]
+            return lines[0][1]["drift_ppm"]
         own, host = self._knots
         return float((host[-2] - host[1]) / ((own[-2] - own[1]) * 1000) - 1) * 1e6
 
@@ -113,7 +114,7 @@ class Clock:
         since = t - own[k]
         slope = (host[k + 1] - host[k]) / (own[k + 1] - own[k]) - 1000.0
         if self._is_one_line:
-            slope = np.full(np.shape(k), self._lines[0][3] * 1e-3)
+            slope = np.full(np.shape(k), self._lines[0][1]["drift_ppm"] * 1e-3)
         return host[k] + since * 1000 + np.rint(since * slope).astype(np.int64)
 
     @property
@@ -182,11 +183,10 @@ def _whole(name: str, values: Any, unit: str) -> NDArray[np.int64]:
     except (ValueError, TypeError, OverflowError):
         times = np.array(None)
     if times.size and (times.dtype.kind not in "iu" or times.max() > np.iinfo(np.int64).max):
-        raise ProblemError(f"{name} is {shown(values)}: must be whole {unit}")
+        raise refused(name, f" is {shown(values)}: must be whole {unit}")
     return times.astype(np.int64)
 
 
-def _at(line: tuple[int, int, int, float], own_us: int) -> int:
-    _, place, host, drift = line
-    since = own_us - place
-    return host + since * 1000 + round(since * drift * 1e-3)
+def _at(line: _core._ClockLine, own_us: int) -> int:
+    since = own_us - line["board_us"]
+    return line["host_ns"] + since * 1000 + round(since * line["drift_ppm"] * 1e-3)

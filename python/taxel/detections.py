@@ -18,6 +18,7 @@ from taxel._base.arguments import bare, column, fields, instance, nth, several, 
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, own, own_column
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import escaped
@@ -157,7 +158,7 @@ class Detections(Columns):
         except (TypeError, ValueError) as error:
             raise ProblemError(f"label: {error}") from None
         if labels.ndim != 1 or labels.dtype.kind != "U":
-            raise ProblemError(f"label is {shown(label)}: must be a list of texts")
+            raise refused("label", f" is {shown(label)}: must be a list of texts")
         self.label: NDArray[np.str_] = own(labels, label)
         self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
         self.known: NDArray[np.int64] = own_column("known", known, np.int64, "us")
@@ -167,7 +168,7 @@ class Detections(Columns):
             None if reported is None else own_column("reported", reported, np.int64, "us")
         )
         if self.reported is not None and len(self.reported) != len(labels):
-            raise ProblemError(f"reported has {len(self.reported)} entries: must be {len(labels)}, one a detection")
+            raise refused("reported", f" has {len(self.reported)} entries: must be {len(labels)}, one a detection")
         marks = frozen(np.zeros(len(labels), np.bool_)) if repaired is None else repaired
         self.repaired: NDArray[np.bool_] = own_column("repaired", marks, np.bool_)
         _core.check_detections(self._parts())
@@ -416,7 +417,7 @@ class Detections(Columns):
         """
         notes = getattr(events, "array_annotations", None)
         if notes is None or "known" not in notes:
-            raise ProblemError(f"events is {shown(events)}: must be a neo.Event with the array annotation known (us)")
+            raise refused("events", f" is {shown(events)}: must be a neo.Event with the array annotation known (us)")
         t = np.rint(events.rescale("us").magnitude).astype(np.int64)
         return cls._of(
             events.labels, t, notes["known"], notes.get("slope"), notes.get("reported"), notes.get(_REPAIRED)
@@ -469,5 +470,5 @@ def _slopes(slope: ArrayLike) -> NDArray[np.float64]:
     wrong = np.flatnonzero(~np.isfinite(values) & ~none)
     if len(wrong):
         k = int(wrong[0])
-        raise ProblemError(f"slope[{k}] is {values[k]}: must be finite, or None where it is not known")
+        raise refused("slope", f"[{k}] is {values[k]}: must be finite, or None where it is not known")
     return values

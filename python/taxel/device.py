@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import select
@@ -19,8 +18,9 @@ from typing import Self, TypeVar
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, number, shown, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
-from taxel._core import DeviceError, ProblemError
+from taxel._core import DeviceError
 from taxel.array import Array
 from taxel.wire import Command, Registers
 
@@ -97,8 +97,7 @@ def ports() -> list[Port]:
     >>> all(port.place for port in ports())
     True
     """
-    records = json.loads(_core.serial_ports())
-    return [Port(**{**port, "usb": None if port["usb"] is None else tuple(port["usb"])}) for port in records]
+    return [Port(**port) for port in _core.serial_ports()]
 
 
 @dataclass(frozen=True)
@@ -166,9 +165,9 @@ class Cable:
         self.place = text("place", place)
         self.timeout = number("timeout", timeout)
         if not 0 < self.timeout <= 3600:
-            raise ProblemError(f"timeout is {shown(timeout)}: must lie between 0 and 3600 s")
+            raise refused("timeout", f" is {shown(timeout)}: must be from 0 to 3600")
         if whole("baud", baud) not in _SPEEDS:
-            raise ProblemError(f"baud is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
+            raise refused("baud", f" is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
         self.faults: dict[str, int] = {}
         self.resets = 0
         self._recent: deque[str] = deque(maxlen=_RECENT)
@@ -196,7 +195,7 @@ class Cable:
             except OSError as error:
                 raise OSError(error.errno, error.strerror or str(error), f"TCP {place}") from None
         else:
-            raise ProblemError(f"place is {shown(place)}: must be a serial device (/dev/ttyUSB0) or host:port")
+            raise refused("place", f" is {shown(place)}: must be a serial device (/dev/ttyUSB0) or host:port")
         os.set_blocking(self._file, False)
 
     def command(self, command: Command) -> int:

@@ -86,7 +86,7 @@ def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path):
             assert feed.take(data)
     assert "parcel" in kinds
     assert feed.take(b"no parcel")
-    came = json.loads(far.stop())["counters"]
+    came = far.stop().counters
     assert came["decoded"] == sent["decoded"] > 0
     bridged = came["bridged"]
     assert (bridged["missing"], bridged["dropped"], bridged["refused"], bridged["ended"]) == (0, 0, 1, True)

@@ -114,7 +114,7 @@ def test_the_spread_is_numpys(values: list[float]) -> None:
         ({1: [5]}, 50, "1 is not a label"),
         ({"a": None}, 50, "truth"),
         ([1, 2], 50, "truth has no labels, found has a, b"),
-        ({"a": [1]}, -1, "window_ms is -1: must lie between 0 and 3600000"),
+        ({"a": [1]}, -1, "window_ms is -1: must be from 0 to 3600000"),
         ({"a": [1]}, math.nan, "window_ms is nan"),
         ({"a": [1]}, math.inf, "window_ms is inf"),
         ({"a": [1]}, "wide", "window_ms"),

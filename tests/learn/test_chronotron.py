@@ -1,7 +1,6 @@
 """E-learning and I-learning against their formulas."""
 
 import itertools
-import json
 
 import numpy as np
 import pytest
@@ -65,7 +64,7 @@ def test_a_late_spike_raises_weights_and_an_early_one_lowers_them():
 
 def neuron_of(learner):
     """The neuron as the compiled part has it, with all that was left out."""
-    return json.loads(taxel._core.check_parameters("chronotron", learner._json()))["neuron"]
+    return taxel._core.check_parameters("chronotron", learner._json())["neuron"]
 
 
 def test_time_constants_are_the_membranes_where_they_are_left_out():

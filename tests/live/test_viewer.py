@@ -416,8 +416,8 @@ def test_what_no_viewer_is_is_refused(to: Any) -> None:
 def test_nonsense_is_refused_by_name(tmp_path: Path) -> None:
     taxel.convert(presses(1), tmp_path / "one.mcap")
     for name, value, said in (
-        ("speed", 0.0, "must lie in 0.001 to 100"),
-        ("rate_hz", 61.0, "must lie in 1 to 60"),
+        ("speed", 0.0, "must be from 0.001 to 100"),
+        ("rate_hz", 61.0, "must be from 1 to 60"),
         ("encoder", "fa1", "encoder is 'fa1'"),
     ):
         with pytest.raises(ProblemError, match=said):

@@ -254,7 +254,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
         (folder, f"{folder}: holds no recording; name a file, or one of its folders"),
         (
             folder / "palm.npy",
-            "layout.toml, or one given by --layout, or --rate-hz HZ, says what it is (docs/files.md):",
+            "layout.toml, or one given as layout, or rate_hz, says what it is (docs/files.md):",
         ),
     ):
         code, _, errors = call(capsys, "view", words, "--no-open", "--seconds", 1)

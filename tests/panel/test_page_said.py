@@ -83,6 +83,7 @@ def test_options_that_the_advice_names_are_given_in_a_shell(chromium: Any, recor
     labelled(recording)
     text = "held out: contact, neuron: 3 of 5\nmore labels help most, else --search (about 60 s) or --recipe gait_plate"
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": text}
+    trained |= {"next": "taxel detect RECORDING", "options": ["--search", "--recipe"]}
     detections = {"train": [trained, {"type": "done"}], "read_out": [{"type": "done"}]}
     with answered(chromium, recording, detections) as page:
         shows(page, "train-shell", r"^The same in a shell: taxel train")
@@ -100,6 +101,7 @@ def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, ch
     table.write_text("label,t_us\n" + "".join(f"contact,{200_000 * k}\n" for k in range(1, count + 1)))
     printed = "\n".join(f"held out: contact, neuron: {k} of 5 found, 0 missed, 0 false" for k in range(30))
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": printed}
+    trained |= {"next": "taxel detect RECORDING", "options": []}
     found = [{"label": "contact", "t_us": 10**5 * k, "known_us": 10**5 * k} for k in range(40)]
     detected = {"type": "detections", "source": recording.name, "readout": "walk.readout.json", "labels": ["contact"]}
     answers = {"train": [trained, {"type": "done"}], "read_out": [{**detected, "detections": found}, {"type": "done"}]}
@@ -128,22 +130,24 @@ for done in range(2):
     time.sleep(0.6)
 while not pathlib.Path({str(end)!r}).exists():
     time.sleep(0.02)
-print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": {{"warnings": ["3 are alone"]}}}}))
+result = {{"warnings": ["3 are alone"], "options": ["--search"]}}
+print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": result}}))
 """
     )
     command.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(command))
     handler = TrainingRequests(Opening(), ShownFiles())
     assert handler.progress() == ""
-    printed: list[str] = []
+    printed: list[tuple[str, str, list[str]]] = []
     training = threading.Thread(target=lambda: printed.append(handler.train(tmp_path / "a.npz", tmp_path / "a.json")))
     training.start()
     until(lambda: re.fullmatch(r"fold 2 of 5, after \d+ s; about \d+ s in all", handler.progress()), "its estimate")
     end.touch()
     training.join()
-    [*lines, last] = printed[0].splitlines()
-    assert (lines[0], last) == ("held out: all found", "warning: 3 are alone")
-    assert lines[2].startswith("written to a.json; next: taxel detect RECORDING --readout ")
+    [(text, following, options)] = printed
+    assert text.splitlines() == ["held out: all found", "warning: 3 are alone"]
+    assert following.startswith("taxel detect RECORDING --readout ")
+    assert options == ["--search"]
     assert handler.progress() == ""
 
 

@@ -57,7 +57,7 @@ def record(
     writer.note(at + 5_000_000, 5000, "left heel")
     writer.note(at + 6_000_000, None, "somebody coughed")
     writer.detection(at + 7_000_000, "contact", 6000, 6192, 1.5, False)
-    writer.registers(at, json.dumps(json.loads(_core.registers_preset("5.2 kHz"))))
+    writer.registers(at, json.dumps(_core.registers_preset("5.2 kHz")))
     writer.picture(at, 0, 64, np.full(4096, 75, np.uint16))
     pressed = np.full(4096, 75, np.uint16)
     pressed[:2] = 135, 105

@@ -57,7 +57,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if number == 3:
             writer.note(at(20), 9, "toe")
             writer.detection(at(21), "contact", 10, 20, 1.5, False)
-            writer.registers(at(22), _core.registers_preset("5.2 kHz"))
+            writer.registers(at(22), json.dumps(_core.registers_preset("5.2 kHz")))
             writer.board_change(at(23), json.dumps({"t_us": 30, "change": "reset"}))
             writer.counts(at(24), json.dumps({"received": 4, "recorded": 4}))
             pause()

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -573,8 +575,8 @@ def test_times_after_a_damaged_stamp_are_doubtful(seed: int, tmp_path: Path) -> 
     assert host.events.t[late].min() > moved
     # The recorder does not know the time, and takes the file's verdict.
     held = recording.verdict.to_dict() | {"doubtful_after_us": None, "text": "as recorded", "parts": []}
-    ended = summary_of(json.dumps({"counters": {}, "verdict": held, "path": str(path), "tare": None}))
-    assert ended.verdict.to_dict() == recording.verdict.to_dict()
+    ended: Any = SimpleNamespace(counters={}, verdict=held, path=path, tare=None)
+    assert summary_of(ended).verdict.to_dict() == recording.verdict.to_dict()
     # All that are wrong come after that time, and it is no earlier than the datagram before.
     assert recording.events.t[late].min() > after
     assert after >= recording.events.t[10 * (wrong - 1)]

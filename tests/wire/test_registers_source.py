@@ -66,7 +66,7 @@ def settings(draw):
 
 def by_rust(rows, columns, values):
     array = taxel.Array(rows, columns)
-    base = json.loads(taxel._core.registers_preset(PRESETS[0])) | values
+    base = taxel._core.registers_preset(PRESETS[0]) | values
     try:
         given = list(values.items())
         taxel._core.registers_with(json.dumps(base), [(n, v) for n, v in given if n != "channels"], array._parts())
@@ -112,7 +112,7 @@ def test_the_rules_agree_in_rust_and_in_the_panel(seed, tmp_path):
 
 
 def _warnings(rows, columns, values):
-    held = json.loads(taxel._core.registers_preset(PRESETS[0])) | values
+    held = taxel._core.registers_preset(PRESETS[0]) | values
     return taxel._core.registers_check(json.dumps(held), taxel.Array(rows, columns)._parts())
 
 

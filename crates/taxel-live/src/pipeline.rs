@@ -146,11 +146,11 @@ impl Live {
     ) -> Result<Self> {
         for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
             if !(frames.is_finite() && frames >= 0.0) {
-                return Err(taxel_core::problem!("{name} is {frames}: must be 0 or more").into());
+                return Err(taxel_core::problem!(name; " is {frames}: must be 0 or more and finite").into());
             }
         }
         if options.readout_events == 0 {
-            return Err(taxel_core::problem!("readout_events is 0: must be 1 or more").into());
+            return Err(taxel_core::problem!("readout_events"; " is 0: must be 1 or more").into());
         }
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
@@ -159,7 +159,7 @@ impl Live {
         }
         match &readout {
             ReadoutSetup::Taring(stretch_us, _) if *stretch_us <= 0 => {
-                return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
+                return Err(taxel_core::problem!("tare"; " of {stretch_us} us: must be above 0").into());
             }
             ReadoutSetup::Taring(_, readout) => readout.check()?,
             ReadoutSetup::None | ReadoutSetup::Reading(_) => {}

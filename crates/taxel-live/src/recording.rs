@@ -64,6 +64,38 @@ pub struct Header {
     /// The array that those registers drive, if the recording contains a part of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub driven: Option<Array>,
+    /// What a conversion states of the recording that it was made of.
+    #[serde(flatten)]
+    pub conversion: Conversion,
+    /// How the datagrams are decoded.
+    #[serde(flatten)]
+    pub decoding: Decoding,
+    /// The origin of the datagrams: "udp 0.0.0.0:5208", a file's name, and so on.
+    #[serde(default)]
+    pub source: String,
+    /// The host's clock when the recording began, ns since 1970.
+    #[serde(default)]
+    pub started_ns: i64,
+    /// Name of this source among the sources of its file.
+    #[serde(default = "board", skip_serializing_if = "is_board")]
+    pub name: String,
+    /// Where the sensor lies.
+    #[serde(flatten)]
+    pub placement: Placement,
+    /// For a stream of numbers, the content of its lines; none for a board.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stream: Option<Stream>,
+    /// For a source of pictures, their unit and more; none for a board.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pictures: Option<PictureSource>,
+    /// The other sources of the file: pictures on the same clock, any other with a clock of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<Header>,
+}
+
+/// What a conversion states of the recording that it was made of.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Conversion {
     /// What conversions to this file left out, one line each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<String>,
@@ -76,6 +108,11 @@ pub struct Header {
     /// The counts of that recording, by cause, as its reader gives them.
     #[serde(default, skip_serializing_if = "serde_json::Map::is_empty")]
     pub counts: serde_json::Map<String, serde_json::Value>,
+}
+
+/// How the datagrams of a recording are decoded.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Decoding {
     /// The numbers of events that a state gave, in a file made of events whose datagrams do not state it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<u64>,
@@ -86,30 +123,17 @@ pub struct Header {
     /// stamp; 0 for a recording from a board.
     #[serde(default)]
     pub origin_us: i64,
-    /// The origin of the datagrams: "udp 0.0.0.0:5208", a file's name, and so on.
-    #[serde(default)]
-    pub source: String,
-    /// The host's clock when the recording began, ns since 1970.
-    #[serde(default)]
-    pub started_ns: i64,
-    /// Name of this source among the sources of its file.
-    #[serde(default = "board", skip_serializing_if = "is_board")]
-    pub name: String,
+}
+
+/// Where a sensor lies.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Placement {
     /// The side of the body that the sensor is of, "left" or "right"; empty if it is unknown.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub side: String,
     /// Where on the sensor the heel lies, "top" or "bottom"; empty if it is unknown.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub heel: String,
-    /// For a stream of numbers, the content of its lines; none for a board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stream: Option<Stream>,
-    /// For a source of pictures, their unit and more; none for a board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pictures: Option<PictureSource>,
-    /// The other sources of the file: pictures on the same clock, any other with a clock of its own.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub sources: Vec<Header>,
 }
 
 /// The default name of a source.
@@ -150,7 +174,7 @@ impl std::str::FromStr for Compression {
             "none" => Ok(Self::None),
             "lz4" => Ok(Self::Lz4),
             "zstd" => Ok(Self::Zstd),
-            _ => Err(taxel_core::problem!("compression is {name:?}: must be none, lz4 or zstd")),
+            _ => Err(taxel_core::problem!("compression"; " is {name:?}: must be none, lz4 or zstd")),
         }
     }
 }
@@ -176,8 +200,8 @@ impl Header {
         if self.array.len() > limits::TAXELS {
             return Err(problem!("a sensor of {rows} x {columns} taxels; at most {} are read", limits::TAXELS));
         }
-        if !(-limits::TIME_US..=limits::TIME_US).contains(&self.origin_us) {
-            return Err(problem!("origin_us is {}: must lie within 142 years of 0", self.origin_us));
+        if !(-limits::TIME_US..=limits::TIME_US).contains(&self.decoding.origin_us) {
+            return Err(problem!("origin_us"; " is {}: must lie within 142 years of 0", self.decoding.origin_us));
         }
         if let Some(stream) = &self.stream {
             stream.check(&self.name)?;
@@ -220,18 +244,12 @@ impl Header {
             array,
             registers,
             driven: None,
-            lost: vec![],
-            remarks: vec![],
-            converted: None,
-            counts: serde_json::Map::new(),
-            repaired: vec![],
-            difference: false,
-            origin_us: 0,
+            conversion: Conversion::default(),
+            decoding: Decoding::default(),
             source,
             started_ns,
             name: board(),
-            side: String::new(),
-            heel: String::new(),
+            placement: Placement::default(),
             stream: None,
             pictures: None,
             sources: vec![],

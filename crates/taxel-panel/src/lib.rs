@@ -56,7 +56,7 @@ pub use array_state::RestSource;
 pub use handler::{
     BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, LabelConflict, LabelEdit, LabelRequests,
     LabelRow, LabelTable, Opening, PicturesRead, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
-    TrainingRequests, UnhealthyTaxels, UserPreset, UserPresets,
+    TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
 pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource};

@@ -178,8 +178,17 @@ pub(super) enum Message {
         /// The folder's readouts and plain rules (`.json`).
         readouts: Vec<String>,
     },
-    /// A training has ended; `text` is what it printed.
-    Trained { name: String, readout: String, text: String },
+    /// A training has ended.
+    Trained {
+        name: String,
+        readout: String,
+        /// How well the readout detects, in words.
+        text: String,
+        /// The command that detects by it in a shell.
+        next: String,
+        /// Options of `taxel train` that may help.
+        options: Vec<String>,
+    },
     /// When asked: the latest progress of the training that runs, first after 2 s; empty before, and where none
     /// runs.
     Training { text: String },

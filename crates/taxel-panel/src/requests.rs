@@ -9,7 +9,7 @@ use taxel_live::locked::lock;
 use taxel_live::ports::ports;
 
 use super::clients::Broadcast;
-use super::handler::{Cut, Detected, LabelRow};
+use super::handler::{Cut, Detected, LabelRow, TrainingResult};
 use super::hub::Hub;
 use super::indexed::{Indexed, Shown};
 use super::labels::LabelChange;
@@ -187,9 +187,10 @@ async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
     let name = shown.ok_or("train: open a recording with labels first")?.name.clone();
     let readout = readout_of(&name);
     let (recording, out) = (hub.folder.file(&name)?, hub.folder.file(&readout)?);
-    let text = hub.ask(move |handlers| handlers.training.train(&recording, &out)).await?;
+    let TrainingResult { text, next, options } =
+        hub.ask(move |handlers| handlers.training.train(&recording, &out)).await?;
     hub.clients.send_message(&hub.recordings_message().await);
-    Ok(Message::Trained { name, readout, text })
+    Ok(Message::Trained { name, readout, text, next, options })
 }
 
 /// The name of the readout that is trained on a recording.

@@ -417,12 +417,17 @@ export interface Recordings {
   readouts: string[];
 }
 
-/** A training has ended; `text` is what it printed. */
+/** A training has ended. */
 export interface Trained {
   type: "trained";
   name: string;
   readout: string;
+  /** How well the readout detects, in words. */
   text: string;
+  /** The command that detects by it in a shell. */
+  next: string;
+  /** Options of `taxel train` that may help. */
+  options: string[];
 }
 
 /** When asked: the latest progress of the training that runs, first after 2 s; empty before, and where none runs. */

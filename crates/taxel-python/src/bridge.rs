@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use serde_json::json;
+use serde_json::{Value, json};
 use taxel_core::problem;
 use taxel_live::capture::{self, Receiver, ReceiverOptions};
 use taxel_live::host_clock::RoundTrip;
@@ -13,10 +13,11 @@ use taxel_live::pipeline::{Copied, Copies as PipelineCopies};
 
 use crate::enter::{Shared, enter};
 use crate::errors::ProblemError;
+use crate::parameters::Plain;
 
 /// The entrance for parcels of another computer.
 #[pyclass(frozen)]
-pub(crate) struct Feed {
+pub struct Feed {
     feed: capture::Feed,
     /// `None` once a pipeline has it.
     receiver: Mutex<Option<Receiver>>,
@@ -54,9 +55,9 @@ impl Feed {
         self.feed.compare(RoundTrip { asked, came, answered, back });
     }
 
-    /// Counts of what came and what was lost: JSON.
-    fn bridged(&self) -> String {
-        json!(self.feed.bridged()).to_string()
+    /// Counts of what came and what was lost.
+    fn bridged(&self) -> Plain<Value> {
+        Plain(json!(self.feed.bridged()))
     }
 
     /// Ends the pipeline because of an error.
@@ -72,7 +73,7 @@ impl Feed {
 
 /// The receiving end of a pipeline's copies.
 #[pyclass(frozen)]
-pub(crate) struct Copies(Shared<PipelineCopies>);
+pub struct Copies(Shared<PipelineCopies>);
 
 impl Copies {
     pub(crate) fn new(copies: PipelineCopies) -> Self {
@@ -98,9 +99,4 @@ impl Copies {
     fn is_over(&self, py: Python<'_>) -> bool {
         self.0.with(py, |copies| copies.is_over())
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Feed>()?;
-    module.add_class::<Copies>()
 }

@@ -9,28 +9,29 @@ use taxel_core::{Error, Result, reading};
 use crate::convert::{array, slice};
 use crate::enter::enter;
 use crate::errors::core;
+use crate::parameters::Plain;
 
 fn law(json: &str) -> Result<Sensor> {
-    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::Scene(unfit.of("law")))?;
+    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::scene(unfit.of("law")))?;
     sensor.check()?;
     Ok(sensor)
 }
 
-/// Gives all parameters of a law as JSON, checked.
+/// Gives all parameters of a law, checked.
 #[pyfunction]
-fn check_law(json: &str) -> PyResult<String> {
-    Ok(serde_json::to_string(&law(json).map_err(core)?).unwrap_or_default())
+pub fn check_law(json: &str) -> PyResult<Plain<Sensor>> {
+    law(json).map(Plain).map_err(core)
 }
 
 /// Gives what a taxel without spread reads at rest, ticks.
 #[pyfunction]
-fn law_rest(json: &str, ramp: f64) -> PyResult<f64> {
+pub fn law_rest(json: &str, ramp: f64) -> PyResult<f64> {
     Ok(Ramp::rc(ramp).ticks(law(json).map_err(core)?.volts(0.0)))
 }
 
 /// Gives forces in N of readings in ticks, each with its rest; or, `back`, the readings of forces.
 #[pyfunction]
-fn law_of<'py>(
+pub fn law_of<'py>(
     py: Python<'py>,
     json: &str,
     ramp: f64,
@@ -47,10 +48,4 @@ fn law_of<'py>(
         Ok(given.iter().zip(rest).map(one).collect())
     })?;
     Ok(array(py, out))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_law, module)?)?;
-    module.add_function(wrap_pyfunction!(law_rest, module)?)?;
-    module.add_function(wrap_pyfunction!(law_of, module)?)
 }

@@ -5,17 +5,30 @@ use pyo3::prelude::*;
 use taxel_core::circuit::{Adaptive, Converter, Divider, Fabric, Scan, VirtualGround};
 use taxel_core::{Result, Stop};
 
-use crate::convert::{array, slice};
+use crate::convert::{Column, array, column, slice};
 use crate::enter::enter;
 use crate::parameters::parsed;
 
 type Values<'py> = Bound<'py, PyArray1<f64>>;
-/// Times, us; voltages of the line, the comparator's input and the ramp, V; the comparator's output.
-type TraceOut<'py> = (Values<'py>, Values<'py>, Values<'py>, Values<'py>, Bound<'py, PyArray1<bool>>);
+
+/// The signals of one comparator, by name.
+#[derive(IntoPyObject)]
+pub(crate) struct TraceOut<'py> {
+    t_us: Values<'py>,
+    line_v: Values<'py>,
+    input_v: Values<'py>,
+    ramp_v: Values<'py>,
+    high: Bound<'py, PyArray1<bool>>,
+}
 
 /// Gives conductances in uS of forces in N; or, `back`, forces of conductances.
 #[pyfunction]
-fn fabric<'py>(py: Python<'py>, json: &str, given: PyReadonlyArray1<'py, f64>, back: bool) -> PyResult<Values<'py>> {
+pub fn fabric<'py>(
+    py: Python<'py>,
+    json: &str,
+    given: PyReadonlyArray1<'py, f64>,
+    back: bool,
+) -> PyResult<Values<'py>> {
     let (fabric, given): (Fabric, _) = (parsed("Fabric", json)?, slice("given", &given)?);
     let one = |&value: &f64| if back { fabric.force_n(value) } else { fabric.conductance_us(value) };
     Ok(array(py, given.iter().map(one).collect()))
@@ -52,7 +65,7 @@ impl Lines {
 
 /// Gives the sense lines' voltages of frame after frame of conductances in uS.
 #[pyfunction]
-fn circuit_volts<'py>(
+pub fn circuit_volts<'py>(
     py: Python<'py>,
     kind: &str,
     json: &str,
@@ -81,7 +94,7 @@ fn circuit_volts<'py>(
 
 /// Gives the voltage that each conductance would make by itself.
 #[pyfunction]
-fn circuit_volts_alone<'py>(
+pub fn circuit_volts_alone<'py>(
     py: Python<'py>,
     kind: &str,
     json: &str,
@@ -93,7 +106,7 @@ fn circuit_volts_alone<'py>(
 
 /// Gives ticks of frame after frame of voltages; not a number where a comparator had not returned.
 #[pyfunction]
-fn converter_ticks<'py>(
+pub fn converter_ticks<'py>(
     py: Python<'py>,
     json: &str,
     shape: (usize, usize),
@@ -116,7 +129,7 @@ fn converter_ticks<'py>(
 
 /// Gives where the ramp stands after ticks, V; or, `back`, when it passes voltages.
 #[pyfunction]
-fn converter_ramp<'py>(
+pub fn converter_ramp<'py>(
     py: Python<'py>,
     json: &str,
     given: PyReadonlyArray1<'py, f64>,
@@ -129,7 +142,7 @@ fn converter_ramp<'py>(
 
 /// Gives the signals of one comparator, as an oscilloscope would show them.
 #[pyfunction]
-fn converter_trace<'py>(
+pub fn converter_trace<'py>(
     py: Python<'py>,
     json: &str,
     line_v: Vec<f64>,
@@ -140,32 +153,30 @@ fn converter_trace<'py>(
     let seen = enter(py, |_| converter.trace(&line_v, every_us, stop_us))?;
     let of = |value: fn(&taxel_core::circuit::Moment) -> f64| array(py, seen.iter().map(value).collect());
     let high = array(py, seen.iter().map(|m| m.high).collect());
-    Ok((of(|m| m.t_us), of(|m| m.line_v), of(|m| m.input_v), of(|m| m.ramp_v), high))
+    let (t_us, line_v, input_v, ramp_v) = (of(|m| m.t_us), of(|m| m.line_v), of(|m| m.input_v), of(|m| m.ramp_v));
+    Ok(TraceOut { t_us, line_v, input_v, ramp_v, high })
 }
 
-/// us and ticks of each frame; ticks and V of all readings.
-type ConvertedOut<'py> = (Values<'py>, Bound<'py, PyArray1<u32>>, Values<'py>, Values<'py>);
+/// us and ramp in ticks of each frame; ticks and V of all readings.
+#[pyclass(frozen, get_all)]
+pub struct Converted {
+    t_us: Column<f64>,
+    ramp: Column<u32>,
+    ticks: Column<f64>,
+    volts: Column<f64>,
+}
 
 /// Converts voltages that go on, frame after frame, by a ramp that adapts.
 #[pyfunction]
-fn adaptive_convert<'py>(
-    py: Python<'py>,
+pub fn adaptive_convert(
+    py: Python<'_>,
     json: &str,
     shape: (usize, usize),
-    volts: PyReadonlyArray1<'py, f64>,
+    volts: PyReadonlyArray1<'_, f64>,
     period_us: f64,
-) -> PyResult<ConvertedOut<'py>> {
+) -> PyResult<Converted> {
     let (adaptive, volts): (Adaptive, _) = (parsed("AdaptiveRamp", json)?, slice("volts", &volts)?);
     let out = enter(py, |stop| adaptive.convert(volts, period_us, shape.0, shape.1, stop))?;
-    Ok((array(py, out.t_us), array(py, out.ramp), array(py, out.ticks), array(py, out.volts)))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(fabric, module)?)?;
-    module.add_function(wrap_pyfunction!(circuit_volts, module)?)?;
-    module.add_function(wrap_pyfunction!(circuit_volts_alone, module)?)?;
-    module.add_function(wrap_pyfunction!(converter_ticks, module)?)?;
-    module.add_function(wrap_pyfunction!(converter_ramp, module)?)?;
-    module.add_function(wrap_pyfunction!(converter_trace, module)?)?;
-    module.add_function(wrap_pyfunction!(adaptive_convert, module)?)
+    let (t_us, ramp) = (column(py, out.t_us), column(py, out.ramp));
+    Ok(Converted { t_us, ramp, ticks: column(py, out.ticks), volts: column(py, out.volts) })
 }

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use taxel_core::learn::{self as core_learn, ConeX, ConeXFit, Fit, GapMultipliers, Left, Margin, Round, Row, Stated};
 use taxel_core::problem;
 
-use crate::convert::{SpikesIn, array, slice, to_spikes};
+use crate::convert::{Column, SpikesIn, array, column, slice, to_patterns};
 use crate::enter::{enter, enter_keeping};
 use crate::errors::core;
 use crate::parameters::parsed;
@@ -46,40 +46,61 @@ fn from_row(row: Row) -> Name {
 }
 
 /// Rows and their multipliers.
-pub(crate) type Weighed<'py> = (Vec<Name>, Bound<'py, PyArray1<f64>>);
+pub(crate) type Weighed = (Vec<Name>, Column<f64>);
 
-pub(crate) fn weighed<'py>(py: Python<'py>, rows: &[(Row, f64)]) -> Weighed<'py> {
-    (rows.iter().map(|r| from_row(r.0)).collect(), array(py, rows.iter().map(|r| r.1).collect()))
+pub(crate) fn weighed(py: Python<'_>, rows: &[(Row, f64)]) -> Weighed {
+    (rows.iter().map(|r| from_row(r.0)).collect(), column(py, rows.iter().map(|r| r.1).collect()))
 }
 
-/// The proof of a gap as Python gets it: multipliers of rows, of B by target, of the l2 term by synapse.
-pub(crate) type ProofOut<'py> =
-    (Weighed<'py>, (Vec<(usize, usize)>, Bound<'py, PyArray1<f64>>), Bound<'py, PyArray1<f64>>);
+/// The proof of a gap: multipliers of rows, of B by target, of the l2 term by synapse.
+pub(crate) type ProofOut = (Weighed, (Vec<(usize, usize)>, Column<f64>), Column<f64>);
 
-pub(crate) fn proof_out(py: Python<'_>, proof: GapMultipliers) -> ProofOut<'_> {
+pub(crate) fn proof_out(py: Python<'_>, proof: GapMultipliers) -> ProofOut {
     let (behind, slopes): (Vec<_>, Vec<_>) = proof.behind.into_iter().unzip();
-    (weighed(py, &proof.rows), (behind, array(py, slopes)), array(py, proof.pull))
+    (weighed(py, &proof.rows), (behind, column(py, slopes)), column(py, proof.pull))
 }
 
-/// A certificate as Python gets it: rows and multipliers, gap, whether it needs no margin, its explanation.
-type CertificateOut<'py> = (Weighed<'py>, f64, bool, String);
+/// Why no weights solve a problem.
+#[pyclass(frozen, get_all)]
+pub struct ConeXCertificate {
+    rows: Weighed,
+    gap: f64,
+    /// Whether it needs no margin.
+    at_all: bool,
+    text: String,
+}
 
-/// A fit as Python gets it: status, weights, objective, parts, gap, violation, margins that hold and were asked for, engine, rounds,
-/// held rows, certificate, why it is stopped; the multipliers that prove its gap; and the exception of a signal that
-/// came meanwhile.
-type FitOut<'py> = (
-    (&'static str, Bound<'py, PyArray1<f64>>, f64, [f64; 3], f64, f64),
-    ([(f64, f64); 2], &'static str, usize, Weighed<'py>, Option<CertificateOut<'py>>, Option<String>),
-    Option<ProofOut<'py>>,
-    Option<Py<PyAny>>,
-);
+/// A fit.
+#[pyclass(frozen, get_all, name = "ConeXFit")]
+pub struct ConeXFitOut {
+    status: &'static str,
+    weights: Column<f64>,
+    objective: f64,
+    /// Of l1, l2 and B.
+    parts: [f64; 3],
+    gap: f64,
+    violation: f64,
+    /// The margin that holds, and the one that was asked for.
+    margin: (f64, f64),
+    asked: (f64, f64),
+    engine: &'static str,
+    rounds: usize,
+    held: Weighed,
+    certificate: Option<Py<ConeXCertificate>>,
+    /// Why it is stopped.
+    reason: Option<String>,
+    /// The multipliers that prove its gap.
+    proof: Option<ProofOut>,
+    /// The exception of a signal that came meanwhile.
+    raised: Option<Py<PyAny>>,
+}
 
 /// Coefficients and limit of a row.
 type RowOut<'py> = (Bound<'py, PyArray1<f64>>, f64);
 
 /// A stated problem.
 #[pyclass(frozen)]
-struct ConeXProblem {
+pub struct ConeXProblem {
     problem: core_learn::ConeXProblem,
     max_seconds: Option<f64>,
 }
@@ -90,11 +111,11 @@ impl ConeXProblem {
     fn new(
         py: Python<'_>,
         parameters: &str,
-        patterns: Vec<SpikesIn<'_>>,
+        patterns: Vec<SpikesIn>,
         targets: Vec<PyReadonlyArray1<'_, f64>>,
     ) -> PyResult<Self> {
         let parameters = to_cone_x(parameters)?;
-        let patterns = patterns.into_iter().map(to_spikes).collect::<PyResult<Vec<_>>>()?;
+        let patterns = to_patterns(patterns);
         let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
         let problem = enter(py, |stop| core_learn::ConeXProblem::new(&parameters, &patterns, &targets, stop))?;
         Ok(Self { problem, max_seconds: parameters.max_seconds })
@@ -131,17 +152,17 @@ impl ConeXProblem {
     }
 
     #[pyo3(signature = (start, multipliers, progress))]
-    fn fit<'py>(
+    fn fit(
         &self,
-        py: Python<'py>,
+        py: Python<'_>,
         start: Vec<Name>,
-        multipliers: PyReadonlyArray1<'py, f64>,
+        multipliers: PyReadonlyArray1<'_, f64>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<FitOut<'py>> {
+    ) -> PyResult<ConeXFitOut> {
         let multipliers = slice("multipliers", &multipliers)?;
         let rows = start.iter().map(to_row).collect::<PyResult<Vec<_>>>()?;
         let start: Vec<(Row, f64)> = rows.into_iter().zip(multipliers.iter().copied()).collect();
-        let (found, signal) = enter_keeping(py, self.max_seconds, |stop, caller| {
+        let (found, raised) = enter_keeping(py, self.max_seconds, |stop, caller| {
             let mut report = |round: Round| {
                 let Round { round, rows, objective, left: Left::Broken(broken) } = round else { return };
                 caller.call(progress.as_ref(), |py, function| function.call1(py, (round, rows, broken, objective)));
@@ -150,18 +171,27 @@ impl ConeXProblem {
         })?;
         let ConeXFit { fit, violation, margin, asked, reason, held, certificate, proof } = found;
         let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
-        let parts = [parts.l1, parts.l2, parts.B];
-        let certificate = certificate.map(|c| (weighed(py, &c.rows), c.gap, c.at_all, c.text));
-        let held = weighed(py, &held);
-        Ok((
-            (status.name(), array(py, weights), objective, parts, gap, violation),
-            ([margin, asked].map(|m| (m.height, m.slope)), engine.name(), rounds, held, certificate, reason),
-            proof.map(|proof| proof_out(py, proof)),
-            signal,
-        ))
+        let certificate = certificate.map(|c| {
+            let rows = weighed(py, &c.rows);
+            Py::new(py, ConeXCertificate { rows, gap: c.gap, at_all: c.at_all, text: c.text })
+        });
+        let [margin, asked] = [margin, asked].map(|m| (m.height, m.slope));
+        Ok(ConeXFitOut {
+            status: status.name(),
+            weights: column(py, weights),
+            objective,
+            parts: [parts.l1, parts.l2, parts.B],
+            gap,
+            violation,
+            margin,
+            asked,
+            engine: engine.name(),
+            rounds,
+            held: weighed(py, &held),
+            certificate: certificate.transpose()?,
+            reason,
+            proof: proof.map(|proof| proof_out(py, proof)),
+            raised,
+        })
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<ConeXProblem>()
 }

@@ -64,6 +64,14 @@ pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyA
     values.into_pyarray(py)
 }
 
+/// An array that is an attribute of a result.
+pub(crate) type Column<T> = Py<PyArray1<T>>;
+
+/// As [`array`], for an attribute of a result.
+pub(crate) fn column<T: Element>(py: Python<'_>, values: Vec<T>) -> Column<T> {
+    array(py, values).unbind()
+}
+
 /// An array's geometry as Python hands it over: rows, columns, pitch in mm (rows, columns), name, which exist, places,
 /// names of the taxels.
 pub(crate) type ArrayParts =
@@ -86,30 +94,25 @@ pub(crate) fn from_array(array: &Array) -> ArrayParts {
     (rows, columns, pitch_mm.map(|pitch| (pitch.rows, pitch.columns)), name, exists, places, names)
 }
 
-/// How many rows of columns were filled, whether ticks were, which rows states gave (none where no row is of that kind), and
-/// the markers.
-pub(crate) type FilledOut<'py> = (usize, bool, Option<Bound<'py, PyArray1<bool>>>, Vec<(i64, bool)>);
+/// What was filled of columns, by name.
+#[derive(IntoPyObject)]
+pub(crate) struct FilledOut<'py> {
+    rows: usize,
+    /// Whether ticks were filled.
+    paired: bool,
+    /// Which rows states gave; none where no row is of that kind.
+    repaired: Option<Bound<'py, PyArray1<bool>>>,
+    markers: Vec<(i64, bool)>,
+}
 
 pub(crate) fn from_filled(py: Python<'_>, columns: Columns) -> FilledOut<'_> {
     let Columns { filled: Filled { rows, paired }, repaired, markers } = columns;
     let markers = markers.iter().map(|m| (m.t, m.start)).collect();
-    (rows, paired, repaired.map(|column| array(py, column)), markers)
+    FilledOut { rows, paired, repaired: repaired.map(|column| array(py, column)), markers }
 }
 
-/// Events as Python hands them over: array, t, x, y, p, intensity with present, repaired, markers as (t, start).
-pub(crate) type EventsIn<'py> = (
-    ArrayParts,
-    ReadArray<'py, i64>,
-    ReadArray<'py, u16>,
-    ReadArray<'py, u16>,
-    ReadArray<'py, bool>,
-    Option<(ReadArray<'py, u16>, ReadArray<'py, bool>)>,
-    Option<ReadArray<'py, bool>>,
-    Vec<(i64, bool)>,
-);
-
-/// Events whose columns stay where Python has them.
-pub(crate) struct EventsHeld<'py> {
+/// Events whose columns stay where Python has them, as (array, t, x, y, p, intensity with present, repaired, markers).
+pub(crate) struct EventsIn<'py> {
     array: Array,
     t: ReadArray<'py, i64>,
     x: ReadArray<'py, u16>,
@@ -120,12 +123,18 @@ pub(crate) struct EventsHeld<'py> {
     markers: Vec<Marker>,
 }
 
-pub(crate) fn to_events((parts, t, x, y, p, intensity, repaired, markers): EventsIn<'_>) -> PyResult<EventsHeld<'_>> {
-    let markers = markers.into_iter().map(|(t, start)| Marker { t, start }).collect();
-    Ok(EventsHeld { array: to_array(parts)?, t, x, y, p, intensity, repaired, markers })
+impl<'py> FromPyObject<'_, 'py> for EventsIn<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let (parts, t, x, y, p, intensity, repaired, markers) = object.extract()?;
+        let marker = |(t, start): (i64, bool)| Marker { t, start };
+        let markers = Vec::into_iter(markers).map(marker).collect();
+        Ok(Self { array: to_array(parts)?, t, x, y, p, intensity, repaired, markers })
+    }
 }
 
-impl EventsHeld<'_> {
+impl EventsIn<'_> {
     /// The columns in place, to be read without the GIL; who reads them checks them.
     pub(crate) fn view(&self) -> PyResult<EventsView<'_>> {
         Ok(EventsView {
@@ -164,22 +173,24 @@ pub(crate) fn to_room<'a>((t, x, y, ticks, p, present): &'a mut ColumnsIn<'_>) -
     Room::new(open(t)?, [open(x)?, open(y)?, open(ticks)?], [open(p)?, open(present)?]).map_err(core)
 }
 
-/// Pictures as Python hands them over: array, t, and values one after the other.
-pub(crate) type FramesIn<'py> = (ArrayParts, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>);
-
-/// Pictures whose values stay where Python has them.
-pub(crate) struct FramesHeld<'py> {
+/// Pictures whose values stay where Python has them, as (array, t, values one picture after the other).
+pub(crate) struct FramesIn<'py> {
     array: Array,
     t: PyReadonlyArray1<'py, i64>,
     values: PyReadonlyArray1<'py, f32>,
 }
 
-pub(crate) fn to_frames((parts, t, values): FramesIn<'_>) -> PyResult<FramesHeld<'_>> {
-    Ok(FramesHeld { array: to_array(parts)?, t, values })
+impl<'py> FromPyObject<'_, 'py> for FramesIn<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let (parts, t, values) = object.extract()?;
+        Ok(Self { array: to_array(parts)?, t, values })
+    }
 }
 
-impl FramesHeld<'_> {
-    /// As [`EventsHeld::view`].
+impl FramesIn<'_> {
+    /// As [`EventsIn::view`].
     pub(crate) fn view(&self) -> PyResult<FramesView<'_>> {
         Ok(FramesView { array: &self.array, t: slice("t", &self.t)?, values: slice("values", &self.values)? })
     }
@@ -211,7 +222,7 @@ pub(crate) fn from_events(py: Python<'_>, events: Events) -> EventsOut<'_> {
 }
 
 /// Spike trains as Python passes them: times, offsets, values, kind, start, stop; ms.
-pub(crate) type SpikesIn<'py> =
+pub(crate) type SpikesParts<'py> =
     (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<PyReadonlyArray1<'py, f32>>, String, f64, f64);
 
 /// Where trains begin and end.
@@ -220,14 +231,27 @@ pub(crate) fn to_offsets(offsets: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<us
     slice("offsets", offsets)?.iter().map(|&o| usize::try_from(o).map_err(|_| below(o))).collect()
 }
 
-pub(crate) fn to_spikes((times, offsets, values, kind, start, stop): SpikesIn<'_>) -> PyResult<SpikeTrains> {
-    let py = times.py();
-    let offsets = to_offsets(&offsets)?;
-    let times = slice("times", &times)?;
-    let values = (SpikeKind::named(&kind).map_err(core)?, values.as_ref().map(|v| slice("values", v)).transpose()?);
-    let copy = |interrupt: Stop<'_>| SpikeTrains::copy_of(times, offsets, values, (start, stop), interrupt);
-    // Of few spikes a copy costs less than releasing the GIL.
-    if times.len() < MANY_SPIKES { copy(Stop::never()).map_err(core) } else { enter(py, copy) }
+/// Spike trains, copied.
+pub(crate) struct SpikesIn(pub(crate) SpikeTrains);
+
+impl FromPyObject<'_, '_> for SpikesIn {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        let (times, offsets, values, kind, start, stop): SpikesParts<'_> = object.extract()?;
+        let offsets = to_offsets(&offsets)?;
+        let times = slice("times", &times)?;
+        let values = (SpikeKind::named(&kind).map_err(core)?, values.as_ref().map(|v| slice("values", v)).transpose()?);
+        let copy = |interrupt: Stop<'_>| SpikeTrains::copy_of(times, offsets, values, (start, stop), interrupt);
+        // Of few spikes a copy costs less than releasing the GIL.
+        let few = times.len() < MANY_SPIKES;
+        if few { copy(Stop::never()).map_err(core) } else { enter(object.py(), copy) }.map(Self)
+    }
+}
+
+/// The trains of patterns.
+pub(crate) fn to_patterns(patterns: Vec<SpikesIn>) -> Vec<SpikeTrains> {
+    patterns.into_iter().map(|SpikesIn(pattern)| pattern).collect()
 }
 
 /// So many spikes are copied without the GIL, so that Ctrl-C can interrupt the copy.

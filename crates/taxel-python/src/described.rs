@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 use taxel_core::circuit::{Adaptive, Chain, Converter, Divider, Fabric, VirtualGround};
 use taxel_core::encode::{Encoder, RunningRange};
 use taxel_core::learn::rivals::{Batch, Rival, Tempotron};
@@ -14,13 +15,13 @@ use taxel_core::{Result as CoreResult, problem};
 
 use crate::errors::core;
 use crate::learn::to_online;
-use crate::parameters::parsed;
+use crate::parameters::{Plain, parsed};
 use crate::rivals::to_rival;
 
-/// What is known of a noun's parameters: defaults, what must be given, ranges; as JSON.
+/// What is known of a noun's parameters: defaults, what must be given, ranges.
 #[pyfunction]
-fn parameters(of: &str) -> PyResult<String> {
-    described(of).map(|d| d.to_json().to_string()).ok_or_else(|| unknown(of))
+pub fn parameters(of: &str) -> PyResult<Plain<Value>> {
+    described(of).map(|d| Plain(d.to_json())).ok_or_else(|| unknown(of))
 }
 
 fn described(of: &str) -> Option<Described> {
@@ -46,9 +47,9 @@ fn described(of: &str) -> Option<Described> {
     }
 }
 
-/// Checks a noun's parameters; gives them back with every default filled in.
+/// Checks a noun's parameters, which are JSON; gives them back with every default filled in.
 #[pyfunction]
-fn check_parameters(of: &str, parameters: &str) -> PyResult<String> {
+pub fn check_parameters(of: &str, parameters: &str) -> PyResult<Plain<Value>> {
     match of {
         "neuron" => checked("neuron", parameters, Neuron::check),
         "running_range" => checked("running_range", parameters, RunningRange::check),
@@ -57,7 +58,7 @@ fn check_parameters(of: &str, parameters: &str) -> PyResult<String> {
         "online_cone_r" => {
             let (cone, window) = to_online(parameters)?;
             OnlineConeR::new(&cone, window).map_err(core)?;
-            written("OnlineConeR", &cone)
+            Ok(json!(cone))
         }
         "stdp" => checked("STDP", parameters, Stdp::check),
         "tempotron" => checked("Tempotron", parameters, Tempotron::check),
@@ -67,11 +68,12 @@ fn check_parameters(of: &str, parameters: &str) -> PyResult<String> {
         "converter" => checked("Converter", parameters, Converter::check),
         "circuit" => checked("Circuit", parameters, Chain::check),
         "adaptive_ramp" => checked("AdaptiveRamp", parameters, Adaptive::check),
-        _ if Rival::described(of).is_some() => written(of, &to_rival(parameters)?),
-        _ if Batch::described(of).is_some() => written(of, &Batch::from_json(of, parameters).map_err(core)?),
-        _ if Encoder::described(of).is_some() => Ok(Encoder::from_json(parameters).map_err(core)?.to_json()),
+        _ if Rival::described(of).is_some() => Ok(json!(to_rival(parameters)?)),
+        _ if Batch::described(of).is_some() => Ok(json!(Batch::from_json(of, parameters).map_err(core)?)),
+        _ if Encoder::described(of).is_some() => Ok(json!(Encoder::from_json(parameters).map_err(core)?)),
         _ => Err(unknown(of)),
     }
+    .map(Plain)
 }
 
 fn unknown(of: &str) -> PyErr {
@@ -82,17 +84,8 @@ fn checked<T: DeserializeOwned + Serialize>(
     what: &str,
     json: &str,
     check: impl Fn(&T) -> CoreResult<()>,
-) -> PyResult<String> {
+) -> PyResult<Value> {
     let value: T = parsed(what, json)?;
     check(&value).map_err(core)?;
-    written(what, &value)
-}
-
-fn written(what: &str, value: &impl Serialize) -> PyResult<String> {
-    serde_json::to_string(value).map_err(|error| core(problem!("{what}: {error}")))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(parameters, module)?)?;
-    module.add_function(wrap_pyfunction!(check_parameters, module)?)
+    Ok(json!(value))
 }

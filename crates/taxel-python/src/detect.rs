@@ -9,10 +9,10 @@ use taxel_core::detect::{
 use taxel_core::encode::{Quantity, Tare, Zeroing};
 use taxel_core::spikes::us;
 
-use crate::convert::{ArrayParts, EventsIn, FramesIn, array, slice, to_array, to_events, to_frames};
+use crate::convert::{ArrayParts, Column, EventsIn, FramesIn, array, column, slice, to_array};
 use crate::enter::{Shared, enter};
 use crate::errors::{ProblemError, core};
-use crate::parameters::parsed;
+use crate::parameters::{Plain, parsed};
 
 /// Detections as Python hands them over: labels, t and known in us, slope in mV/ms, repaired.
 pub(crate) type DetectionsIn<'py> = (
@@ -56,33 +56,36 @@ fn from_detections(py: Python<'_>, found: Vec<Detection>) -> DetectionsOut<'_> {
     (labels, array(py, t), array(py, known), array(py, slope), array(py, repaired))
 }
 
-/// One label's tally: label, pairs as two columns, missed, false, false within a window, errors and delays in ms.
-type TallyOut<'py> = (
-    String,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<i64>>,
-    usize,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-);
+/// One label's detections beside its reference events.
+#[pyclass(frozen, get_all)]
+pub struct Tally {
+    label: String,
+    /// The pairs: places of detections, and of events.
+    detected: Column<i64>,
+    events: Column<i64>,
+    missed_events: Column<i64>,
+    /// Places of false detections, and how many of them lie within a window.
+    false_detections: Column<i64>,
+    false_near: usize,
+    errors_ms: Column<f64>,
+    delays_ms: Column<f64>,
+}
 
 /// Checks detections; raises where columns differ in length.
 #[pyfunction]
-fn check_detections(detections: DetectionsIn<'_>) -> PyResult<()> {
+pub fn check_detections(detections: DetectionsIn<'_>) -> PyResult<()> {
     to_detections(detections).map(drop)
 }
 
 /// Matches detections with reference events, label by label, in order of time.
 #[pyfunction]
-fn score<'py>(
-    py: Python<'py>,
-    found: DetectionsIn<'py>,
+pub fn score(
+    py: Python<'_>,
+    found: DetectionsIn<'_>,
     labels: Vec<String>,
-    t: PyReadonlyArray1<'py, i64>,
-    windows: PyReadonlyArray1<'py, i64>,
-) -> PyResult<Vec<TallyOut<'py>>> {
+    t: PyReadonlyArray1<'_, i64>,
+    windows: PyReadonlyArray1<'_, i64>,
+) -> PyResult<Vec<Tally>> {
     let found = to_detections(found)?;
     let t = slice("t", &t)?;
     if t.len() != labels.len() {
@@ -95,35 +98,34 @@ fn score<'py>(
     let truth: Vec<Reference> = labels.into_iter().zip(t).map(|(label, &t)| Reference { label, t }).collect();
     let windows = slice("windows", &windows)?.to_vec();
     let tallies = enter(py, |stop| score_core(&found, &truth, &windows, stop))?;
-    let places = |indices: Vec<usize>| array(py, indices.into_iter().map(|k| k as i64).collect());
+    let places = |indices: Vec<usize>| column(py, indices.into_iter().map(|k| k as i64).collect());
     Ok(tallies
         .into_iter()
         .map(|tally| {
-            let (detections, events) = tally.pairs.into_iter().unzip();
-            (
-                tally.label,
-                places(detections),
-                places(events),
-                places(tally.missed),
-                places(tally.false_),
-                tally.false_near,
-                array(py, tally.errors_ms),
-                array(py, tally.delays_ms),
-            )
+            let (detected, events) = tally.pairs.into_iter().unzip();
+            Tally {
+                label: tally.label,
+                detected: places(detected),
+                events: places(events),
+                missed_events: places(tally.missed),
+                false_detections: places(tally.false_),
+                false_near: tally.false_near,
+                errors_ms: column(py, tally.errors_ms),
+                delays_ms: column(py, tally.delays_ms),
+            }
         })
         .collect())
 }
 
 /// Mean, standard deviation, median, 2.5th and 97.5th percentile.
 #[pyfunction]
-fn spread(values: PyReadonlyArray1<'_, f64>) -> PyResult<(f64, f64, f64, f64, f64)> {
-    let Spread { mean, sd, median, low, high } = Spread::of(slice("values", &values)?);
-    Ok((mean, sd, median, low, high))
+pub fn spread(values: PyReadonlyArray1<'_, f64>) -> PyResult<Plain<Spread>> {
+    Ok(Plain(Spread::of(slice("values", &values)?)))
 }
 
 /// Checks a readout's parts; gives the text of its file.
 #[pyfunction]
-fn make_readout(parts: &str) -> PyResult<String> {
+pub fn make_readout(parts: &str) -> PyResult<String> {
     let readout: Readout = parsed("readout", parts)?;
     readout.check().map_err(core)?;
     Ok(readout.to_json())
@@ -131,13 +133,13 @@ fn make_readout(parts: &str) -> PyResult<String> {
 
 /// Checks the text of a readout's file; gives it with every default filled in.
 #[pyfunction]
-fn check_readout(text: &str) -> PyResult<String> {
+pub fn check_readout(text: &str) -> PyResult<String> {
     Ok(Readout::from_json(text).map_err(core)?.to_json())
 }
 
 /// Checks a plain rule's parts; gives the text of its file.
 #[pyfunction]
-fn make_plain_rule(parts: &str) -> PyResult<String> {
+pub fn make_plain_rule(parts: &str) -> PyResult<String> {
     let rule: PlainRule = parsed("plain rule", parts)?;
     rule.check().map_err(core)?;
     Ok(rule.to_json())
@@ -145,13 +147,13 @@ fn make_plain_rule(parts: &str) -> PyResult<String> {
 
 /// Checks the text of a plain rule's file; gives it with every default filled in.
 #[pyfunction]
-fn check_plain_rule(text: &str) -> PyResult<String> {
+pub fn check_plain_rule(text: &str) -> PyResult<String> {
     Ok(PlainRule::from_json(text).map_err(core)?.to_json())
 }
 
 /// Whether the text of a file, of a readout or a plain rule, is a plain rule's; checks it.
 #[pyfunction]
-fn is_plain_rule(text: &str) -> PyResult<bool> {
+pub fn is_plain_rule(text: &str) -> PyResult<bool> {
     Ok(matches!(Detector::from_json(text).map_err(core)?, Detector::PlainRule(_)))
 }
 
@@ -166,8 +168,7 @@ fn parse_tare(tare: Option<&str>) -> PyResult<Option<Tare>> {
 /// The detections of a readout or a plain rule in a whole recording of events, with its zeroings: t in us, column, row,
 /// rest; and how many of them have an input outside its range in training.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
-fn readout_run_events<'py>(
+pub fn readout_run_events<'py>(
     py: Python<'py>,
     readout: &str,
     events: EventsIn<'py>,
@@ -177,7 +178,7 @@ fn readout_run_events<'py>(
     zeroings: Vec<(i64, u16, u16, f64)>,
     begin: Option<i64>,
 ) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
-    let ((readout, tare), events) = (parse(readout, tare)?, to_events(events)?);
+    let (readout, tare) = parse(readout, tare)?;
     let zeroings: Vec<_> =
         zeroings.into_iter().map(|(t, x, y, rest)| Zeroing { t, x, y, rest, before: None }).collect();
     let events = events.view()?;
@@ -189,7 +190,7 @@ fn readout_run_events<'py>(
 /// The detections of a readout or a plain rule in a whole recording of pictures, and how many of them have an input
 /// outside its range in training.
 #[pyfunction]
-fn readout_run_frames<'py>(
+pub fn readout_run_frames<'py>(
     py: Python<'py>,
     readout: &str,
     frames: FramesIn<'py>,
@@ -197,7 +198,7 @@ fn readout_run_frames<'py>(
     tare: Option<&str>,
     begin: Option<i64>,
 ) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
-    let ((readout, tare), frames) = (parse(readout, tare)?, to_frames(frames)?);
+    let (readout, tare) = parse(readout, tare)?;
     let frames = frames.view()?;
     let (found, outside) = enter(py, |stop| readout.run_frames(frames, frame_us, tare.as_ref(), begin, stop))?;
     Ok((from_detections(py, found), outside))
@@ -205,7 +206,7 @@ fn readout_run_frames<'py>(
 
 /// A readout or a plain rule at work.
 #[pyclass(frozen)]
-struct ReadoutStream(Shared<CoreStream>);
+pub struct ReadoutStream(Shared<CoreStream>);
 
 #[pymethods]
 impl ReadoutStream {
@@ -217,14 +218,12 @@ impl ReadoutStream {
     }
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<DetectionsOut<'py>> {
-        let events = to_events(events)?;
         let (events, mut found) = (events.view()?, vec![]);
         self.0.enter(py, |readout, _| readout.push_events(events, &mut found))?;
         Ok(from_detections(py, found))
     }
 
     fn push_frames<'py>(&self, py: Python<'py>, frames: FramesIn<'py>) -> PyResult<DetectionsOut<'py>> {
-        let frames = to_frames(frames)?;
         let frames = frames.view()?;
         let found = self.0.enter(py, |readout, stop| readout.push_frames(frames, stop))?;
         Ok(from_detections(py, found))
@@ -271,7 +270,7 @@ fn from_decisions<'py>(py: Python<'py>, found: &[Decision]) -> DecisionsOut<'py>
 
 /// A quantity over a recording, on which plain rules are tried.
 #[pyclass(frozen)]
-struct LoadCurve(CoreCurve);
+pub struct LoadCurve(CoreCurve);
 
 #[pymethods]
 impl LoadCurve {
@@ -285,7 +284,7 @@ impl LoadCurve {
         wire_version: u8,
         tare: Option<&str>,
     ) -> PyResult<Self> {
-        let (quantity, tare, events) = (to_quantity(quantity)?, parse_tare(tare)?, to_events(events)?);
+        let (quantity, tare) = (to_quantity(quantity)?, parse_tare(tare)?);
         let events = events.view()?;
         let frames = FrameTime::on_wire(frame_us, wire_version);
         enter(py, |stop| CoreCurve::of_events(quantity, noise_floor, events, frames, tare.as_ref(), stop)).map(Self)
@@ -300,7 +299,7 @@ impl LoadCurve {
         frame_us: Option<f64>,
         tare: Option<&str>,
     ) -> PyResult<Self> {
-        let (quantity, tare, frames) = (to_quantity(quantity)?, parse_tare(tare)?, to_frames(frames)?);
+        let (quantity, tare) = (to_quantity(quantity)?, parse_tare(tare)?);
         let frames = frames.view()?;
         enter(py, |stop| CoreCurve::of_frames(quantity, noise_floor, frames, frame_us, tare.as_ref(), stop)).map(Self)
     }
@@ -333,19 +332,4 @@ impl LoadCurve {
 
 fn to_quantity(name: &str) -> PyResult<Quantity> {
     parsed("quantity", &serde_json::Value::from(name).to_string())
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_detections, module)?)?;
-    module.add_function(wrap_pyfunction!(score, module)?)?;
-    module.add_function(wrap_pyfunction!(spread, module)?)?;
-    module.add_function(wrap_pyfunction!(make_readout, module)?)?;
-    module.add_function(wrap_pyfunction!(check_readout, module)?)?;
-    module.add_function(wrap_pyfunction!(make_plain_rule, module)?)?;
-    module.add_function(wrap_pyfunction!(check_plain_rule, module)?)?;
-    module.add_function(wrap_pyfunction!(is_plain_rule, module)?)?;
-    module.add_function(wrap_pyfunction!(readout_run_events, module)?)?;
-    module.add_function(wrap_pyfunction!(readout_run_frames, module)?)?;
-    module.add_class::<LoadCurve>()?;
-    module.add_class::<ReadoutStream>()
 }

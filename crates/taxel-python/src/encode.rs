@@ -6,7 +6,7 @@ use taxel_core::encode::{Encoder, LocalLoad, Pieces, Skin, Tare};
 
 use taxel_core::problem;
 
-use crate::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spikes, to_array, to_events, to_frames};
+use crate::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spikes, to_array};
 use crate::enter::{Shared, enter};
 use crate::errors::core;
 
@@ -15,26 +15,26 @@ type SkinAfferents = (Vec<&'static str>, Vec<f64>, Vec<f64>);
 
 /// Checks an encoder; gives it back with every default filled in.
 #[pyfunction]
-fn check_encoder(encoder: &str) -> PyResult<String> {
+pub fn check_encoder(encoder: &str) -> PyResult<String> {
     Ok(Encoder::from_json(encoder).map_err(core)?.to_json())
 }
 
 /// The names of all encoders.
 #[pyfunction]
-fn encoder_names() -> Vec<&'static str> {
+pub fn encoder_names() -> Vec<&'static str> {
     taxel_core::encode::NAMES.to_vec()
 }
 
 /// Trains for an array, their kind, and the latency in ms.
 #[pyfunction]
-fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, &'static str, f64)> {
+pub fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, &'static str, f64)> {
     let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
     Ok((encoder.trains(&array), encoder.kind().name(), encoder.latency_ms()))
 }
 
 /// Type and place (x, y in mm) of each afferent of a skin on an array, a train each.
 #[pyfunction]
-fn skin_afferents(py: Python<'_>, skin: &str, array: ArrayParts) -> PyResult<SkinAfferents> {
+pub fn skin_afferents(py: Python<'_>, skin: &str, array: ArrayParts) -> PyResult<SkinAfferents> {
     let Encoder::Skin(skin) = Encoder::from_json(skin).map_err(core)? else {
         return Err(core(problem!("skin: must be one")));
     };
@@ -57,38 +57,38 @@ fn local_load(encoder: &str) -> PyResult<LocalLoad> {
 
 /// The names of a local load's quantities.
 #[pyfunction]
-fn local_load_quantities(encoder: &str) -> PyResult<Vec<String>> {
+pub fn local_load_quantities(encoder: &str) -> PyResult<Vec<String>> {
     Ok(local_load(encoder)?.quantities())
 }
 
 /// The quantities of a local load of a whole recording of events, sample by sample.
 #[pyfunction]
-fn local_load_of_events<'py>(
+pub fn local_load_of_events<'py>(
     py: Python<'py>,
     encoder: &str,
     events: EventsIn<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (load, events) = (local_load(encoder)?, to_events(events)?);
+    let load = local_load(encoder)?;
     let events = events.view()?;
     Ok(PyArray1::from_vec(py, enter(py, |stop| load.values_of_events(events, stop))?))
 }
 
 /// The quantities of a local load of a whole recording of pictures, picture by picture.
 #[pyfunction]
-fn local_load_of_frames<'py>(
+pub fn local_load_of_frames<'py>(
     py: Python<'py>,
     encoder: &str,
     frames: FramesIn<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (load, frames) = (local_load(encoder)?, to_frames(frames)?);
+    let load = local_load(encoder)?;
     let frames = frames.view()?;
     Ok(PyArray1::from_vec(py, enter(py, |stop| load.values_of_frames(frames, stop))?))
 }
 
 /// Encodes a whole recording of events.
 #[pyfunction]
-fn encode_events<'py>(py: Python<'py>, encoder: &str, events: EventsIn<'py>) -> PyResult<SpikesOut<'py>> {
-    let (encoder, events) = (Encoder::from_json(encoder).map_err(core)?, to_events(events)?);
+pub fn encode_events<'py>(py: Python<'py>, encoder: &str, events: EventsIn<'py>) -> PyResult<SpikesOut<'py>> {
+    let encoder = Encoder::from_json(encoder).map_err(core)?;
     let events = events.view()?;
     let trains = enter(py, |stop| encoder.encode_events(events, stop))?;
     Ok(from_spikes(py, trains))
@@ -96,8 +96,8 @@ fn encode_events<'py>(py: Python<'py>, encoder: &str, events: EventsIn<'py>) -> 
 
 /// Encodes a whole recording of pictures.
 #[pyfunction]
-fn encode_frames<'py>(py: Python<'py>, encoder: &str, frames: FramesIn<'py>) -> PyResult<SpikesOut<'py>> {
-    let (encoder, frames) = (Encoder::from_json(encoder).map_err(core)?, to_frames(frames)?);
+pub fn encode_frames<'py>(py: Python<'py>, encoder: &str, frames: FramesIn<'py>) -> PyResult<SpikesOut<'py>> {
+    let encoder = Encoder::from_json(encoder).map_err(core)?;
     let frames = frames.view()?;
     let trains = enter(py, |stop| encoder.encode_frames(frames, stop))?;
     Ok(from_spikes(py, trains))
@@ -105,7 +105,7 @@ fn encode_frames<'py>(py: Python<'py>, encoder: &str, frames: FramesIn<'py>) -> 
 
 /// An encoder at work.
 #[pyclass(frozen)]
-struct EncoderStream(Shared<Pieces>);
+pub struct EncoderStream(Shared<Pieces>);
 
 #[pymethods]
 impl EncoderStream {
@@ -116,13 +116,11 @@ impl EncoderStream {
     }
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<SpikesOut<'py>> {
-        let events = to_events(events)?;
         let events = events.view()?;
         Ok(from_spikes(py, self.0.enter(py, |pieces, _| pieces.push_events(events))?))
     }
 
     fn push_frames<'py>(&self, py: Python<'py>, frames: FramesIn<'py>) -> PyResult<SpikesOut<'py>> {
-        let frames = to_frames(frames)?;
         let frames = frames.view()?;
         Ok(from_spikes(py, self.0.enter(py, |pieces, _| pieces.push_frames(frames))?))
     }
@@ -144,50 +142,32 @@ impl EncoderStream {
 
 /// Takes a tare from events, as JSON; times in us.
 #[pyfunction]
-fn tare_of_events(
+pub fn tare_of_events(
     py: Python<'_>,
     events: EventsIn<'_>,
     start: Option<i64>,
     stop: Option<i64>,
     note: &str,
 ) -> PyResult<String> {
-    let events = to_events(events)?;
     let events = events.view()?;
     Ok(enter(py, |_| Tare::of_events(events, start, stop, note))?.to_json())
 }
 
 /// Takes a tare from pictures, as JSON; times in us.
 #[pyfunction]
-fn tare_of_frames(
+pub fn tare_of_frames(
     py: Python<'_>,
     frames: FramesIn<'_>,
     start: Option<i64>,
     stop: Option<i64>,
     note: &str,
 ) -> PyResult<String> {
-    let frames = to_frames(frames)?;
     let frames = frames.view()?;
     Ok(enter(py, |_| Tare::of_frames(frames, start, stop, note))?.to_json())
 }
 
 /// Checks a tare; gives it back as the compiled part writes it.
 #[pyfunction]
-fn check_tare(tare: &str) -> PyResult<String> {
+pub fn check_tare(tare: &str) -> PyResult<String> {
     Ok(Tare::from_json(tare).map_err(core)?.to_json())
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<EncoderStream>()?;
-    module.add_function(wrap_pyfunction!(check_encoder, module)?)?;
-    module.add_function(wrap_pyfunction!(encoder_names, module)?)?;
-    module.add_function(wrap_pyfunction!(encoder_about, module)?)?;
-    module.add_function(wrap_pyfunction!(skin_afferents, module)?)?;
-    module.add_function(wrap_pyfunction!(local_load_quantities, module)?)?;
-    module.add_function(wrap_pyfunction!(local_load_of_events, module)?)?;
-    module.add_function(wrap_pyfunction!(local_load_of_frames, module)?)?;
-    module.add_function(wrap_pyfunction!(encode_events, module)?)?;
-    module.add_function(wrap_pyfunction!(encode_frames, module)?)?;
-    module.add_function(wrap_pyfunction!(tare_of_events, module)?)?;
-    module.add_function(wrap_pyfunction!(tare_of_frames, module)?)?;
-    module.add_function(wrap_pyfunction!(check_tare, module)?)
 }

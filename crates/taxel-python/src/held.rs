@@ -3,21 +3,19 @@
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
-use taxel_core::preload::{LOADED_TICKS, place, preload as preload_of};
+use taxel_core::preload::{place, preload as preload_of};
 use taxel_core::rest::{Rest, Value, touched_from};
 use taxel_core::touch_counts::{BIN_US, TouchCounts};
 use taxel_core::tracked_rest::TrackedRest;
 use taxel_core::{Error, problem};
 
-use crate::convert::{
-    ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array, to_events, to_frames,
-};
+use crate::convert::{ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array};
 use crate::enter::{Shared, enter};
 use crate::errors::core;
 
 /// What chosen taxels of a recording hold at any time; without values, each event is a step of 1 up or down.
 #[pyclass(frozen, module = "taxel._core")]
-struct HeldValues(Shared<HeldOverTime<f32>>);
+pub struct HeldValues(Shared<HeldOverTime<f32>>);
 
 #[pymethods]
 impl HeldValues {
@@ -29,7 +27,6 @@ impl HeldValues {
         taxels: Option<PyReadonlyArray1<'_, u32>>,
         begins: Option<PyReadonlyArray1<'_, f32>>,
     ) -> PyResult<Self> {
-        let events = to_events(events)?;
         let events = events.view()?;
         let taxels = taxels.as_ref().map(|taxels| slice("taxels", taxels)).transpose()?;
         let begins = begins.as_ref().map(|begins| slice("begins", begins)).transpose()?;
@@ -69,7 +66,7 @@ impl HeldValues {
 
 /// Events at `t` us that report what the taxels hold (ticks by index, 65 535 where that is unknown).
 #[pyfunction]
-fn held_as_events<'py>(
+pub fn held_as_events<'py>(
     py: Python<'py>,
     held: PyReadonlyArray1<'py, u16>,
     t: i64,
@@ -80,7 +77,7 @@ fn held_as_events<'py>(
 
 /// What pictures, one after the other in `values`, read above the rest of each taxel, infinite where that is unknown.
 #[pyfunction]
-fn above_rest<'py>(
+pub fn above_rest<'py>(
     py: Python<'py>,
     values: PyReadonlyArray1<'py, f32>,
     rest: PyReadonlyArray1<'py, f64>,
@@ -104,7 +101,7 @@ fn above_rest<'py>(
 /// The rest of pictures without a tare: `columns` of the array, its noise floor, the rest of each taxel to begin
 /// with (NaN where unknown), and whether values fall from it with pressure.
 #[pyclass(frozen, name = "TrackedRest", module = "taxel._core")]
-struct PyTrackedRest(Shared<TrackedRest>);
+pub struct PyTrackedRest(Shared<TrackedRest>);
 
 #[pymethods]
 impl PyTrackedRest {
@@ -166,8 +163,7 @@ pub(crate) fn from_touches<'py>(py: Python<'py>, of: &TouchCounts) -> TouchesOut
 
 /// The counts of touches of events.
 #[pyfunction]
-fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<TouchesOut<'py>> {
-    let events = to_events(events)?;
+pub fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<TouchesOut<'py>> {
     let events = events.view()?;
     let counts = enter(py, |stop| {
         events.check()?;
@@ -193,8 +189,7 @@ const NOISE_FLOOR: f32 = 3.0;
 
 /// The counts of touches of pictures in ticks; `rest` of all of them, NaN where it is to be tracked.
 #[pyfunction]
-fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> PyResult<TouchesOut<'py>> {
-    let frames = to_frames(frames)?;
+pub fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> PyResult<TouchesOut<'py>> {
     let frames = frames.view()?;
     let counts = enter(py, |stop| {
         let taxels = frames.array.len();
@@ -223,8 +218,7 @@ fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> 
 type ChangesOut<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
 
 #[pyfunction]
-fn changes_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>) -> PyResult<ChangesOut<'py>> {
-    let frames = to_frames(frames)?;
+pub fn changes_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>) -> PyResult<ChangesOut<'py>> {
     let frames = frames.view()?;
     let changes = enter(py, |stop| frames.changes(stop))?;
     Ok((array(py, changes.number), array(py, changes.on)))
@@ -232,13 +226,13 @@ fn changes_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>) -> PyResult<Ch
 
 /// What a touched taxel reads above rest at least, for a board's noise floor.
 #[pyfunction]
-fn touched_above(noise_floor: f64) -> f64 {
+pub fn touched_above(noise_floor: f64) -> f64 {
     touched_from(0.0, noise_floor)
 }
 
 /// The preload of each taxel, and its place as text.
 #[pyfunction]
-fn preload<'py>(
+pub fn preload<'py>(
     py: Python<'py>,
     less: PyReadonlyArray1<'py, f64>,
     columns: usize,
@@ -248,18 +242,4 @@ fn preload<'py>(
     let loads = preload_of(slice("less", &less)?, columns, above);
     let at = place(&loads, columns, corner);
     Ok((array(py, loads), at))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("UNKNOWN", UNKNOWN)?;
-    module.add_class::<HeldValues>()?;
-    module.add_class::<PyTrackedRest>()?;
-    module.add_function(wrap_pyfunction!(held_as_events, module)?)?;
-    module.add_function(wrap_pyfunction!(above_rest, module)?)?;
-    module.add("LOADED_TICKS", LOADED_TICKS)?;
-    module.add_function(wrap_pyfunction!(preload, module)?)?;
-    module.add_function(wrap_pyfunction!(touches_of_events, module)?)?;
-    module.add_function(wrap_pyfunction!(touches_of_frames, module)?)?;
-    module.add_function(wrap_pyfunction!(changes_of_frames, module)?)?;
-    module.add_function(wrap_pyfunction!(touched_above, module)?)
 }

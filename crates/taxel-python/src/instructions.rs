@@ -8,15 +8,15 @@ use crate::errors::core;
 
 /// The set of vector instructions in use: plain, avx2, avx512 or avx512_bytes.
 #[pyfunction]
-fn instructions() -> &'static str {
+pub fn instructions() -> &'static str {
     Instructions::best().name()
 }
 
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+/// Takes at most the set that the environment names.
+pub(crate) fn cap() -> PyResult<()> {
     match std::env::var("TAXEL_INSTRUCTIONS") {
-        Ok(name) => Instructions::cap(&name).map_err(core)?,
-        Err(std::env::VarError::NotPresent) => {}
-        Err(std::env::VarError::NotUnicode(_)) => return Err(core(problem!("TAXEL_INSTRUCTIONS is no text"))),
+        Ok(name) => Instructions::cap(&name).map_err(core),
+        Err(std::env::VarError::NotPresent) => Ok(()),
+        Err(std::env::VarError::NotUnicode(_)) => Err(core(problem!("TAXEL_INSTRUCTIONS is no text"))),
     }
-    module.add_function(wrap_pyfunction!(instructions, module)?)
 }

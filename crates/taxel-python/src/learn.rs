@@ -4,11 +4,11 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 use taxel_core::learn as core_learn;
-use taxel_core::learn::{ConeR, ConeRFit, Engine, Fit, Left, Round, Shares, Status, Stdp, StdpNeuron};
+use taxel_core::learn::{ConeR, ConeRFit, Fit, Left, Round, Shares, Stdp, StdpNeuron};
 use taxel_core::problem;
 
 use crate::cone_x::{ProofOut, proof_out};
-use crate::convert::{SpikesIn, array, slice, to_spikes};
+use crate::convert::{Column, SpikesIn, array, column, slice, to_patterns};
 use crate::enter::{Shared, enter, enter_keeping};
 use crate::errors::core;
 use crate::parameters::parsed;
@@ -24,30 +24,38 @@ pub(crate) fn to_online(json: &str) -> PyResult<(ConeR, usize)> {
     let mut given: Map<String, Value> = parsed("OnlineConeR", json)?;
     let window = given.remove("window").unwrap_or(Value::Null);
     let window = window.as_u64().and_then(|window| usize::try_from(window).ok());
-    let window = window.ok_or_else(|| core(problem!("window: must be a whole number, 1 or more")))?;
+    let window = window.ok_or_else(|| core(problem!("window"; ": must be a whole number, 1 or more")))?;
     Ok((to_cone_r(&Value::Object(given).to_string())?, window))
 }
 
 /// Multipliers of a start as Python holds them: rows, and a share each.
-type MultipliersOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
 type MultipliersIn<'py> = (PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f64>);
 
-/// A fit as Python gets it: weights, objective, parts, gap; rounds, rows, solved, native; unreachable, refires; multipliers
-/// of a start; multipliers that prove the gap.
-type FitOut<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    f64,
-    [f64; 5],
-    f64,
-    (usize, usize, bool, bool),
-    (Vec<(usize, usize)>, usize),
-    MultipliersOut<'py>,
-    ProofOut<'py>,
-);
+/// A fit.
+#[pyclass(frozen, get_all, name = "ConeRFit")]
+pub struct ConeRFitOut {
+    weights: Column<f64>,
+    objective: f64,
+    /// Of l1, l2, B, C and D.
+    parts: [f64; 5],
+    gap: f64,
+    status: &'static str,
+    engine: &'static str,
+    rounds: usize,
+    rows: usize,
+    unreachable: Vec<(usize, usize)>,
+    refires: usize,
+    /// For a start: rows, and a share each.
+    multipliers: (Column<i64>, Column<f64>),
+    /// The multipliers that prove the gap.
+    proof: ProofOut,
+    /// The exception of a signal that ended it early.
+    raised: Option<Py<PyAny>>,
+}
 
 /// The rows of one set of examples.
 #[pyclass(frozen)]
-struct ConeRProblem(core_learn::ConeRProblem);
+pub struct ConeRProblem(core_learn::ConeRProblem);
 
 #[pymethods]
 impl ConeRProblem {
@@ -55,12 +63,12 @@ impl ConeRProblem {
     fn new(
         py: Python<'_>,
         parameters: &str,
-        patterns: Vec<SpikesIn<'_>>,
+        patterns: Vec<SpikesIn>,
         targets: Vec<PyReadonlyArray1<'_, f64>>,
         silence: Vec<Option<PyReadonlyArray1<'_, f64>>>,
     ) -> PyResult<Self> {
         let parameters = to_cone_r(parameters)?;
-        let patterns = patterns.into_iter().map(to_spikes).collect::<PyResult<Vec<_>>>()?;
+        let patterns = to_patterns(patterns);
         let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
         let silence = silence.iter().map(to_windows).collect::<PyResult<Vec<_>>>()?;
         enter(py, |stop| core_learn::ConeRProblem::new(&parameters, &patterns, &targets, &silence, stop)).map(Self)
@@ -78,16 +86,15 @@ impl ConeRProblem {
         self.0.rows()
     }
 
-    /// A fit, and the exception of a signal that ended it early.
     #[pyo3(signature = (parameters, silent, start, progress))]
-    fn fit<'py>(
+    fn fit(
         &self,
-        py: Python<'py>,
+        py: Python<'_>,
         parameters: &str,
-        silent: PyReadonlyArray1<'py, f64>,
-        start: Option<StartIn<'py>>,
+        silent: PyReadonlyArray1<'_, f64>,
+        start: Option<StartIn<'_>>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(FitOut<'py>, Option<Py<PyAny>>)> {
+    ) -> PyResult<ConeRFitOut> {
         let parameters = to_cone_r(parameters)?;
         let silent = slice("silent", &silent)?;
         let start = start.as_ref().map(to_start).transpose()?;
@@ -99,13 +106,13 @@ impl ConeRProblem {
             };
             self.0.fit(&parameters, silent, start, &mut report, stop)
         })?;
-        Ok((fit_out(py, fit), raised))
+        Ok(fit_out(py, fit, raised))
     }
 }
 
 /// A sliding window of patterns and its last fit.
 #[pyclass(frozen)]
-struct OnlineConeR {
+pub struct OnlineConeR {
     window: Shared<core_learn::OnlineConeR>,
     max_seconds: Option<f64>,
 }
@@ -133,25 +140,24 @@ impl OnlineConeR {
     fn add(
         &self,
         py: Python<'_>,
-        pattern: SpikesIn<'_>,
+        pattern: SpikesIn,
         targets: PyReadonlyArray1<'_, f64>,
         silence: Option<PyReadonlyArray1<'_, f64>>,
     ) -> PyResult<()> {
-        let (pattern, targets) = (to_spikes(pattern)?, slice("targets", &targets)?);
+        let targets = slice("targets", &targets)?;
         let silence = to_windows(&silence)?;
-        self.window.enter(py, |window, stop| window.add(&pattern, targets, silence.as_deref(), stop))
+        self.window.enter(py, |window, stop| window.add(&pattern.0, targets, silence.as_deref(), stop))
     }
 
-    /// A fit, and the exception of a signal that ended it early.
-    fn fit<'py>(&self, py: Python<'py>) -> PyResult<(FitOut<'py>, Option<Py<PyAny>>)> {
-        let (fit, signal) = enter_keeping(py, self.max_seconds, |stop, _| self.window.lock().fit(&mut |_| {}, stop))?;
-        Ok((fit_out(py, fit), signal))
+    fn fit(&self, py: Python<'_>) -> PyResult<ConeRFitOut> {
+        let (fit, raised) = enter_keeping(py, self.max_seconds, |stop, _| self.window.lock().fit(&mut |_| {}, stop))?;
+        Ok(fit_out(py, fit, raised))
     }
 }
 
 /// A neuron with spike-timing-dependent plasticity, in one stream of time.
 #[pyclass(frozen, name = "STDP")]
-struct Plastic(Shared<StdpNeuron>);
+pub struct Plastic(Shared<StdpNeuron>);
 
 #[pymethods]
 impl Plastic {
@@ -175,9 +181,8 @@ impl Plastic {
         self.0.with(py, StdpNeuron::rest);
     }
 
-    fn push<'py>(&self, py: Python<'py>, piece: SpikesIn<'_>, learn: bool) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let piece = to_spikes(piece)?;
-        Ok(array(py, self.0.enter(py, |neuron, stop| neuron.push(&piece, learn, stop))?))
+    fn push<'py>(&self, py: Python<'py>, piece: SpikesIn, learn: bool) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, self.0.enter(py, |neuron, stop| neuron.push(&piece.0, learn, stop))?))
     }
 }
 
@@ -201,18 +206,23 @@ fn to_start<'a>((weights, multipliers): &'a StartIn<'_>) -> PyResult<(&'a [f64],
     Ok((slice("start", weights)?, multipliers))
 }
 
-fn fit_out(py: Python<'_>, found: ConeRFit) -> FitOut<'_> {
+fn fit_out(py: Python<'_>, found: ConeRFit, raised: Option<Py<PyAny>>) -> ConeRFitOut {
     let ConeRFit { fit, rows, multipliers, proof, unreachable, refires } = found;
     let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
-    let parts = [parts.l1, parts.l2, parts.B, parts.C, parts.D];
-    let how = (rounds, rows, status == Status::Solved, engine == Engine::Native);
     let numbers = multipliers.rows.iter().map(|&row| row as i64).collect();
-    let multipliers = (array(py, numbers), array(py, multipliers.values));
-    (array(py, weights), objective, parts, gap, how, (unreachable, refires), multipliers, proof_out(py, proof))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<ConeRProblem>()?;
-    module.add_class::<OnlineConeR>()?;
-    module.add_class::<Plastic>()
+    ConeRFitOut {
+        weights: column(py, weights),
+        objective,
+        parts: [parts.l1, parts.l2, parts.B, parts.C, parts.D],
+        gap,
+        status: status.name(),
+        engine: engine.name(),
+        rounds,
+        rows,
+        unreachable,
+        refires,
+        multipliers: (column(py, numbers), column(py, multipliers.values)),
+        proof: proof_out(py, proof),
+        raised,
+    }
 }

@@ -1,5 +1,7 @@
 //! Python bindings of taxel: conversion, releasing the GIL, errors, and nothing else.
 
+#![allow(clippy::too_many_arguments, reason = "Python names them")]
+
 mod convert;
 mod enter;
 mod errors;
@@ -31,34 +33,87 @@ mod simulate;
 mod wire;
 mod wire_v2;
 
-use pyo3::prelude::*;
-
 /// The compiled part of taxel; import `taxel` instead.
-#[pymodule]
-fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    errors::register(module)?;
-    instructions::register(module)?;
+#[pyo3::pymodule]
+mod _core {
+    use pyo3::prelude::*;
+    use taxel_core::held::UNKNOWN;
+    use taxel_core::preload::LOADED_TICKS;
+
+    #[pymodule_export]
+    use crate::bridge::{Copies, Feed};
+    #[pymodule_export]
+    use crate::calibration::{check_law, law_of, law_rest};
+    #[pymodule_export]
+    use crate::circuit::{
+        Converted, adaptive_convert, circuit_volts, circuit_volts_alone, converter_ramp, converter_ticks,
+        converter_trace, fabric,
+    };
+    #[pymodule_export]
+    use crate::cone_x::{ConeXCertificate, ConeXFitOut, ConeXProblem};
+    #[pymodule_export]
+    use crate::described::{check_parameters, parameters};
+    #[pymodule_export]
+    use crate::detect::{
+        LoadCurve, ReadoutStream, Tally, check_detections, check_plain_rule, check_readout, is_plain_rule,
+        make_plain_rule, make_readout, readout_run_events, readout_run_frames, score, spread,
+    };
+    #[pymodule_export]
+    use crate::encode::{
+        EncoderStream, check_encoder, check_tare, encode_events, encode_frames, encoder_about, encoder_names,
+        local_load_of_events, local_load_of_frames, local_load_quantities, skin_afferents, tare_of_events,
+        tare_of_frames,
+    };
+    #[pymodule_export]
+    use crate::held::{
+        HeldValues, PyTrackedRest, above_rest, changes_of_frames, held_as_events, preload, touched_above,
+        touches_of_events, touches_of_frames,
+    };
+    #[pymodule_export]
+    use crate::instructions::instructions;
+    #[pymodule_export]
+    use crate::learn::{ConeRFitOut, ConeRProblem, OnlineConeR, Plastic};
+    #[pymodule_export]
+    use crate::live::{Ended, Live, send, serial_ports};
+    #[pymodule_export]
+    use crate::metrics::{distance, match_spikes, metric_names, pairwise};
+    #[pymodule_export]
+    use crate::neuron::{neuron_memory_ms, neuron_potential, neuron_run, neuron_run_many};
+    #[pymodule_export]
+    use crate::nouns::{check_events, check_spikes, split_by_sign};
+    #[pymodule_export]
+    use crate::panel::Panel;
+    #[pymodule_export]
+    use crate::pictures::RecordingPictures;
+    #[pymodule_export]
+    use crate::recording::{
+        Decoded, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
+        numbered_path, open_regular, read_lsa, recording_damage, recording_verdict, whole_pictures, write_lsa,
+    };
+    #[pymodule_export]
+    use crate::rivals::{
+        TrainedOut, batch_names, change_rival, change_tempotron, fit_batch, fit_rival, fit_tempotron, output_skim,
+        peak_tempotron, rows_skim, rule_names, run_batch, run_rival,
+    };
+    #[pymodule_export]
+    use crate::simulate::{Layer, Played, Source, check_scene, draw_scene, emulate, motion, play, truth};
     #[cfg(feature = "test-hooks")]
-    test_hooks::register(module)?;
-    nouns::register(module)?;
-    bridge::register(module)?;
-    calibration::register(module)?;
-    circuit::register(module)?;
-    cone_x::register(module)?;
-    detect::register(module)?;
-    encode::register(module)?;
-    live::register(module)?;
-    metrics::register(module)?;
-    held::register(module)?;
-    learn::register(module)?;
-    neuron::register(module)?;
-    described::register(module)?;
-    panel::register(module)?;
-    pictures::register(module)?;
-    recording::register(module)?;
-    rivals::register(module)?;
-    simulate::register(module)?;
-    wire::register(module)?;
-    wire_v2::register(module)?;
-    Ok(())
+    #[pymodule_export]
+    use crate::test_hooks::{message_schemas, test_hook};
+    #[pymodule_export]
+    use crate::wire::{
+        WireBoard, WireDecoder, command_bytes, command_read, registers_at_reset, registers_check, registers_commands,
+        registers_fields, registers_of_source, registers_of_words, registers_preset, registers_presets, registers_with,
+        registers_with_preset, registers_words, wire_cut, wire_encode, wire_rows,
+    };
+    #[pymodule_export]
+    use crate::wire_v2::{DatagramStream, EncodedDatagrams, decode_datagrams, encode_datagrams};
+
+    #[pymodule_init]
+    fn begin(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::errors::register(module)?;
+        crate::instructions::cap()?;
+        module.add("UNKNOWN", UNKNOWN)?;
+        module.add("LOADED_TICKS", LOADED_TICKS)
+    }
 }

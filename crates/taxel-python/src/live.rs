@@ -7,38 +7,66 @@ use std::time::Duration;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use serde_json::json;
-use taxel_core::encode::Zeroing;
+use serde_json::{Value, json};
+use taxel_core::detect::Detection;
+use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::problem;
 use taxel_live::address::of_host;
 use taxel_live::capture::Sender;
-use taxel_live::pipeline::{Handle, Lines, Live as Pipeline, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink};
+use taxel_live::pipeline::{
+    Handle, Lines, Live as Pipeline, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Summary,
+};
+use taxel_live::ports;
 
 use crate::bridge::{Copies, Feed};
 use crate::convert::array;
 use crate::enter::enter;
 use crate::errors::{ProblemError, core, live};
-use crate::parameters::parsed;
+use crate::parameters::{Plain, parsed};
 use crate::thread_state;
 use crate::threaded::Threaded;
 
-/// Label, t, known, slope, output \(us of the board's clock, ns of the host's clock\), repaired.
-type OutputParts = (String, i64, i64, f64, i64, i64, bool);
+/// A detection, by name: `reported` is the time of its report in us of the board's clock, `reported_ns` in ns of the host's.
+#[derive(IntoPyObject)]
+pub(crate) struct DetectionOut {
+    label: String,
+    t: i64,
+    known: i64,
+    slope: f64,
+    reported: i64,
+    reported_ns: i64,
+    repaired: bool,
+}
 
-/// t (us), column, row, rest after, rest before.
-type ZeroingOut = (i64, u16, u16, f64, Option<f64>);
+/// How a pipeline, or one of its recordings, ended.
+#[pyclass(frozen, get_all)]
+pub struct Ended {
+    counters: Plain<Value>,
+    verdict: Plain<Value>,
+    /// The recording, where there is one.
+    path: Option<PathBuf>,
+    /// The fresh tare, as its file's text, where one was completed.
+    tare: Option<String>,
+}
 
-fn zeroing_out(one: Zeroing) -> ZeroingOut {
-    (one.t, one.x, one.y, one.rest, one.before)
+impl From<Summary> for Ended {
+    fn from(summary: Summary) -> Self {
+        Self {
+            counters: Plain(json!(summary.counters)),
+            verdict: Plain(json!(summary.verdict)),
+            path: summary.path,
+            tare: summary.tare.as_ref().map(Tare::to_json),
+        }
+    }
 }
 
 fn to_record(path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Record> {
     Ok(Record { path, compression: compression.parse().map_err(core)?, overwrite })
 }
 
-fn output_parts(output: OutputDetection) -> OutputParts {
-    let d = output.detection;
-    (d.label, d.t, d.known, d.slope, output.reported_us, output.reported_ns, d.repaired)
+fn detection_out(output: OutputDetection) -> DetectionOut {
+    let Detection { label, t, known, slope, repaired } = output.detection;
+    DetectionOut { label, t, known, slope, reported: output.reported_us, reported_ns: output.reported_ns, repaired }
 }
 
 thread_local! {
@@ -48,10 +76,10 @@ thread_local! {
 
 /// Datagrams to detections, as they come.
 #[pyclass(frozen)]
-pub(crate) struct Live {
+pub struct Live {
     pipeline: Threaded<Pipeline>,
-    /// How it ended, as JSON, once it has; locked while it is being ended.
-    summary: Mutex<Option<String>>,
+    /// How it ended, once it has; locked while it is being ended.
+    summary: Mutex<Option<Summary>>,
 }
 
 impl Live {
@@ -93,7 +121,7 @@ impl Live {
             sinks.push(Box::new(move |output: &OutputDetection| {
                 thread_state::attach(|py| {
                     IN_CALLBACK.set(true);
-                    let outcome = say.call1(py, output_parts(output.clone()));
+                    let outcome = say.call1(py, (detection_out(output.clone()),));
                     IN_CALLBACK.set(false);
                     outcome.map(drop)
                 })
@@ -123,9 +151,9 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.place().to_string()))
     }
 
-    /// The board's registers, as far as they are known: JSON.
-    fn registers(&self, py: Python<'_>) -> PyResult<String> {
-        self.with(py, |pipeline| Ok(json!(pipeline.handle().registers()).to_string()))
+    /// The board's registers, as far as they are known.
+    fn registers(&self, py: Python<'_>) -> PyResult<Plain<Value>> {
+        self.with(py, |pipeline| Ok(Plain(json!(pipeline.handle().registers()))))
     }
 
     /// Copies for other computers, from the next batch on.
@@ -134,7 +162,7 @@ impl Live {
     }
 
     /// The next detection; None after `timeout` seconds without one, or when all is over.
-    fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<OutputParts>> {
+    fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<DetectionOut>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
         self.pipeline.check()?;
@@ -142,7 +170,7 @@ impl Live {
             Some(pipeline) => pipeline.wait(timeout, stop),
             None => Ok(None),
         })?;
-        Ok(output.map(output_parts))
+        Ok(output.map(detection_out))
     }
 
     /// Whether the pipeline has ended.
@@ -150,13 +178,13 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.is_over())).unwrap_or(true)
     }
 
-    /// Counts of what came and what became of it: JSON.
-    fn counters(&self, py: Python<'_>) -> PyResult<String> {
+    /// Counts of what came and what became of it.
+    fn counters(&self, py: Python<'_>) -> PyResult<Plain<Value>> {
         self.with(py, |pipeline| {
             let counters = pipeline.counters();
             let mut all = json!(counters);
             all["arrival"] = json!(counters.arrival(taxel_live::recording::now_ns()));
-            Ok(all.to_string())
+            Ok(Plain(all))
         })
     }
 
@@ -187,14 +215,14 @@ impl Live {
         self.with(py, |pipeline| pipeline.sample(name, arrived_ns, &values))
     }
 
-    /// Takes the values that taxels (column, row) hold for their rest from now on: t in us, column, row, rest after and before.
-    fn zero(&self, py: Python<'_>, taxels: Vec<(u16, u16)>) -> PyResult<Vec<ZeroingOut>> {
-        self.with(py, |pipeline| pipeline.handle().zero(&taxels)).map(|all| all.into_iter().map(zeroing_out).collect())
+    /// Takes the values that taxels (column, row) hold for their rest from now on.
+    fn zero(&self, py: Python<'_>, taxels: Vec<(u16, u16)>) -> PyResult<Plain<Vec<Zeroing>>> {
+        self.with(py, |pipeline| pipeline.handle().zero(&taxels).map(Plain))
     }
 
     /// The latest zeroing of each taxel that was zeroed.
-    fn zeroed(&self, py: Python<'_>) -> PyResult<Vec<ZeroingOut>> {
-        self.with(py, |pipeline| Ok(pipeline.handle().zeroed().0)).map(|all| all.into_iter().map(zeroing_out).collect())
+    fn zeroed(&self, py: Python<'_>) -> PyResult<Plain<Vec<Zeroing>>> {
+        self.with(py, |pipeline| Ok(Plain(pipeline.handle().zeroed().0)))
     }
 
     /// Writes a note into the recording.
@@ -202,11 +230,11 @@ impl Live {
         self.with(py, |pipeline| pipeline.note(text))
     }
 
-    /// Records what comes from here on; returns how a recording that ran ended, as JSON.
-    fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<String>> {
+    /// Records what comes from here on; returns how a recording that ran ended.
+    fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<Ended>> {
         let record = to_record(path, compression, overwrite)?;
         let ended = self.with(py, |pipeline| pipeline.record(&record))?;
-        Ok(ended.map(|summary| json!(summary).to_string()))
+        Ok(ended.map(Ended::from))
     }
 
     /// Lets the recording that runs begin anew where it holds nothing; returns whether it does.
@@ -214,9 +242,9 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.record_again()))
     }
 
-    /// Ends the recording that runs; returns how, as JSON.
-    fn end_recording(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(json!(self.with(py, Pipeline::end_recording)?).to_string())
+    /// Ends the recording that runs; returns how.
+    fn end_recording(&self, py: Python<'_>) -> PyResult<Ended> {
+        self.with(py, Pipeline::end_recording).map(Ended::from)
     }
 
     /// Whether a recording that `record` began runs.
@@ -229,8 +257,8 @@ impl Live {
         self.with(py, |pipeline| pipeline.expect_version(version))
     }
 
-    /// Ends; returns counters, verdict and path as JSON, the same at every call.
-    fn stop(&self, py: Python<'_>) -> PyResult<String> {
+    /// Ends; returns how, the same at every call.
+    fn stop(&self, py: Python<'_>) -> PyResult<Ended> {
         self.pipeline.check()?;
         if IN_CALLBACK.get() {
             let text =
@@ -242,25 +270,24 @@ impl Live {
             self.pipeline.read().iter().for_each(Pipeline::end);
             let mut summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(pipeline) = self.pipeline.take() {
-                *summary = Some(json!(pipeline.stop()?).to_string());
+                *summary = Some(pipeline.stop()?);
             }
             let ended = summary.clone();
             ended.ok_or_else(|| taxel_live::Error::from(problem!("live: ended by an error, which was raised then")))
         })
+        .map(Ended::from)
     }
 }
 
-/// The serial ports that the system knows, as JSON.
+/// The serial ports that the system knows.
 #[pyfunction]
-fn serial_ports(py: Python<'_>) -> PyResult<String> {
-    let ports = enter(py, |_| taxel_live::ports::ports())?;
-    Ok(json!(ports).to_string())
+pub fn serial_ports(py: Python<'_>) -> PyResult<Plain<Vec<ports::Port>>> {
+    enter(py, |_| ports::ports()).map(Plain)
 }
 
-/// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; returns the counts as JSON.
+/// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; returns the counts.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
-fn send(
+pub fn send(
     py: Python<'_>,
     host: &str,
     port: u16,
@@ -269,17 +296,10 @@ fn send(
     period_us: f64,
     seconds: f64,
     segment: bool,
-) -> PyResult<String> {
-    let counts = enter(py, |stop| {
+) -> PyResult<Plain<Value>> {
+    enter(py, |stop| {
         let mut sender = Sender::open(of_host(host, port)?, segment)?;
         sender.repeat(&datagrams, each, period_us, seconds, stop)?;
-        Ok::<_, taxel_live::Error>(sender.counts())
-    })?;
-    Ok(json!(counts).to_string())
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Live>()?;
-    module.add_function(wrap_pyfunction!(serial_ports, module)?)?;
-    module.add_function(wrap_pyfunction!(send, module)?)
+        Ok::<_, taxel_live::Error>(Plain(json!(sender.counts())))
+    })
 }

@@ -49,7 +49,7 @@ fn to_metric(json: &str) -> PyResult<Metric> {
 
 /// Which spikes and targets (ms) belong together, pattern by pattern: a pair of places each.
 #[pyfunction]
-fn match_spikes(
+pub fn match_spikes(
     py: Python<'_>,
     spikes: Vec<PyReadonlyArray1<'_, f64>>,
     targets: Vec<PyReadonlyArray1<'_, f64>>,
@@ -69,13 +69,13 @@ fn match_spikes(
 
 /// The names of all metrics.
 #[pyfunction]
-fn metric_names() -> Vec<&'static str> {
+pub fn metric_names() -> Vec<&'static str> {
     NAMES.to_vec()
 }
 
 /// The distance of two patterns.
 #[pyfunction]
-fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: PatternsIn<'py>) -> PyResult<f64> {
+pub fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: PatternsIn<'py>) -> PyResult<f64> {
     let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, Held::new(b)?);
     let (a, b) = (a.patterns()?, b.patterns()?);
     enter(py, |stop| metric.distance(&a, &b, stop))
@@ -90,7 +90,7 @@ fn to_instructions(name: Option<&str>) -> PyResult<Instructions> {
 
 /// The distances of all patterns from all others, row by row.
 #[pyfunction]
-fn pairwise<'py>(
+pub fn pairwise<'py>(
     py: Python<'py>,
     metric: &str,
     a: PatternsIn<'py>,
@@ -111,11 +111,4 @@ fn pairwise<'py>(
         metric.pairwise(&a, b.as_ref(), &mut work)
     })?;
     Ok(array(py, distances))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(metric_names, module)?)?;
-    module.add_function(wrap_pyfunction!(distance, module)?)?;
-    module.add_function(wrap_pyfunction!(match_spikes, module)?)?;
-    module.add_function(wrap_pyfunction!(pairwise, module)?)
 }

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::neuron::Neuron;
 
-use crate::convert::{SpikesIn, SpikesOut, array, from_spikes, slice, to_spikes};
+use crate::convert::{SpikesIn, SpikesOut, array, from_spikes, slice};
 use crate::enter::enter;
 use crate::errors::core;
 use crate::parameters::parsed;
@@ -20,14 +20,14 @@ type OutputSpikes<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 /// Times and slopes of the output spikes.
 #[pyfunction]
-fn neuron_run<'py>(
+pub fn neuron_run<'py>(
     py: Python<'py>,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
-    trains: SpikesIn<'py>,
+    trains: SpikesIn,
     threshold: f64,
 ) -> PyResult<OutputSpikes<'py>> {
-    let (neuron, trains) = (to_neuron(parameters)?, to_spikes(trains)?);
+    let (neuron, SpikesIn(trains)) = (to_neuron(parameters)?, trains);
     let weights = slice("weights", &weights)?;
     let spikes = enter(py, |stop| neuron.run(weights, &trains, threshold, stop))?;
     let (times, slopes) = spikes.iter().map(|s| (s.t, s.slope)).unzip();
@@ -36,28 +36,28 @@ fn neuron_run<'py>(
 
 /// The time after which an input's effect is less than 1 % of its largest, ms.
 #[pyfunction]
-fn neuron_memory_ms(parameters: &str) -> PyResult<f64> {
+pub fn neuron_memory_ms(parameters: &str) -> PyResult<f64> {
     Ok(to_neuron(parameters)?.memory_ms())
 }
 
 /// Weights of many neurons, in the precision that they are held in.
 #[derive(FromPyObject)]
-enum WeightsIn<'py> {
+pub(crate) enum WeightsIn<'py> {
     Double(PyReadonlyArray1<'py, f64>),
     Single(PyReadonlyArray1<'py, f32>),
 }
 
 /// The spike trains of many neurons on the same inputs; weights neuron after neuron.
 #[pyfunction]
-fn neuron_run_many<'py>(
+pub fn neuron_run_many<'py>(
     py: Python<'py>,
     parameters: &str,
     weights: WeightsIn<'py>,
     neurons: usize,
-    trains: SpikesIn<'py>,
+    trains: SpikesIn,
     threshold: f64,
 ) -> PyResult<SpikesOut<'py>> {
-    let (neuron, trains) = (to_neuron(parameters)?, to_spikes(trains)?);
+    let (neuron, SpikesIn(trains)) = (to_neuron(parameters)?, trains);
     let fired = match &weights {
         WeightsIn::Double(weights) => {
             let weights = slice("weights", weights)?;
@@ -73,23 +73,16 @@ fn neuron_run_many<'py>(
 
 /// The potential at these times.
 #[pyfunction]
-fn neuron_potential<'py>(
+pub fn neuron_potential<'py>(
     py: Python<'py>,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
-    trains: SpikesIn<'py>,
+    trains: SpikesIn,
     times: PyReadonlyArray1<'py, f64>,
     spikes: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (neuron, trains) = (to_neuron(parameters)?, to_spikes(trains)?);
+    let (neuron, SpikesIn(trains)) = (to_neuron(parameters)?, trains);
     let (weights, times, spikes) = (slice("weights", &weights)?, slice("times", &times)?, slice("spikes", &spikes)?);
     let potential = enter(py, |stop| neuron.potential(weights, &trains, times, spikes, stop))?;
     Ok(array(py, potential))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(neuron_memory_ms, module)?)?;
-    module.add_function(wrap_pyfunction!(neuron_run, module)?)?;
-    module.add_function(wrap_pyfunction!(neuron_run_many, module)?)?;
-    module.add_function(wrap_pyfunction!(neuron_potential, module)?)
 }

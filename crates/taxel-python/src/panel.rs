@@ -15,13 +15,12 @@ use requests::handlers;
 
 /// The panel's server.
 #[pyclass(frozen)]
-struct Panel(Threaded<Server>);
+pub struct Panel(Threaded<Server>);
 
 #[pymethods]
 impl Panel {
     /// Opens the port and begins to serve.
     #[new]
-    #[allow(clippy::too_many_arguments)]
     fn start(
         py: Python<'_>,
         host: &str,
@@ -88,8 +87,4 @@ impl Panel {
         py.detach(|| drop(self.0.take()));
         Ok(())
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Panel>()
 }

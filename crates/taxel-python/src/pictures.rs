@@ -5,12 +5,12 @@ use pyo3::prelude::*;
 use taxel_core::Error;
 use taxel_live::recording::EventPictures;
 
-use crate::convert::{EventsIn, array, slice, to_events};
+use crate::convert::{EventsIn, array, slice};
 use crate::enter::{Shared, enter};
 
 /// The pictures that a recording of events gets, one by one.
 #[pyclass(frozen, module = "taxel._core")]
-struct RecordingPictures(Shared<EventPictures>);
+pub struct RecordingPictures(Shared<EventPictures>);
 
 /// Time, us, and ticks by taxel index.
 type PictureOut<'py> = (i64, Bound<'py, PyArray1<u16>>);
@@ -20,7 +20,7 @@ impl RecordingPictures {
     /// `around` are times of interest, us.
     #[new]
     fn new(py: Python<'_>, events: EventsIn<'_>, around: PyReadonlyArray1<'_, i64>) -> PyResult<Self> {
-        let (events, around) = (to_events(events)?, slice("around", &around)?);
+        let around = slice("around", &around)?;
         let events = events.view()?;
         Ok(Self(Shared::new(enter(py, |_| EventPictures::new(events, around))?)))
     }
@@ -34,8 +34,4 @@ impl RecordingPictures {
         let found = self.0.enter(py, |pictures, _| Ok::<_, Error>(picture(pictures)))?;
         Ok(found.map(|(t, held)| (t, array(py, held))))
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<RecordingPictures>()
 }

@@ -1,60 +1,96 @@
 //! Recordings: the live format's reader and writer, and the manual's raw files.
 
+use std::collections::BTreeMap;
 use std::os::fd::IntoRawFd;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
-use serde_json::json;
+use pyo3::types::{PyBytes, PyTuple};
+use serde_json::{Value, json};
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, wire};
-use taxel_live::clock::{self, BoardClock};
+use taxel_live::clock::{self, BoardClock, Offset};
 use taxel_live::recording::{
-    Basis, BoardChange, Counts, Encoding, Header, LsaWriter, Reader, Track, Verdict, Writer, WriterOptions, decode_lsa,
-    numbered,
+    Basis, BoardChange, Counts, Encoding, Header, LsaWriter, Reader, Track, Verdict, Writer, WriterOptions,
+    damage_of_version_1, decode_lsa, numbered,
 };
 
-use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
+use crate::convert::{ArrayParts, Column, array, column, from_events, slice, to_array};
 use crate::enter::enter;
 use crate::errors::{core, live};
-use crate::parameters::parsed;
+use crate::parameters::{Plain, parsed};
 use crate::threaded::Threaded;
 
-/// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram; counts of version 2 as JSON; when
-/// each datagram could leave the board, us; what a verdict takes from decoding, as JSON.
-type DecodedOut<'py> = (
-    EventsOut<'py>,
-    String,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<u64>>,
-    Bound<'py, PyArray1<u64>>,
-    String,
-    Bound<'py, PyArray1<i64>>,
-    String,
-);
+/// The decoded datagrams of a board.
+#[pyclass(frozen, get_all)]
+pub struct Decoded {
+    /// The parts of the events.
+    events: Py<PyTuple>,
+    /// The decoder's counts.
+    counts: Plain<Value>,
+    /// The counts of the decoder of version 2.
+    version_2: Plain<Value>,
+    /// What a verdict takes from decoding.
+    found: Plain<Value>,
+    /// Of each datagram its arrival (ns), and the earliest time (us) at which it could leave the board.
+    arrived_ns: Column<i64>,
+    left: Column<i64>,
+}
 
-/// Arrival ns, number and own time us of each sample, all values, what could not be read and what is wrong with the stamps as JSON.
-type SamplesOut<'py> = (
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<u64>>,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<f64>>,
-    String,
-);
+/// The lines of a stream.
+#[pyclass(frozen, get_all)]
+pub struct Samples {
+    arrived_ns: Column<i64>,
+    number: Column<u64>,
+    /// The stream's own time, us.
+    t: Column<i64>,
+    /// All values, line by line.
+    values: Column<f64>,
+    /// What could not be read, and what is wrong with the times: what a verdict takes from reading.
+    found: Plain<Value>,
+}
 
-/// Arrival ns, number, where each begins, all bytes.
-type DatagramsOut<'py> =
-    (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u8>>);
+/// What a recording holds beside its data.
+#[pyclass(frozen, get_all)]
+pub struct Remarks {
+    /// The registers each time they were set, with the host's time (ns); notes; changes of the board with the host's time.
+    registers: Plain<Value>,
+    notes: Plain<Value>,
+    board: Plain<Value>,
+    /// Detections: host's time (ns), label, t and known (us), slope, repaired.
+    detections: Plain<Value>,
+    /// Zeroed taxels, with the host's time.
+    zeroings: Plain<Value>,
+    /// The last counts before the end.
+    counts: Plain<Value>,
+    /// What a verdict takes from the file.
+    condition: Plain<Value>,
+    datagrams: u64,
+    datagram_bytes: u64,
+    samples: u64,
+    /// The values that taxels held at the beginning, ticks; none if that is not known.
+    held: Option<Vec<u16>>,
+}
+
+/// Bytes of datagrams, by name.
+#[derive(IntoPyObject)]
+struct Datagrams<'py> {
+    arrived_ns: Bound<'py, PyArray1<i64>>,
+    number: Bound<'py, PyArray1<u64>>,
+    /// Where each begins, and the last ends.
+    offsets: Bound<'py, PyArray1<i64>>,
+    payload: Bound<'py, PyArray1<u8>>,
+}
 
 /// Time us of each picture, all values, messages that are no picture.
 type PicturesOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f32>>, u64);
 
 /// A recording of the live format, opened.
 #[pyclass(frozen)]
-struct RecordingReader {
+pub struct RecordingReader {
     reader: Reader,
 }
 
@@ -81,10 +117,15 @@ impl RecordingReader {
     }
 
     /// All samples of a stream.
-    fn samples<'py>(&self, py: Python<'py>) -> PyResult<SamplesOut<'py>> {
+    fn samples(&self, py: Python<'_>) -> PyResult<Samples> {
         let all = enter(py, |stop| self.reader.samples(stop))?;
-        let (arrived, number) = (array(py, all.arrived_ns), array(py, all.number));
-        Ok((arrived, number, array(py, all.t), array(py, all.values), json!(all.found).to_string()))
+        Ok(Samples {
+            arrived_ns: column(py, all.arrived_ns),
+            number: column(py, all.number),
+            t: column(py, all.t),
+            values: column(py, all.values),
+            found: Plain(json!(all.found)),
+        })
     }
 
     /// All pictures of a source: time us of each, all values, messages that are no picture of its array.
@@ -93,54 +134,57 @@ impl RecordingReader {
         Ok((array(py, all.t), array(py, all.values), all.bad))
     }
 
-    /// The header, how the recording ended, and what was rebuilt: JSON.
-    fn about(&self) -> String {
+    /// The header, how the recording ended, and what was rebuilt on opening.
+    fn about(&self) -> (Plain<Value>, Plain<Value>, Plain<Value>) {
         let reader = &self.reader;
-        json!({ "header": reader.header(), "ending": reader.ending(), "rebuilt": reader.rebuilt() }).to_string()
+        (Plain(json!(reader.header())), Plain(json!(reader.ending())), Plain(json!(reader.rebuilt())))
     }
 
-    /// Registers, notes, detections, counts, sizes: JSON.
-    fn remarks(&self, py: Python<'_>) -> PyResult<String> {
+    /// What the recording holds beside its data.
+    fn remarks(&self, py: Python<'_>) -> PyResult<Remarks> {
         let (all, unread) = enter(py, |stop| self.reader.remarks(stop))?;
         let detections: Vec<_> =
             all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope, d.repaired)).collect();
-        let markers: Vec<_> = all.markers.iter().map(|m| (m.t, m.start)).collect();
-        let remarks = json!({
-            "registers": all.registers, "markers": markers, "notes": all.notes, "detections": detections,
-            "board": all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>(),
-            "counts": all.counts, "datagrams": all.datagrams, "datagram_bytes": all.datagram_bytes,
-            "arrivals": all.arrivals, "pictures": all.pictures, "condition": self.reader.condition(&all, &unread),
-            "samples": all.samples, "held": all.held, "zeroings": all.zeroings,
-        });
-        Ok(remarks.to_string())
+        Ok(Remarks {
+            registers: Plain(json!(all.registers)),
+            notes: Plain(json!(all.notes)),
+            board: Plain(json!(all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>())),
+            detections: Plain(json!(detections)),
+            zeroings: Plain(json!(all.zeroings)),
+            counts: Plain(json!(all.counts)),
+            condition: Plain(json!(self.reader.condition(&all, &unread))),
+            datagrams: all.datagrams,
+            datagram_bytes: all.datagram_bytes,
+            samples: all.samples,
+            held: all.held,
+        })
     }
 
     /// Decodes all datagrams.
-    fn decode<'py>(&self, py: Python<'py>, pairing: &str) -> PyResult<DecodedOut<'py>> {
+    fn decode(&self, py: Python<'_>, pairing: &str) -> PyResult<Decoded> {
         let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
         let decoded = enter(py, |stop| self.reader.decode(pairing, stop))?;
-        Ok((
-            from_events(py, decoded.events),
-            json!(decoded.counts).to_string(),
-            array(py, decoded.arrived_ns),
-            array(py, decoded.number),
-            array(py, decoded.first),
-            json!(decoded.version_2).to_string(),
-            array(py, decoded.left),
-            json!(decoded.found).to_string(),
-        ))
+        Ok(Decoded {
+            events: from_events(py, decoded.events).into_pyobject(py)?.unbind(),
+            counts: Plain(json!(decoded.counts)),
+            version_2: Plain(json!(decoded.version_2)),
+            found: Plain(json!(decoded.found)),
+            arrived_ns: column(py, decoded.arrived_ns),
+            left: column(py, decoded.left),
+        })
     }
 
     /// All datagrams as they came.
-    fn datagrams<'py>(&self, py: Python<'py>) -> PyResult<DatagramsOut<'py>> {
+    fn datagrams<'py>(&self, py: Python<'py>) -> PyResult<Datagrams<'py>> {
         let all = enter(py, |stop| self.reader.datagrams(stop))?;
-        Ok((array(py, all.arrived_ns), array(py, all.number), array(py, all.offsets), array(py, all.bytes)))
+        let (arrived_ns, number) = (array(py, all.arrived_ns), array(py, all.number));
+        Ok(Datagrams { arrived_ns, number, offsets: array(py, all.offsets), payload: array(py, all.bytes) })
     }
 }
 
 /// A recording of the live format, being written: one of its sources.
 #[pyclass(frozen)]
-struct RecordingWriter {
+pub struct RecordingWriter {
     writer: Arc<Threaded<Writer>>,
     /// The source, if it is not the first.
     source: Option<String>,
@@ -221,7 +265,6 @@ impl RecordingWriter {
     }
 
     /// Writes that a taxel was zeroed.
-    #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn zeroing(
         &self,
         py: Python<'_>,
@@ -241,7 +284,6 @@ impl RecordingWriter {
     }
 
     /// Writes a detection.
-    #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn detection(
         &self,
         py: Python<'_>,
@@ -288,7 +330,6 @@ impl RecordingWriter {
     }
 
     /// Writes a picture for viewers of values above rest, row by row; white is at least `least`.
-    #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn picture_above(
         &self,
         py: Python<'_>,
@@ -326,33 +367,32 @@ impl RecordingWriter {
         })
     }
 
-    /// Ends the recording; counts in and out as JSON.
-    fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<String> {
+    /// Ends the recording; `counts` is JSON.
+    fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<()> {
         let counts: Counts = parsed("counts", counts)?;
         self.writer.check()?;
-        let counts = enter(py, |_| match self.writer.take() {
-            Some(writer) => writer.finish(counts),
+        enter(py, |_| match self.writer.take() {
+            Some(writer) => writer.finish(counts).map(drop),
             None => Err(self.writer.ended()),
-        })?;
-        Ok(json!(counts).to_string())
+        })
     }
 }
 
-/// The verdict of what is known of a recording: JSON in and out.
+/// The verdict on what is known of a recording, which is JSON.
 #[pyfunction]
-fn recording_verdict(basis: &str) -> PyResult<String> {
-    Ok(json!(Verdict::of(parsed::<Basis>("verdict", basis)?)).to_string())
+pub fn recording_verdict(basis: &str) -> PyResult<Plain<Value>> {
+    Ok(Plain(json!(Verdict::of(parsed::<Basis>("verdict", basis)?))))
 }
 
-/// The damage among a decoder's counts: JSON in and out.
+/// The damage among a decoder's counts, which are JSON.
 #[pyfunction]
-fn recording_damage(counts: &str) -> PyResult<String> {
-    Ok(json!(taxel_live::recording::damage_of_version_1(&parsed("counts", counts)?)).to_string())
+pub fn recording_damage(counts: &str) -> PyResult<Plain<BTreeMap<String, u64>>> {
+    Ok(Plain(damage_of_version_1(&parsed("counts", counts)?)))
 }
 
 /// Writes raw bytes as a new, complete `.lsa` with its `.lss`.
 #[pyfunction]
-fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>) -> PyResult<()> {
+pub fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>) -> PyResult<()> {
     let bytes = payload.as_bytes();
     enter(py, |_| {
         let mut writer = LsaWriter::create(&path, false)?;
@@ -361,73 +401,73 @@ fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>) -> PyR
     })
 }
 
-/// Bytes, events, counts as JSON, whether the `.lss` is there.
-type LsaOut<'py> = (Bound<'py, PyArray1<u8>>, EventsOut<'py>, String, bool);
+/// A `.lsa`, decoded.
+#[pyclass(frozen, get_all)]
+pub struct DecodedLsa {
+    payload: Column<u8>,
+    /// The parts of the events.
+    events: Py<PyTuple>,
+    /// The decoder's counts, and the damage among them.
+    counts: Plain<Value>,
+    damage: Plain<Value>,
+    /// Whether the `.lss` is there.
+    complete: bool,
+}
 
 /// Reads a `.lsa` and decodes it.
 #[pyfunction]
-fn read_lsa<'py>(
-    py: Python<'py>,
+pub fn read_lsa(
+    py: Python<'_>,
     path: PathBuf,
     sensor: ArrayParts,
     pairing: &str,
     differences: bool,
     memory: u64,
-) -> PyResult<LsaOut<'py>> {
+) -> PyResult<DecodedLsa> {
     let sensor = to_array(sensor)?;
     let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
     let read = enter(py, |stop| decode_lsa(&path, sensor, pairing, differences, memory, stop))?;
-    Ok((array(py, read.bytes), from_events(py, read.events), json!(read.counts).to_string(), read.complete))
+    Ok(DecodedLsa {
+        payload: column(py, read.bytes),
+        events: from_events(py, read.events).into_pyobject(py)?.unbind(),
+        counts: Plain(json!(read.counts)),
+        damage: Plain(json!(damage_of_version_1(&read.counts))),
+        complete: read.complete,
+    })
 }
 
-/// Lines between a source's clock and the host's, one for each stretch: its middle (us), a time of the source (us), the
-/// host's then (ns), drift (ppm).
+/// Lines between a source's clock and the host's, one for each stretch: its middle (us), and the line.
 #[pyfunction]
-fn clock_lines(
+pub fn clock_lines(
     py: Python<'_>,
     own_us: PyReadonlyArray1<'_, i64>,
     arrived_ns: PyReadonlyArray1<'_, i64>,
-) -> PyResult<Vec<(i64, i64, i64, f64)>> {
+) -> PyResult<Plain<Vec<(i64, Offset)>>> {
     let (own_us, arrived_ns) = (slice("own_us", &own_us)?, slice("arrived_ns", &arrived_ns)?);
-    let lines = enter(py, |_| Ok::<_, taxel_core::Error>(BoardClock::offsets_of(own_us, arrived_ns)))?;
-    Ok(lines.into_iter().map(|(middle, o)| (middle, o.board_us, o.host_ns, o.drift_ppm)).collect())
+    enter(py, |_| Ok::<_, taxel_core::Error>(Plain(BoardClock::offsets_of(own_us, arrived_ns))))
 }
 
 /// Why a drift (ppm) and delays (us: of 99 in 100 datagrams at most, of one in two) cannot be; `None` if they can.
 #[pyfunction]
-fn clock_doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
+pub fn clock_doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
     clock::doubt(drift_ppm, delay_us, median_us)
 }
 
 /// The descriptor of a regular file, opened for reading.
 #[pyfunction]
-fn open_regular(py: Python<'_>, path: PathBuf) -> PyResult<i32> {
+pub fn open_regular(py: Python<'_>, path: PathBuf) -> PyResult<i32> {
     Ok(enter(py, |_| taxel_live::open_regular(&path))?.into_raw_fd())
 }
 
 /// The name of a recording in automatic mode: the index appended to the name.
 #[pyfunction]
-fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
+pub fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
     numbered(&path, index)
 }
 
 /// Whether all values are whole and from 0 to 65 535, so that 16 bits hold them.
 #[pyfunction]
-fn whole_pictures(py: Python<'_>, values: PyReadonlyArray1<'_, f32>) -> PyResult<bool> {
+pub fn whole_pictures(py: Python<'_>, values: PyReadonlyArray1<'_, f32>) -> PyResult<bool> {
     let values = slice("values", &values)?;
     enter(py, |_| Ok::<_, taxel_core::Error>(Encoding::of(values) == Encoding::Whole))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<RecordingReader>()?;
-    module.add_class::<RecordingWriter>()?;
-    module.add_function(wrap_pyfunction!(whole_pictures, module)?)?;
-    module.add_function(wrap_pyfunction!(recording_verdict, module)?)?;
-    module.add_function(wrap_pyfunction!(recording_damage, module)?)?;
-    module.add_function(wrap_pyfunction!(read_lsa, module)?)?;
-    module.add_function(wrap_pyfunction!(clock_lines, module)?)?;
-    module.add_function(wrap_pyfunction!(clock_doubt, module)?)?;
-    module.add_function(wrap_pyfunction!(write_lsa, module)?)?;
-    module.add_function(wrap_pyfunction!(open_regular, module)?)?;
-    module.add_function(wrap_pyfunction!(numbered_path, module)?)
 }

@@ -4,24 +4,33 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 use taxel_core::learn::rivals::{Batch, Ended, Learnt, Rival, Skim, Tempotron, Trained};
-use taxel_core::{Result as CoreResult, SpikeTrains, Stop, problem};
+use taxel_core::{Result as CoreResult, Stop, problem};
 
-use crate::convert::{SpikesIn, array, slice, to_spikes};
+use crate::convert::{Column, SpikesIn, array, column, slice, to_patterns};
 use crate::enter::{enter, enter_keeping};
 use crate::errors::core;
-use crate::parameters::parsed;
+use crate::parameters::{Plain, parsed};
 
-/// Training as Python gets it: weights, right, best epoch, how it ended, a pending KeyboardInterrupt.
-type TrainedOut<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, usize, &'static str, Option<Py<PyAny>>);
+/// What training found.
+#[pyclass(frozen, get_all, name = "Trained")]
+pub struct TrainedOut {
+    weights: Column<f64>,
+    /// The share of patterns that were right, by epoch.
+    right: Column<f64>,
+    best_epoch: usize,
+    ended: &'static str,
+    /// A pending exception, such as KeyboardInterrupt.
+    raised: Option<Py<PyAny>>,
+}
 
 /// Trains, telling `progress` of each epoch; what it raises ends the training and is raised again.
-fn train<'py>(
-    py: Python<'py>,
+fn train(
+    py: Python<'_>,
     max_seconds: Option<f64>,
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&mut dyn FnMut(usize, f64), Stop<'_>) -> CoreResult<Trained> + Send,
-) -> PyResult<TrainedOut<'py>> {
-    let (trained, interrupt) = enter_keeping(py, max_seconds, |stop, caller| {
+) -> PyResult<TrainedOut> {
+    let (trained, raised) = enter_keeping(py, max_seconds, |stop, caller| {
         let mut report = |epoch: usize, right: f64| {
             caller.call(progress.as_ref(), |py, function| function.call1(py, (epoch, right)));
         };
@@ -32,11 +41,8 @@ fn train<'py>(
         Ended::Epochs => "epochs",
         Ended::Stopped => "stopped",
     };
-    Ok((array(py, trained.weights), array(py, trained.right), trained.best_epoch, ended, interrupt))
-}
-
-fn to_patterns(patterns: Vec<SpikesIn<'_>>) -> PyResult<Vec<SpikeTrains>> {
-    patterns.into_iter().map(to_spikes).collect()
+    let (weights, right) = (column(py, trained.weights), column(py, trained.right));
+    Ok(TrainedOut { weights, right, best_epoch: trained.best_epoch, ended, raised })
 }
 
 fn to_targets(targets: &[PyReadonlyArray1<'_, f64>]) -> PyResult<Vec<Vec<f64>>> {
@@ -58,179 +64,157 @@ pub(crate) fn to_rival(json: &str) -> PyResult<Rival> {
 
 /// The names of all rules by epochs.
 #[pyfunction]
-fn rule_names() -> Vec<&'static str> {
+pub fn rule_names() -> Vec<&'static str> {
     Rival::names().collect()
 }
 
 /// Trains a rule's neuron.
 #[pyfunction]
 #[pyo3(signature = (parameters, patterns, targets, start, progress))]
-fn fit_rival<'py>(
+pub fn fit_rival<'py>(
     py: Python<'py>,
     parameters: &str,
-    patterns: Vec<SpikesIn<'py>>,
+    patterns: Vec<SpikesIn>,
     targets: Vec<PyReadonlyArray1<'py, f64>>,
     start: Option<PyReadonlyArray1<'py, f64>>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<TrainedOut<'py>> {
+) -> PyResult<TrainedOut> {
     let rival = to_rival(parameters)?;
-    let (patterns, targets) = (to_patterns(patterns)?, to_targets(&targets)?);
+    let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
     let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
     train(py, rival.training.max_seconds, progress, |report, stop| rival.fit(&patterns, &targets, start, report, stop))
 }
 
 /// What one presentation changes, over the learning rate; output spikes.
 #[pyfunction]
-fn change_rival<'py>(
+pub fn change_rival<'py>(
     py: Python<'py>,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
-    pattern: SpikesIn<'py>,
+    pattern: SpikesIn,
     targets: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
     let rival = to_rival(parameters)?;
-    let pattern = to_spikes(pattern)?;
     let (weights, targets) = (slice("weights", &weights)?, slice("targets", &targets)?);
-    let (change, fired) = enter(py, |_| rival.change(weights, &pattern, targets))?;
+    let (change, fired) = enter(py, |_| rival.change(weights, &pattern.0, targets))?;
     Ok([array(py, change), array(py, fired)])
 }
 
 /// Output spikes of a rule's neuron.
 #[pyfunction]
-fn run_rival<'py>(
+pub fn run_rival<'py>(
     py: Python<'py>,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
-    pattern: SpikesIn<'py>,
+    pattern: SpikesIn,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let rival = to_rival(parameters)?;
-    let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
-    let fired = enter(py, |stop| rival.run(weights, &pattern, stop))?;
+    let fired = enter(py, |stop| rival.run(weights, &pattern.0, stop))?;
     Ok(array(py, fired))
 }
 
 /// Trains a Tempotron.
 #[pyfunction]
 #[pyo3(signature = (parameters, patterns, labels, start, progress))]
-fn fit_tempotron<'py>(
+pub fn fit_tempotron<'py>(
     py: Python<'py>,
     parameters: &str,
-    patterns: Vec<SpikesIn<'py>>,
+    patterns: Vec<SpikesIn>,
     labels: Vec<bool>,
     start: Option<PyReadonlyArray1<'py, f64>>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<TrainedOut<'py>> {
+) -> PyResult<TrainedOut> {
     let tempotron: Tempotron = parsed("Tempotron", parameters)?;
-    let patterns = to_patterns(patterns)?;
+    let patterns = to_patterns(patterns);
     let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
     train(py, tempotron.max_seconds, progress, |report, stop| tempotron.fit(&patterns, &labels, start, report, stop))
 }
 
 /// Highest potential, its time, time of the spike (infinite where there is none).
 #[pyfunction]
-fn peak_tempotron(
+pub fn peak_tempotron(
     py: Python<'_>,
     parameters: &str,
     weights: PyReadonlyArray1<'_, f64>,
-    pattern: SpikesIn<'_>,
+    pattern: SpikesIn,
 ) -> PyResult<(f64, f64, f64)> {
     let tempotron: Tempotron = parsed("Tempotron", parameters)?;
-    let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
-    let peak = enter(py, |_| tempotron.peak(weights, &pattern))?;
+    let peak = enter(py, |_| tempotron.peak(weights, &pattern.0))?;
     Ok((peak.v_max, peak.t_max, peak.t_spike.unwrap_or(f64::INFINITY)))
 }
 
 /// What one presentation changes, over the learning rate.
 #[pyfunction]
-fn change_tempotron<'py>(
+pub fn change_tempotron<'py>(
     py: Python<'py>,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
-    pattern: SpikesIn<'py>,
+    pattern: SpikesIn,
     label: bool,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let tempotron: Tempotron = parsed("Tempotron", parameters)?;
-    let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
-    let change = enter(py, |_| tempotron.change(weights, &pattern, label))?;
+    let change = enter(py, |_| tempotron.change(weights, &pattern.0, label))?;
     Ok(array(py, change))
 }
 
 /// The names of all learners that take all examples at once.
 #[pyfunction]
-fn batch_names() -> &'static [&'static str] {
+pub fn batch_names() -> &'static [&'static str] {
     Batch::NAMES
 }
 
-/// Learns from all examples at once; returns weights, and further results as JSON.
+/// Learns from all examples at once; returns weights, and further results by name.
 #[pyfunction]
-fn fit_batch<'py>(
+pub fn fit_batch<'py>(
     py: Python<'py>,
     name: &str,
     parameters: &str,
-    patterns: Vec<SpikesIn<'py>>,
+    patterns: Vec<SpikesIn>,
     targets: Vec<PyReadonlyArray1<'py, f64>>,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, String)> {
+) -> PyResult<(Bound<'py, PyArray1<f64>>, Plain<Map<String, Value>>)> {
     let batch = Batch::from_json(name, parameters).map_err(core)?;
-    let (patterns, targets) = (to_patterns(patterns)?, to_targets(&targets)?);
+    let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
     let learnt = enter(py, |stop| batch.fit(&patterns, &targets, stop))?;
-    Ok((array(py, learnt.weights), Value::Object(learnt.results).to_string()))
+    Ok((array(py, learnt.weights), Plain(learnt.results)))
 }
 
 /// Output spikes of such a learner.
 #[pyfunction]
-fn run_batch<'py>(
+pub fn run_batch<'py>(
     py: Python<'py>,
     name: &str,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
     results: &str,
-    pattern: SpikesIn<'py>,
+    pattern: SpikesIn,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let batch = Batch::from_json(name, parameters).map_err(core)?;
     let learnt = Learnt { weights: slice("weights", &weights)?.to_vec(), results: parsed(name, results)? };
-    let pattern = to_spikes(pattern)?;
-    let fired = enter(py, |stop| batch.run(&learnt, &pattern, stop))?;
+    let fired = enter(py, |stop| batch.run(&learnt, &pattern.0, stop))?;
     Ok(array(py, fired))
 }
 
 /// The rows of one pattern, one after the other.
 #[pyfunction]
-fn rows_skim<'py>(py: Python<'py>, parameters: &str, pattern: SpikesIn<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+pub fn rows_skim<'py>(py: Python<'py>, parameters: &str, pattern: SpikesIn) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let skim: Skim = parsed("SKIM", parameters)?;
-    let pattern = to_spikes(pattern)?;
-    let rows = enter(py, |stop| skim.rows(&pattern, stop))?;
+    let rows = enter(py, |stop| skim.rows(&pattern.0, stop))?;
     Ok(array(py, rows))
 }
 
 /// The output at each row's time.
 #[pyfunction]
-fn output_skim<'py>(
+pub fn output_skim<'py>(
     py: Python<'py>,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
-    pattern: SpikesIn<'py>,
+    pattern: SpikesIn,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let skim: Skim = parsed("SKIM", parameters)?;
-    let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
-    let output = enter(py, |stop| skim.output(weights, &pattern, stop))?;
+    let output = enter(py, |stop| skim.output(weights, &pattern.0, stop))?;
     Ok(array(py, output))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(rule_names, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_rival, module)?)?;
-    module.add_function(wrap_pyfunction!(change_rival, module)?)?;
-    module.add_function(wrap_pyfunction!(run_rival, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_tempotron, module)?)?;
-    module.add_function(wrap_pyfunction!(peak_tempotron, module)?)?;
-    module.add_function(wrap_pyfunction!(change_tempotron, module)?)?;
-    module.add_function(wrap_pyfunction!(batch_names, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_batch, module)?)?;
-    module.add_function(wrap_pyfunction!(run_batch, module)?)?;
-    module.add_function(wrap_pyfunction!(rows_skim, module)?)?;
-    module.add_function(wrap_pyfunction!(output_skim, module)?)
 }

@@ -6,8 +6,11 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use serde::Deserialize;
-use taxel_core::board::{Board, Crossed, Faults, Flaws, IntensityWord, Play, Played, Previous, Version2, opening};
+use taxel_core::board::{
+    self, Board, BoardCounts, Crossed, Faults, Flaws, IntensityWord, Play, Previous, Version2, opening,
+};
 use taxel_core::circuit::Chain;
 use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Narrow, Pictures, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
@@ -16,21 +19,21 @@ use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Feed, Replay, Report, Scenes, Touch};
 
-use crate::convert::{ArrayParts, EventsIn, EventsOut, array, from_events, slice, to_array, to_events};
+use crate::convert::{ArrayParts, EventsIn, array, from_events, slice, to_array};
 use crate::enter::{Shared, enter, enter_with_progress};
 use crate::errors::core;
-use crate::parameters::parsed;
+use crate::parameters::{Plain, parsed};
 
 /// An act as Python passes it: silence in ms, a scene as JSON, or pictures with their period in us.
 #[derive(FromPyObject)]
-enum ActIn<'py> {
+pub(crate) enum ActIn<'py> {
     Silence(f64),
     Scene(String),
     Pictures(PyReadonlyArray1<'py, f32>, f64),
 }
 
 fn scene(json: &str) -> Result<Scene> {
-    reading::from_text(json).map_err(|unfit| Error::Scene(unfit.of("scene")))
+    reading::from_text(json).map_err(|unfit| Error::scene(unfit.of("scene")))
 }
 
 fn to_act(act: ActIn<'_>) -> PyResult<Act> {
@@ -48,14 +51,20 @@ fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
 }
 
 fn to_sensor(json: &str) -> PyResult<Sensor> {
-    reading::from_text(json).map_err(|unfit| core(Error::Scene(unfit.of("sensor"))))
+    reading::from_text(json).map_err(|unfit| core(Error::scene(unfit.of("sensor"))))
 }
 
-/// Touches as Python receives them: kind, start and stop in us, speed in m/s, peak force in N.
-type ContactsOut = Vec<(String, f64, f64, f64, f64)>;
+/// What one body does at even steps, by name.
+#[derive(IntoPyObject)]
+pub(crate) struct TrackOut<'py> {
+    x_mm: Bound<'py, PyArray1<f32>>,
+    y_mm: Bound<'py, PyArray1<f32>>,
+    depth_mm: Bound<'py, PyArray1<f32>>,
+    force_n: Bound<'py, PyArray1<f32>>,
+}
 
-/// By body: place in mm, depth in mm and force in N at even steps; touches; the warning of one that is too narrow.
-type MotionOut<'py> = (Vec<[Bound<'py, PyArray1<f32>>; 4]>, ContactsOut, Option<String>);
+/// By body what it does; touches; the warning of one that is too narrow.
+type MotionOut<'py> = (Vec<TrackOut<'py>>, Plain<Vec<Contact>>, Option<String>);
 
 /// By number of an act the warning of a touch that is narrower than its cells resolve.
 type NarrowOut = Vec<(usize, String)>;
@@ -64,20 +73,15 @@ fn from_narrow(narrow: &[(usize, Narrow)]) -> NarrowOut {
     narrow.iter().map(|(act, narrow)| (*act, narrow.to_string())).collect()
 }
 
-fn from_contacts(contacts: &[Contact]) -> ContactsOut {
-    contacts.iter().map(|c| (c.kind.name().to_owned(), c.start_us, c.stop_us, c.speed_m_s, c.peak_n)).collect()
-}
-
-/// Draws a scene; gives its parameters as JSON.
+/// Draws a scene; gives its parameters.
 #[pyfunction]
-fn draw_scene(parts: ArrayParts, seed: u64, index: u32, left_to_rest: bool) -> PyResult<String> {
-    let scene = Scene::draw(&to_array(parts)?, seed, index, left_to_rest).map_err(core)?;
-    serde_json::to_string(&scene).map_err(|error| core(Error::Scene(error.to_string())))
+pub fn draw_scene(parts: ArrayParts, seed: u64, index: u32, left_to_rest: bool) -> PyResult<Plain<Scene>> {
+    Scene::draw(&to_array(parts)?, seed, index, left_to_rest).map(Plain).map_err(core)
 }
 
 /// Refuses a scene or taxels that make no sense on an array, without computing the scene.
 #[pyfunction]
-fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> {
+pub fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> {
     let felt = to_array(parts)?;
     scene(json).and_then(|scene| scene.check(&felt)).map_err(core)?;
     to_sensor(sensor)?.check().map_err(core)
@@ -85,23 +89,27 @@ fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> {
 
 /// Works a scene out: each body's trajectory at even steps, and the touches.
 #[pyfunction]
-fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
+pub fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
     let felt = to_array(parts)?;
     let motion = enter(py, |stop| Motion::of(&scene(json)?, &felt, step_us, stop))?;
-    let (contacts, narrow) = (from_contacts(&motion.contacts), motion.narrow.map(|narrow| narrow.to_string()));
-    let column = |values| array(py, values);
-    let out = |t: Track| [t.x_mm, t.y_mm, t.depth_mm, t.force_n].map(column);
+    let (contacts, narrow) = (Plain(motion.contacts), motion.narrow.map(|narrow| narrow.to_string()));
+    let out = |Track { x_mm, y_mm, depth_mm, force_n }: Track| TrackOut {
+        x_mm: array(py, x_mm),
+        y_mm: array(py, y_mm),
+        depth_mm: array(py, depth_mm),
+        force_n: array(py, force_n),
+    };
     Ok((motion.tracks.into_iter().map(out).collect(), contacts, narrow))
 }
 
 /// Works acts out without playing them: touches in us of the board's clock, force in N by frame. `registers` is JSON.
 #[pyfunction]
-fn truth<'py>(
+pub fn truth<'py>(
     py: Python<'py>,
     parts: ArrayParts,
     registers: &str,
     acts: Vec<ActIn<'py>>,
-) -> PyResult<(ContactsOut, Bound<'py, PyArray1<f32>>, NarrowOut)> {
+) -> PyResult<(Plain<Vec<Contact>>, Bound<'py, PyArray1<f32>>, NarrowOut)> {
     let registers = parsed("registers", registers)?;
     let (array_felt, sensor) = (to_array(parts)?, Sensor::default());
     let (circuit, asynchronous, tare_ms) = (None, false, 0.0);
@@ -112,7 +120,7 @@ fn truth<'py>(
         let force_n = stage.force_n()?;
         Ok::<_, Error>((stage, force_n))
     })?;
-    Ok((from_contacts(stage.contacts()), array(py, force_n), from_narrow(stage.narrow())))
+    Ok((Plain(stage.contacts().to_vec()), array(py, force_n), from_narrow(stage.narrow())))
 }
 
 /// The circuit of a board that is played to, and whether it is asynchronous.
@@ -123,36 +131,47 @@ struct PlayedBy {
     asynchronous: bool,
 }
 
-/// Plays acts to a board that arms, is tared and starts; gives what a host decodes of its datagrams, and how many they
-/// were, with their words and bytes. `registers` and `options` are JSON.
+/// What a host decodes of the datagrams of a board that was played to.
+#[pyclass(frozen, get_all, module = "taxel._core")]
+pub struct Played {
+    /// The parts of the events.
+    events: Py<PyTuple>,
+    /// How many datagrams there were, with their words and bytes.
+    datagrams: u64,
+    words: u64,
+    bytes: u64,
+    narrow: NarrowOut,
+}
+
+/// Plays acts to a board that arms, is tared and starts. `registers` and `options` are JSON.
 ///
 /// `watch` is called once a second of the board's with the share that is played; an exception of it ends the play.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
-fn play<'py>(
-    py: Python<'py>,
+pub fn play(
+    py: Python<'_>,
     parts: ArrayParts,
     registers: &str,
     sensor: &str,
     seed: u64,
-    acts: Vec<ActIn<'py>>,
+    acts: Vec<ActIn<'_>>,
     tare_ms: f64,
     options: &str,
     watch: Py<PyAny>,
-) -> PyResult<(EventsOut<'py>, u64, u64, u64, NarrowOut)> {
+) -> PyResult<Played> {
     let (array, registers, sensor) = (to_array(parts)?, parsed("registers", registers)?, to_sensor(sensor)?);
     let PlayedBy { circuit, asynchronous } = parsed("options", options)?;
     let play = Play { array, registers, sensor, seed, acts: to_acts(acts)?, tare_ms, circuit, asynchronous };
-    let Played { events, datagrams, words, bytes, narrow } = enter_with_progress(py, |stop, caller| {
+    let board::Played { events, datagrams, words, bytes, narrow } = enter_with_progress(py, |stop, caller| {
         play.run(|share| caller.call(Some(&watch), |py, function| function.call1(py, (share,))), stop)
     })?;
-    Ok((from_events(py, events), datagrams, words, bytes, from_narrow(&narrow)))
+    let events = from_events(py, events).into_pyobject(py)?.unbind();
+    Ok(Played { events, datagrams, words, bytes, narrow: from_narrow(&narrow) })
 }
 
 /// The touch of an emulated board, as Python passes it.
 #[expect(clippy::large_enum_variant, reason = "there is one by call")]
 #[derive(FromPyObject)]
-enum TouchIn<'py> {
+pub(crate) enum TouchIn<'py> {
     /// Events and the speed at which they are played.
     Events(EventsIn<'py>, f64),
     /// us, ticks, speed.
@@ -239,10 +258,9 @@ impl Touch for Felt {
 /// the report.
 ///
 /// `options` is JSON. `begun` is called with the address for commands once the board is ready, `watch` ten times a second
-/// with a report, as JSON, and the touches that became known. An exception of either ends the play.
+/// with a report and the touches that became known. An exception of either ends the play.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
-fn emulate(
+pub fn emulate(
     py: Python<'_>,
     to: &str,
     parts: ArrayParts,
@@ -252,7 +270,7 @@ fn emulate(
     options: &str,
     begun: Py<PyAny>,
     watch: Py<PyAny>,
-) -> PyResult<String> {
+) -> PyResult<Plain<Report>> {
     let array = to_array(parts)?;
     let chosen: Chosen = parsed("options", options)?;
     let Chosen { registers, tare_ms, version_2, previous, intensity, .. } = chosen;
@@ -268,7 +286,6 @@ fn emulate(
             Felt::Scenes(Box::new(enter(py, |_| Scenes::new(&array, taxels, frame_us, Acts(iterator)))?))
         }
         TouchIn::Events(events, speed) => {
-            let events = to_events(events)?;
             let events = events.view()?;
             Felt::Other(Box::new(enter(py, |_| Replay::events(events, (frame_us, speed), step, registers.ramp))?))
         }
@@ -310,14 +327,14 @@ fn emulate(
             &mut touch,
             |report, touch| {
                 let contacts = match touch {
-                    Felt::Scenes(scenes) => from_contacts(&scenes.take_contacts()),
+                    Felt::Scenes(scenes) => scenes.take_contacts(),
                     Felt::Other(_) => vec![],
                 };
-                caller.call(Some(&watch), |py, function| function.call1(py, (json(report), contacts)));
+                caller.call(Some(&watch), |py, function| function.call1(py, (Plain(report), Plain(contacts))));
             },
             stop,
         )?;
-        Ok::<_, taxel_live::Error>(json(&report))
+        Ok::<_, taxel_live::Error>(Plain(report))
     })
 }
 
@@ -326,14 +343,14 @@ type TwoOut<'py, A, B> = (Bound<'py, PyArray1<A>>, Bound<'py, PyArray1<B>>);
 
 /// Foam bonded to the board.
 #[pyclass(frozen, module = "taxel._core")]
-struct Layer(Shared<Bonded>);
+pub struct Layer(Shared<Bonded>);
 
 #[pymethods]
 impl Layer {
     /// `foam` is JSON.
     #[new]
     fn new(py: Python<'_>, parts: ArrayParts, foam: &str, cells_per_pitch: u16, tolerance: f64) -> PyResult<Self> {
-        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::Scene(unfit.of("foam"))))?;
+        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::scene(unfit.of("foam"))))?;
         let array = to_array(parts)?;
         let layer =
             enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch, stop)?.to_within(tolerance)))?;
@@ -379,7 +396,7 @@ impl Layer {
 
 /// A board that scans frames as they are pushed, and sends what it makes of them.
 #[pyclass(frozen, module = "taxel._core")]
-struct Source(Shared<(Board, Sender)>);
+pub struct Source(Shared<(Board, Sender)>);
 
 #[pymethods]
 impl Source {
@@ -409,25 +426,7 @@ impl Source {
         })
     }
 
-    /// The counts as JSON.
-    fn counts(&self, py: Python<'_>) -> PyResult<String> {
-        let counts = self.0.with(py, |(board, _)| *board.counts());
-        serde_json::to_string(&counts).map_err(|error| core(Error::Scene(error.to_string())))
+    fn counts(&self, py: Python<'_>) -> Plain<BoardCounts> {
+        Plain(self.0.with(py, |(board, _)| *board.counts()))
     }
-}
-
-fn json(report: &Report) -> String {
-    // Whole and finite numbers only: nothing in it can fail to be written.
-    serde_json::to_string(report).unwrap_or_default()
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(draw_scene, module)?)?;
-    module.add_function(wrap_pyfunction!(check_scene, module)?)?;
-    module.add_function(wrap_pyfunction!(motion, module)?)?;
-    module.add_function(wrap_pyfunction!(truth, module)?)?;
-    module.add_function(wrap_pyfunction!(play, module)?)?;
-    module.add_class::<Layer>()?;
-    module.add_class::<Source>()?;
-    module.add_function(wrap_pyfunction!(emulate, module)?)
 }

@@ -4,19 +4,19 @@
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use taxel_core::Error;
+use taxel_core::{Error, Hint};
 
 use crate::enter::enter;
 use crate::errors::ProblemError;
 
 /// Does what `what` names without the GIL: returns an error of a kind, panics, or waits a minute for Ctrl-C.
 #[pyfunction]
-fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
+pub fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
     let error = match what {
-        "format" => Error::Format("file, byte 0: raised by a test hook".to_owned()),
-        "problem" => Error::Problem("argument: raised by a test hook".to_owned()),
-        "device" => Error::Device("register: raised by a test hook".to_owned()),
-        "scene" => Error::Scene("ball: raised by a test hook".to_owned()),
+        "format" => Error::format("file, byte 0: raised by a test hook").helped_by("limit", Hint::Larger),
+        "problem" => Error::argument("tau", ": raised by a test hook"),
+        "device" => Error::device("register: raised by a test hook"),
+        "scene" => Error::scene("ball: raised by a test hook"),
         "interrupted" => Error::Interrupted,
         #[allow(clippy::panic)]
         "panic" => return enter(py, |_| -> Result<(), Error> { panic!("raised by a test hook") }),
@@ -36,11 +36,6 @@ fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
 
 /// The JSON schemas of the panel's requests and messages.
 #[pyfunction]
-fn message_schemas() -> String {
+pub fn message_schemas() -> String {
     taxel_panel::message_schemas()
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(message_schemas, module)?)?;
-    module.add_function(wrap_pyfunction!(test_hook, module)?)
 }

@@ -6,19 +6,19 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Deserialize;
-use taxel_core::board::{Board, Crossed, IntensityWord, Previous, Version2};
+use serde_json::{Value, json};
+use taxel_core::board::{Board, BoardCounts, Crossed, IntensityWord, Previous, Version2};
 use taxel_core::circuit::Chain;
 use taxel_core::wire::v2::{self, Outcome};
 use taxel_core::wire::{self, Command, Cut, Decoder, Pairing, Registers};
 use taxel_core::{Error, Events, problem};
 
 use crate::convert::{
-    ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_events, from_filled, slice, to_array, to_events,
-    to_room,
+    ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_events, from_filled, slice, to_array, to_room,
 };
 use crate::enter::{Shared, enter};
 use crate::errors::core;
-use crate::parameters::{parsed, to_json};
+use crate::parameters::{Plain, parsed};
 
 /// A decoder of either version, and what the last datagram of version 2 was.
 enum Either {
@@ -28,7 +28,7 @@ enum Either {
 
 /// Turns bytes of version 1, or datagrams of version 2, into events as they come.
 #[pyclass(module = "taxel._core", frozen)]
-struct WireDecoder(Shared<Either>);
+pub struct WireDecoder(Shared<Either>);
 
 #[pymethods]
 impl WireDecoder {
@@ -77,7 +77,7 @@ impl WireDecoder {
         let (data, lengths, room) = (slice("data", &data)?, slice("lengths", &lengths)?, to_room(&mut columns)?);
         let columns = self.0.enter(py, |decoder, stop| match decoder {
             Either::One(decoder) => decoder.fill_datagrams(data, lengths, room, stop),
-            Either::Two(..) => Err(problem!("lengths: datagrams of version 2 have theirs before them")),
+            Either::Two(..) => Err(problem!("lengths"; ": datagrams of version 2 have theirs before them")),
         })?;
         Ok(from_filled(py, columns))
     }
@@ -102,12 +102,12 @@ impl WireDecoder {
         Ok(from_events(py, events))
     }
 
-    /// The version's counts as JSON.
-    fn counts(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.with(py, |decoder| match decoder {
-            Either::One(decoder) => to_json(decoder.counts()),
-            Either::Two(decoder, _) => to_json(&decoder.counts()),
-        })
+    /// The version's counts.
+    fn counts(&self, py: Python<'_>) -> Plain<Value> {
+        Plain(self.0.with(py, |decoder| match decoder {
+            Either::One(decoder) => json!(decoder.counts()),
+            Either::Two(decoder, _) => json!(decoder.counts()),
+        }))
     }
 
     /// Of the last datagram of version 2: until when nothing comes any more, us, and whether it was decoded.
@@ -121,13 +121,12 @@ impl WireDecoder {
         })
     }
 
-    /// The totals that the board last sent, as JSON.
-    fn status(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        let status = self.0.with(py, |decoder| match decoder {
+    /// The totals that the board last sent.
+    fn status(&self, py: Python<'_>) -> Option<Plain<v2::Status>> {
+        self.0.with(py, |decoder| match decoder {
             Either::One(_) => None,
-            Either::Two(decoder, _) => decoder.status().copied(),
-        });
-        status.map(|status| to_json(&status)).transpose()
+            Either::Two(decoder, _) => decoder.status().copied().map(Plain),
+        })
     }
 
     /// What each taxel holds by index, -1 where that is not known.
@@ -142,7 +141,7 @@ impl WireDecoder {
 
 /// How many rows bytes of a version may need: of a stream of version 1, of a datagram or a stream of version 2.
 #[pyfunction]
-fn wire_rows(version: u8, length: usize) -> usize {
+pub fn wire_rows(version: u8, length: usize) -> usize {
     match version {
         1 => wire::most_rows(length),
         _ => v2::stream_rows(length),
@@ -154,7 +153,7 @@ type CutOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
 
 /// Where datagrams begin into which bytes of version 1 are cut, and where the last one ends; the board's time of each, us.
 #[pyfunction]
-fn wire_cut<'py>(py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResult<CutOut<'py>> {
+pub fn wire_cut<'py>(py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResult<CutOut<'py>> {
     let data = slice("data", &data)?;
     let Cut { offsets, times } = enter(py, |_| Ok::<_, Error>(wire::cut(data)))?;
     Ok((array(py, offsets.into_iter().map(|at| at as i64).collect()), array(py, times)))
@@ -162,8 +161,7 @@ fn wire_cut<'py>(py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResult<Cu
 
 /// Events as bytes.
 #[pyfunction]
-fn wire_encode<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyBytes>> {
-    let events = to_events(events)?;
+pub fn wire_encode<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyBytes>> {
     let events = events.view()?;
     let bytes = enter(py, |_| wire::encode(events))?;
     Ok(PyBytes::new(py, &bytes))
@@ -171,13 +169,13 @@ fn wire_encode<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'p
 
 /// A command's five bytes.
 #[pyfunction]
-fn command_bytes(py: Python<'_>, register: u8, value: u32) -> PyResult<Bound<'_, PyBytes>> {
+pub fn command_bytes(py: Python<'_>, register: u8, value: u32) -> PyResult<Bound<'_, PyBytes>> {
     Ok(PyBytes::new(py, &Command::new(register, value).map_err(core)?.to_bytes()))
 }
 
 /// Register and value of a command's five bytes.
 #[pyfunction]
-fn command_read(data: PyReadonlyArray1<'_, u8>) -> PyResult<(u8, u32)> {
+pub fn command_read(data: PyReadonlyArray1<'_, u8>) -> PyResult<(u8, u32)> {
     let data = slice("data", &data)?;
     let bytes = data
         .try_into()
@@ -188,62 +186,62 @@ fn command_read(data: PyReadonlyArray1<'_, u8>) -> PyResult<(u8, u32)> {
 
 /// The presets' names.
 #[pyfunction]
-fn registers_presets() -> Vec<&'static str> {
+pub fn registers_presets() -> Vec<&'static str> {
     wire::registers::PRESETS.iter().map(|preset| preset.name).collect()
 }
 
-/// All fields as JSON, in the order of the registers: names, units, ranges, texts.
+/// All fields, in the order of the registers: names, units, ranges, texts.
 #[pyfunction]
-fn registers_fields() -> PyResult<String> {
-    to_json(&wire::registers::fields())
+pub fn registers_fields() -> Plain<&'static [wire::registers::Field]> {
+    Plain(wire::registers::fields())
 }
 
-/// A preset, as JSON: as it is written, or on a board of an array.
+/// A preset: as it is written, or on a board of an array.
 #[pyfunction]
 #[pyo3(signature = (name, array = None))]
-fn registers_preset(name: &str, array: Option<ArrayParts>) -> PyResult<String> {
+pub fn registers_preset(name: &str, array: Option<ArrayParts>) -> PyResult<Plain<Registers>> {
     let preset = match array {
         None => Registers::preset(name),
         Some(array) => Registers::preset_on(name, &to_array(array)?),
     };
-    to_json(&preset.map_err(core)?)
+    Ok(Plain(preset.map_err(core)?))
 }
 
-/// What a board of an array that holds these registers holds after a preset, as JSON.
+/// What a board of an array that holds these registers holds after a preset.
 #[pyfunction]
-fn registers_with_preset(registers: &str, name: &str, array: ArrayParts) -> PyResult<String> {
+pub fn registers_with_preset(registers: &str, name: &str, array: ArrayParts) -> PyResult<Plain<Registers>> {
     let held: Registers = parsed("registers", registers)?;
     let array = to_array(array)?;
     let preset = Registers::preset_on(name, &array).map_err(core)?;
-    to_json(&held.with_preset(&preset, &array))
+    Ok(Plain(held.with_preset(&preset, &array)))
 }
 
-/// What a board of an array and so many channels holds at reset, as JSON.
+/// What a board of an array and so many channels holds at reset.
 #[pyfunction]
-fn registers_at_reset(array: ArrayParts, channels: u8) -> PyResult<String> {
-    to_json(&Registers::at_reset(&to_array(array)?, channels))
+pub fn registers_at_reset(array: ArrayParts, channels: u8) -> PyResult<Plain<Registers>> {
+    Ok(Plain(Registers::at_reset(&to_array(array)?, channels)))
 }
 
-/// What a board holds that scans another sensor's frames, as JSON, and by how many bits values are shifted down.
+/// What a board holds that scans another sensor's frames, and by how many bits values are shifted down.
 #[pyfunction]
-fn registers_of_source(array: ArrayParts, rate_hz: f64, bits: u32) -> PyResult<(String, u32)> {
+pub fn registers_of_source(array: ArrayParts, rate_hz: f64, bits: u32) -> PyResult<(Plain<Registers>, u32)> {
     let (registers, shift) = Registers::of_source(&to_array(array)?, rate_hz, bits).map_err(core)?;
-    Ok((to_json(&registers)?, shift))
+    Ok((Plain(registers), shift))
 }
 
-/// Sets fields by name, in the registers' own units; returns the new set as JSON.
+/// Sets fields by name, in the registers' own units; returns the new set.
 ///
 /// All are set before the rules are checked, so that their order does not matter.
 #[pyfunction]
-fn registers_with(registers: &str, fields: Vec<(String, u32)>, array: ArrayParts) -> PyResult<String> {
+pub fn registers_with(registers: &str, fields: Vec<(String, u32)>, array: ArrayParts) -> PyResult<Plain<Registers>> {
     let mut registers: Registers = parsed("registers", registers)?;
     registers.set_all(&fields, &to_array(array)?).map_err(core)?;
-    to_json(&registers)
+    Ok(Plain(registers))
 }
 
 /// Checks all rules; returns the warnings.
 #[pyfunction]
-fn registers_check(registers: &str, array: ArrayParts) -> PyResult<Vec<String>> {
+pub fn registers_check(registers: &str, array: ArrayParts) -> PyResult<Vec<String>> {
     let registers: Registers = parsed("registers", registers)?;
     registers.check(&to_array(array)?).map_err(core)?;
     Ok(registers.warnings())
@@ -251,20 +249,20 @@ fn registers_check(registers: &str, array: ArrayParts) -> PyResult<Vec<String>> 
 
 /// The eight 32-bit registers, and a frame's length in us.
 #[pyfunction]
-fn registers_words(registers: &str) -> PyResult<(Vec<u32>, f64)> {
+pub fn registers_words(registers: &str) -> PyResult<(Vec<u32>, f64)> {
     let registers: Registers = parsed("registers", registers)?;
     Ok(((0..8).map(|n| registers.word(n)).collect(), registers.frame_us()))
 }
 
-/// What the eight 32-bit registers of a board of so many channels hold, as JSON, whatever the rules say.
+/// What the eight 32-bit registers of a board of so many channels hold, whatever the rules say.
 #[pyfunction]
-fn registers_of_words(words: [u32; 8], channels: u8) -> PyResult<String> {
-    to_json(&Registers::of_words(&words, channels))
+pub fn registers_of_words(words: [u32; 8], channels: u8) -> Plain<Registers> {
+    Plain(Registers::of_words(&words, channels))
 }
 
 /// The writes that lead from one set to another.
 #[pyfunction]
-fn registers_commands(source: &str, target: &str, array: ArrayParts) -> PyResult<Vec<(u8, u32)>> {
+pub fn registers_commands(source: &str, target: &str, array: ArrayParts) -> PyResult<Vec<(u8, u32)>> {
     let (from, to): (Registers, Registers) = (parsed("registers", source)?, parsed("registers", target)?);
     let commands = from.commands_to(&to, &to_array(array)?).map_err(core)?;
     Ok(commands.into_iter().map(|c| (c.register, c.value)).collect())
@@ -284,7 +282,7 @@ struct WireBoardOptions {
 
 /// The emulated board, and the circuit through which it reads.
 #[pyclass(module = "taxel._core", frozen)]
-struct WireBoard(Shared<(Board, Option<Crossed>)>);
+pub struct WireBoard(Shared<(Board, Option<Crossed>)>);
 
 #[pymethods]
 impl WireBoard {
@@ -312,8 +310,8 @@ impl WireBoard {
         self.0.with(py, |(board, _)| board.greeting())
     }
 
-    fn registers(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.with(py, |(board, _)| to_json(board.registers()))
+    fn registers(&self, py: Python<'_>) -> Plain<Registers> {
+        Plain(self.0.with(py, |(board, _)| *board.registers()))
     }
 
     fn time_us(&self, py: Python<'_>) -> f64 {
@@ -364,29 +362,7 @@ impl WireBoard {
         Ok(datagrams.iter().map(|d| PyBytes::new(py, d)).collect())
     }
 
-    /// The counts as JSON.
-    fn counts(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.with(py, |(board, _)| to_json(board.counts()))
+    fn counts(&self, py: Python<'_>) -> Plain<BoardCounts> {
+        Plain(self.0.with(py, |(board, _)| *board.counts()))
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<WireDecoder>()?;
-    module.add_class::<WireBoard>()?;
-    module.add_function(wrap_pyfunction!(wire_rows, module)?)?;
-    module.add_function(wrap_pyfunction!(wire_cut, module)?)?;
-    module.add_function(wrap_pyfunction!(wire_encode, module)?)?;
-    module.add_function(wrap_pyfunction!(command_bytes, module)?)?;
-    module.add_function(wrap_pyfunction!(command_read, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_presets, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_fields, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_at_reset, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_of_source, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_preset, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_with_preset, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_with, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_check, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_words, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_of_words, module)?)?;
-    module.add_function(wrap_pyfunction!(registers_commands, module)?)
 }

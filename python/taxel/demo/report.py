@@ -108,7 +108,7 @@ def figures(material: Material) -> dict[str, Any]:
             "said": {label: len(material.noise.detections[label]) for label in LABELS},
             "plain_rule_said": {label: len(material.noise.plain[label]) for label in LABELS},
         },
-        "dashpot_ms": {f"{ms:g}": other.judged.to_dict() for ms, other in material.dashpots.items()},
+        "dashpot_ms": {f"{ms:g}": dashpot.judged.to_dict() for ms, dashpot in material.dashpots.items()},
         "footfalls": None
         if material.footfalls is None
         else {"note": material.footfall_note, **material.footfalls.judged.to_dict()},

@@ -59,7 +59,7 @@ class Screen:
             ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
             ("arrived to decoded", delays(counters["decode_latency"])),
             ("known to detected", delays(counters["report_latency"])),
-            *((label, str(sum(one.label == label for one in detections))) for label in LABELS),
+            *((label, str(sum(detection.label == label for detection in detections))) for label in LABELS),
         ):
             rows.add_row(Text(name, style="dim"), value)
         state = "taring" if counters["taring"] else f"{min(now, self._seconds):5.1f} of {self._seconds:.1f} s"
@@ -82,8 +82,8 @@ class Screen:
     def _newest(self, detections: list[Detection], width: int, rows: int) -> list[Text]:
         """Return the last lines that find room, the newest last; a long one takes more than one row."""
         lines: list[Text] = []
-        for one in reversed(detections):
-            line = self._line(one)
+        for detection in reversed(detections):
+            line = self._line(detection)
             rows -= -(-line.cell_len // width)
             if rows < 0 and lines:
                 break

@@ -48,8 +48,7 @@ class BatchLearner(SpikeLearner):
         ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
-        self.weights_, learnt = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
-        self._results = json.loads(learnt)
+        self.weights_, self._results = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
         for name, value in self._results.items():
             setattr(self, f"{name}_", value)
         return self
@@ -59,4 +58,4 @@ class BatchLearner(SpikeLearner):
     ) -> list[NDArray[np.float64]]:
         """Return the output spikes in each pattern; `instead` replaces learnt attributes by name."""
         weights, learnt = self._fitted(), json.dumps(self._results | dict(instead))
-        return [_core.run_batch(self._kind, self._json(), weights, learnt, one._parts()) for one in patterns]
+        return [_core.run_batch(self._kind, self._json(), weights, learnt, pattern._parts()) for pattern in patterns]

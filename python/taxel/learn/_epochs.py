@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
@@ -102,7 +101,7 @@ class EpochLearner(SpikeLearner):
 
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
         rule, weights = self._json(), self._fitted()
-        return [_core.run_rival(rule, weights, one._parts()) for one in patterns]
+        return [_core.run_rival(rule, weights, pattern._parts()) for pattern in patterns]
 
     def change(
         self, weights: ArrayLike, pattern: SpikeTrains, targets: ArrayLike
@@ -131,7 +130,7 @@ class EpochLearner(SpikeLearner):
         return change, spikes
 
     def _fitted_neuron(self) -> Neuron | None:
-        stepped = json.loads(_core.check_parameters(self._kind, self._json()))["neuron"]
+        stepped = _core.check_parameters(self._kind, self._json())["neuron"]
         if stepped["after_spike"] != "reset" or "exponential" not in stepped["current"]:
             return None
         return Neuron(
@@ -147,11 +146,10 @@ class EpochLearner(SpikeLearner):
         )
 
 
-def keep(learner: Any, trained: tuple[Any, ...]) -> None:
+def keep(learner: Any, trained: _core.Trained) -> None:
     """Set the results on the learner, then raise the KeyboardInterrupt of a Ctrl-C during the fit."""
-    weights, right, best_epoch, status, interrupt = trained
-    learner.weights_, learner.right_ = weights, right
-    learner.best_epoch_, learner.status_ = best_epoch, status
-    learner.epochs_ = max(len(right) - learner._LOOKS_BEFORE_THE_FIRST, 0)
-    if interrupt is not None:
-        raise interrupt
+    learner.weights_, learner.right_ = trained.weights, trained.right
+    learner.best_epoch_, learner.status_ = trained.best_epoch, trained.ended
+    learner.epochs_ = max(len(trained.right) - learner._LOOKS_BEFORE_THE_FIRST, 0)
+    if trained.raised is not None:
+        raise trained.raised

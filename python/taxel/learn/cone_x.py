@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, flag, floats, instance, number, several, shown, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.parameters import defaults
-from taxel._core import NotFittedError, ProblemError
+from taxel._core import NotFittedError
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner, Status, fired_by_neuron
 from taxel.neuron import Neuron
@@ -116,13 +117,11 @@ class Certificate:
         """
         names = ("rows", "multipliers", "gap", "at_all", "text")
         if not isinstance(held, Mapping) or set(held) != set(names):
-            raise ProblemError(f"certificate: must be a dict of {', '.join(names)}, as to_dict gives it")
+            raise refused("certificate", f": must be a dict of {', '.join(names)}, as to_dict gives it")
         rows = [_row(_name(row)) for row in several("rows", held["rows"])]
         multipliers = floats("multipliers", held["multipliers"])
         if len(rows) != len(multipliers):
-            raise ProblemError(
-                f"certificate: {counted(len(multipliers), 'multiplier')} for {counted(len(rows), 'row')}"
-            )
+            raise refused("certificate", f": {counted(len(multipliers), 'multiplier')} for {counted(len(rows), 'row')}")
         gap = number("gap", held["gap"], "mV")
         return cls(rows, multipliers, gap, flag("at_all", held["at_all"]), str(held["text"]))
 
@@ -364,29 +363,29 @@ class ConeX(SpikeLearner):
         problem = ConeXProblem(self, patterns, targets)
         multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
         first = [tuple(row) for row, _ in held]
-        result = problem._problem.fit(first, multipliers, progress)
-        (status, weights, objective, parts, gap, violation), rest, proof, signal = result
-        (margin, requested), engine, rounds, (rows, multipliers), certificate, reason = rest
-        self.weights_ = weights
-        self.status_ = status
-        self.objective_ = objective
-        self.parts_ = dict(zip(("l1", "l2", "B"), parts, strict=True))
-        self.gap_ = gap
-        self.multipliers_ = None if proof is None else _multipliers(proof)
-        self.violation_ = violation
-        self.margin_ = Margin(*margin)
-        self.reason_ = reason
-        self.engine_ = engine
-        self.rounds_ = rounds
-        self.held_ = list(zip(map(_row, rows), multipliers.tolist(), strict=True))
+        fit = problem._problem.fit(first, multipliers, progress)
+        self.weights_ = fit.weights
+        self.status_ = fit.status
+        self.objective_ = fit.objective
+        self.parts_ = dict(zip(("l1", "l2", "B"), fit.parts, strict=True))
+        self.gap_ = fit.gap
+        self.multipliers_ = None if fit.proof is None else _multipliers(fit.proof)
+        self.violation_ = fit.violation
+        self.margin_ = Margin(*fit.margin)
+        self.reason_ = fit.reason
+        self.engine_ = fit.engine
+        self.rounds_ = fit.rounds
+        rows, values = fit.held
+        self.held_ = list(zip(map(_row, rows), values.tolist(), strict=True))
         self.certificate_ = None
-        if certificate is not None:
-            (rows, multipliers), proven, at_all, text = certificate
-            self.certificate_ = Certificate([_row(row) for row in rows], multipliers, proven, at_all, text)
-        self.problem_ = problem._with_margin(requested)
+        if fit.certificate is not None:
+            found = fit.certificate
+            rows, values = found.rows
+            self.certificate_ = Certificate([_row(row) for row in rows], values, found.gap, found.at_all, found.text)
+        self.problem_ = problem._with_margin(fit.asked)
         self.neuron_ = neuron
-        if signal is not None:
-            raise signal
+        if fit.raised is not None:
+            raise fit.raised
         return self
 
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
@@ -444,7 +443,7 @@ class ConeXProblem:
     def _restated(self) -> tuple[ConeX, list[SpikeTrains]]:
         """Return the learner's parameters and the patterns that state the problem."""
         json_text, parts = self._stated
-        return ConeX._from_values(json.loads(json_text)), [SpikeTrains._from_parts(one) for one in parts]
+        return ConeX._from_values(json.loads(json_text)), [SpikeTrains._from_parts(part) for part in parts]
 
     def __getstate__(self) -> dict[str, Any]:
         return {"_stated": self._stated, "targets": self.targets, "margin": self.margin}
@@ -570,9 +569,9 @@ def _name(row: object) -> tuple[str, int, float]:
         given: Any = row
         kind, pattern, at = given
     except (TypeError, ValueError):
-        raise ProblemError(f"row is {shown(row)}: must be kind, pattern and target or time") from None
+        raise refused("row", f" is {shown(row)}: must be kind, pattern and target or time") from None
     if not isinstance(kind, str):
-        raise ProblemError(f"row is {shown(row)}: its kind must be a text")
+        raise refused("row", f" is {shown(row)}: its kind must be a text")
     return kind, whole("pattern", pattern, 0), number("target or time", at, "ms")
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from taxel import _core
 from taxel._base.arguments import number, text
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._core import DeviceError, ProblemError
 from taxel.live.live import Live
@@ -154,7 +155,7 @@ def _places(name: str, addresses: str | Sequence[str]) -> list[str]:
     for place in places:
         match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[\w.-]+):(\d{1,5})", text(name, place), re.ASCII)
         if not match or not 1 <= int(match[2]) <= 65_535:
-            raise ProblemError(f"{name} is {place!r}: must be HOST:PORT, as {PLACE}")
+            raise refused(name, f" is {place!r}: must be HOST:PORT, as {PLACE}")
     return places
 
 
@@ -180,7 +181,7 @@ def _refused(place: str) -> None:
 
 def _about(live: Live) -> str:
     """Return the description of the sensor that is published."""
-    registers = json.loads(live._core.registers())
+    registers = live._core.registers()
     return json.dumps(
         {"array": live.array._geometry(), "registers": registers, "differences": live._options.differences}
     )

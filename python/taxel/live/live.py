@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import finite, flag, numbers, shown, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped
 from taxel._base.options import with_fields_of
@@ -173,7 +173,7 @@ class Live:
         self._core = _core.Live(
             stated,
             None if options.record is None else checked_path("record", options.record),
-            None if not receivers else lambda *values: [receive(Detection(*values)) for receive in receivers],
+            None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
             feed,
         )
         self._remote, self._place = remote, self._core.place()
@@ -196,7 +196,7 @@ class Live:
         ProblemError : the board is another computer's
         """
         if self._remote is not None:
-            raise ProblemError(f"live: receives from {self.place}, and on no address of this computer")
+            raise refused("live", f": receives from {self.place}, and on no address of this computer")
         return self._core.address()
 
     @property
@@ -223,7 +223,7 @@ class Live:
         True
         """
         values = self._core.next(finite("timeout", timeout, "s", least=0.0, most=1e9))
-        return None if values is None else Detection(*values)
+        return None if values is None else Detection(**values)
 
     def __iter__(self) -> Iterator[Detection]:
         """Yield detections as they come, until `stop` is called."""
@@ -268,8 +268,7 @@ class Live:
         """
         if self._summary is not None:
             return self._summary.counters
-        counters: dict[str, Any] = json.loads(self._core.counters())
-        return counters
+        return self._core.counters()
 
     @property
     def picture(self) -> NDArray[np.uint16]:
@@ -350,8 +349,8 @@ class Live:
         arrival = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
         given = numbers("values", values, np.float64).reshape(-1)
         for k in np.flatnonzero(np.abs(given) > VALUE)[:1]:
-            raise ProblemError(
-                f"values[{k}] is {shown(given[k].item())}: must fit 32 bits, or be NaN where it is missing"
+            raise refused(
+                "values", f"[{k}] is {shown(given[k].item())}: must fit 32 bits, or be NaN where it is missing"
             )
         self._core.sample(text("name", name), given.tolist(), arrival)
 
@@ -375,19 +374,19 @@ class Live:
         """
         columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
-            raise ProblemError(
-                f"x has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
+            raise refused(
+                "x", f" has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
             )
         for name, places in (("x", columns), ("y", rows)):
             if len(places) and (places.min() < 0 or places.max() > _MOST_PLACE):
                 wrong = places.min() if places.min() < 0 else places.max()
                 raise ProblemError(f"{name}: holds {wrong}, must be a taxel's")
-        return tuple(Zeroing(*one) for one in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True))))
+        return tuple(Zeroing(**one) for one in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True))))
 
     @property
     def zeroed(self) -> tuple[Zeroing, ...]:
         """The latest zeroing of each taxel that was zeroed, by `zero` or a panel."""
-        return tuple(Zeroing(*one) for one in self._core.zeroed())
+        return tuple(Zeroing(**one) for one in self._core.zeroed())
 
     def note(self, message: str) -> None:
         """Write a note into the recording, with the current time.

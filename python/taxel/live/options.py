@@ -8,6 +8,7 @@ from dataclasses import Field, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from taxel._base.arguments import flag, instance, number, parameters, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import PlainRule, Readout
@@ -46,7 +47,7 @@ class LiveOptions(StatedOptions):
         elif readout is not None and readout.array is not None:
             readout.array._warn_apart(instance("array", array, Array), "live")
         if self.say is not None and not callable(self.say):
-            raise ProblemError(f"say is {shown(self.say)}: must be a function of a Detection")
+            raise refused("say", f" is {shown(self.say)}: must be a function of a Detection")
         if readout is None and self.tare is not None:
             raise ProblemError("tare without a readout: nothing would use it")
         array = Array._of(array)

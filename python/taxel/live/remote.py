@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from taxel import _core
 from taxel._base.arguments import finite, shown, text
+from taxel._base.errors import refused
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 
@@ -132,7 +133,7 @@ class Remote:
     def __init__(self, address: str, *, congestion: str = "block", timeout: float = 5.0) -> None:
         self.address = Address.of(address)
         if congestion not in ("block", "drop"):
-            raise ProblemError(f"congestion is {shown(congestion)}: must be block or drop")
+            raise refused("congestion", f" is {shown(congestion)}: must be block or drop")
         self.congestion = congestion
         self._zenoh = with_taxel_errors(wheel().Subscriber, [self.address.place])
         try:
@@ -210,7 +211,7 @@ class Remote:
 
     def _only_one(self) -> None:
         if self._feed is not None:
-            raise ProblemError("remote: is in use already; make another one")
+            raise refused("remote", ": is in use already; make another one")
 
     def _run(self, feed: _core.Feed) -> None:
         """Feed received parcels until the pipeline ends, or `stop` is called."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -62,18 +61,15 @@ def send(
     >>> send([bytes.fromhex("c000050304")], "127.0.0.1", 9, seconds=0.0)["datagrams"] >= 0
     True
     """
-    counts: dict[str, Any] = json.loads(
-        _core.send(
-            text("host", host),
-            whole("port", port, 1, 65_535),
-            [_datagram(n, d) for n, d in enumerate(several("datagrams", datagrams))],
-            whole("each", each, 1, 2**31 - 1),
-            number("period_us", period_us),
-            number("seconds", seconds),
-            flag("segment", segment),
-        )
+    return _core.send(
+        text("host", host),
+        whole("port", port, 1, 65_535),
+        [_datagram(n, d) for n, d in enumerate(several("datagrams", datagrams))],
+        whole("each", each, 1, 2**31 - 1),
+        number("period_us", period_us),
+        number("seconds", seconds),
+        flag("segment", segment),
     )
-    return counts
 
 
 def _datagram(n: int, data: object) -> bytes:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from taxel import _core
 from taxel.recording import open_recording
 from taxel.recording.read_mcap import DOUBTS, STEPS
 from taxel.recording.verdict import Verdict
@@ -63,16 +63,15 @@ class Summary:
         return not capture["messages"] + capture["dropped_by_kernel"]
 
 
-def summary_of(text: str) -> Summary:
-    """Return the summary that Rust returns as JSON."""
-    values = json.loads(text)
-    path = None if values["path"] is None else Path(values["path"])
-    tare = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
-    verdict = Verdict._from(values["verdict"])
+def summary_of(ended: _core.Ended) -> Summary:
+    """Return the summary of what Rust returns."""
+    path = ended.path
+    tare = None if ended.tare is None else Tare.from_json(ended.tare)
+    verdict = Verdict._from(ended.verdict)
     # Of these the file has its own times.
     if {*DOUBTS, *STEPS} & {*verdict.damaged, *verdict.noted} and path is not None and path.suffix == ".mcap":
         verdict = open_recording(path).verdict
-    return Summary(values["counters"], verdict, path, tare)
+    return Summary(ended.counters, verdict, path, tare)
 
 
 def delays(measured: dict[str, Any]) -> str:

@@ -12,8 +12,8 @@ from taxel import _core
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.messages import counted
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -141,7 +141,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     if isinstance(held, Events):
         return judged(held.array, _statistics_of_events(held))
     if not isinstance(held, Frames):
-        raise ProblemError(f"recorded is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
+        raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     activity, moved = (of.astype(np.int64).reshape(held.array.shape) for of in _core.changes_of_frames(held._parts()))
     # The values of pictures count from the least one.
     scale, least = ticks_by_unit(held), np.fmin.reduce(held.values, axis=None, initial=np.inf)
@@ -242,14 +242,14 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
 
 def _statistics_of_events(events: Events) -> TaxelStatistics:
     """Return the statistics of each taxel; an event that a state repaired counts for the held value only."""
-    own = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
+    sent = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
     index = events.array.index(events.x, events.y).astype(np.int64)
-    activity, moved = _ways(index[own], np.where(events.p[own], 1, -1), events.array)
+    activity, moved = _ways(index[sent], np.where(events.p[sent], 1, -1), events.array)
     touches = Touches.of(*_core.touches_of_events(events.sorted()._parts()))
     if events.intensity is None or events.present is None:
         return TaxelStatistics(activity, moved, touches)
     shape, size = events.array.shape, events.array.rows * events.array.columns
-    pairs = np.unique(index[events.present & own] * 65_536 + events.intensity[events.present & own].astype(np.int64))
+    pairs = np.unique(index[events.present & sent] * 65_536 + events.intensity[events.present & sent].astype(np.int64))
     values = np.bincount(pairs // 65_536, minlength=size).astype(np.int32)
     ticks = events.intensity[events.present].astype(np.int32)
     least, greatest = np.full(size, 65_536, np.int32), np.full(size, -1, np.int32)
@@ -264,9 +264,9 @@ def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[ND
     """Return how many changes each taxel has, and how many of them have the direction of the one before."""
     order = np.argsort(index, kind="stable")
     taxel, way = index[order], way[order]
-    on = taxel[1:][(taxel[1:] == taxel[:-1]) & (way[1:] == way[:-1])]
+    again = taxel[1:][(taxel[1:] == taxel[:-1]) & (way[1:] == way[:-1])]
     size = array.rows * array.columns
-    counts = (np.bincount(of, minlength=size).reshape(array.shape) for of in (taxel, on))
+    counts = (np.bincount(of, minlength=size).reshape(array.shape) for of in (taxel, again))
     activity, moved = counts
     return activity, moved
 

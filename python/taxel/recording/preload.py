@@ -30,7 +30,7 @@ def without_preload(recording: Recording, first_us: int) -> tuple[Tare | None, s
         return None, ""
     span, line = _without(read[0], read[1], first_us), f"{recording.path}: the rest is {read[1]}"
     if span is None:
-        return None, f"{line}, and there is no other rest, so the tare holds it; give --tare FILE"
+        return None, f"{line}, and there is no other rest, so the tare holds it; give a tare's file"
     tare = Tare.take(source, start_us=span[0], stop_us=span[1], note=str(recording.path))
     return tare, f"{line}, so the tare is of a time without it"
 
@@ -46,7 +46,7 @@ def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] |
     free, line = _free(read[0], rest), f"{recording.path}: the rest is {rest}"
     span = _later(read[0], free) if len(free) else None
     if span is None:
-        return rest.quiet_us, f"{line}, and there is no other rest, so the tare holds it; give --tare FILE"
+        return rest.quiet_us, f"{line}, and there is no other rest, so the tare holds it; give a tare's file"
     return span, f"{line}, so the tare is of a time without it"
 
 
@@ -54,10 +54,10 @@ def _free(pictures: Frames, rest: Rest) -> NDArray[np.int64]:
     """Return the numbers of the pictures without what lay on the array in the quiet stretch of a rest."""
     assert rest.quiet_us is not None
     assert rest.preload is not None
-    loaded = rest.preload > 0
-    values = pictures.values.reshape(len(pictures), -1)[:, loaded]
+    is_loaded = rest.preload > 0
+    values = pictures.values.reshape(len(pictures), -1)[:, is_loaded]
     quiet = values[slice(*np.searchsorted(pictures.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
-    return np.flatnonzero((values < quiet - rest.preload[loaded] / 2).all(axis=1))
+    return np.flatnonzero((values < quiet - rest.preload[is_loaded] / 2).all(axis=1))
 
 
 def _later(pictures: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:

@@ -161,8 +161,8 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     of = _series_of(drawn, rest, events.array)
     moments = _moments(events, drawn, rest, of)
     # They are pictures more, at which the rest is tracked as at the others.
-    both = replace(drawn, t=np.union1d(drawn.t, moments))
-    return replace(of, largest=_series_of(both, rest, events.array)) if len(both.t) > len(drawn.t) else of
+    at_all = replace(drawn, t=np.union1d(drawn.t, moments))
+    return replace(of, largest=_series_of(at_all, rest, events.array)) if len(at_all.t) > len(drawn.t) else of
 
 
 def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
@@ -525,8 +525,8 @@ def _given(recording: Recording, tare: Tare | None) -> Rest | None:
     """Return the measured rest; NaN where a taxel has none."""
     if tare is not None:
         if tare.array.shape != recording.array.shape:
-            given, own = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
-            raise ProblemError(f"the tare is of {given} taxels, {recording.path} of {own}")
+            given, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
+            raise ProblemError(f"the tare is of {given} taxels, {recording.path} of {stated}")
         return Rest("tare", tare.rest.reshape(-1))
     of = recording.calibration
     return None if of is None or of.rest is None else Rest("calibration", of.rest.reshape(-1))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from taxel import _core
@@ -35,15 +34,14 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Board
     OSError : the file cannot be read
     """
     memory = limits.memory(limits.given())
-    payload, parts, decoder, complete = _core.read_lsa(path, array._parts(), pairing, differences, memory)
-    unmarked = None if complete else path.with_suffix(".lss").name
-    verdict = Verdict._of({"raw": [unmarked, json.loads(_core.recording_damage(decoder))]})
+    read = _core.read_lsa(path, array._parts(), pairing, differences, memory)
+    unmarked = None if read.complete else path.with_suffix(".lss").name
     losses = Losses(
-        known({"bytes": len(payload), "decoder": json.loads(decoder)}),
-        known(verdict),
+        known({"bytes": len(read.payload), "decoder": read.counts}),
+        known(Verdict._of({"raw": [unmarked, read.damage]})),
         ("times after a silence of more than 6.45 s are short by whole turns of 6.5536 s",),
-        truncated=not complete,
+        truncated=not read.complete,
     )
-    events = known(Events._from_parts(parts, array))
-    wire = Wire(payload=payload, differences=differences)
+    events = known(Events._from_parts(read.events, array))
+    wire = Wire(payload=read.payload, differences=differences)
     return Board(Origin(path, path.name, "lsa"), Sensor(array), Changes(events), wire, losses=losses)

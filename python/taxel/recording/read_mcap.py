@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -55,16 +54,16 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     reader = _core.RecordingReader(path, limits.memory(limit), limit is not None)
     sources: dict[str, Source] = {}
     for name in reader.sources():
-        one = _Source(path, reader.of_source(name), limit)
-        if one.header.get("pictures") is not None:
-            sources[name] = one.pictures()
+        channel = _Source(path, reader.of_source(name), limit)
+        if channel.header.get("pictures") is not None:
+            sources[name] = channel.pictures()
         else:
-            sources[name] = one.board(pairing) if one.header.get("stream") is None else one.stream()
-    sensors = [name for name, one in sources.items() if type(one) is Pictures]
+            sources[name] = channel.board(pairing) if channel.header.get("stream") is None else channel.stream()
+    sensors = [name for name, source in sources.items() if type(source) is Pictures]
     if len(sensors) > 1:
         for name in sensors:
-            own = sources[name]
-            sources[name] = replace(own, origin=replace(own.origin, name=f"{path.name} {name}"))
+            source = sources[name]
+            sources[name] = replace(source, origin=replace(source.origin, name=f"{path.name} {name}"))
     return alone(sources)
 
 
@@ -73,17 +72,19 @@ class _Source:
 
     def __init__(self, path: Path, reader: _core.RecordingReader, limit: int | None) -> None:
         self._reader, self._limit = reader, limit
-        about = json.loads(reader.about())
-        self.header, self.ending, self.opened = about["header"], about["ending"] or {}, about["rebuilt"]
+        self.header, ending, self.opened = reader.about()
+        self.ending = ending or {}
         self.array = array_of(self.header["array"])
         # Those of the recording that a source was converted from.
         self.before = _stated(path, "counts", counts_of, self.header.get("counts")) or {}
-        self.remarks = Once(lambda: json.loads(self.reader().remarks()))
+        self.remarks = Once(lambda: self.reader().remarks())
         label = self.header.get("name", "board")
         self.origin = parts.Origin(path, path.name, "mcap", label, self.header["source"])
         self.sensor = parts.Sensor(self.array, self.header.get("side", ""), self.header.get("heel", ""))
 
-    def losses(self, counts: Callable[[], dict[str, Any]], found: Callable[[], str] | None = None) -> parts.Losses:
+    def losses(
+        self, counts: Callable[[], dict[str, Any]], found: Callable[[], dict[str, Any]] | None = None
+    ) -> parts.Losses:
         """Return what was lost; arguments are those of `counts` and `verdict`."""
         return parts.Losses(
             counts=self.counts(counts),
@@ -103,21 +104,21 @@ class _Source:
         decoded = Once(lambda: self.reader().decode(pairing))
 
         def arrived() -> bool:
-            return bool(self.remarks()["datagrams"] > 0)
+            return self.remarks().datagrams > 0
 
         return Board(
             self.origin,
             self.sensor,
-            parts.Changes(Once(lambda: Events._from_parts(decoded()[0], self.array))),
+            parts.Changes(Once(lambda: Events._from_parts(decoded().events, self.array))),
             parts.Wire(
-                datagrams=Once(lambda: Datagrams(*self.reader().datagrams()), arrived),
-                version_2=Once(lambda: bool(json.loads(decoded()[5])["intact"])),
+                datagrams=Once(lambda: Datagrams(**self.reader().datagrams()), arrived),
+                version_2=Once(lambda: bool(decoded().version_2["intact"])),
                 differences=bool(self.header["difference"]),
                 origin_us=int(self.header["origin_us"]),
                 unmarked=tuple(self.header.get("repaired", ())),
             ),
             timing=parts.Timing(Once(lambda: _clock(decoded()), arrived)),
-            losses=self.losses(lambda: self.counts_of_board(decoded()), lambda: decoded()[7]),
+            losses=self.losses(lambda: self.counts_of_board(decoded()), lambda: decoded().found),
             settings=self.settings(),
             marks=self.marks(),
         )
@@ -129,10 +130,10 @@ class _Source:
     def marks(self) -> parts.Marks:
         """Return what happened at a time."""
         return parts.Marks(
-            board_changes=Once(lambda: board_changes_of(self.remarks()["board"])),
-            notes=Once(lambda: notes_of(self.remarks()["notes"])),
-            detections=Once(lambda: detections_of(self.remarks()["detections"])),
-            zeroings=Once(lambda: zeroings_of([one for _, one in self.remarks()["zeroings"]])),
+            board_changes=Once(lambda: board_changes_of(self.remarks().board)),
+            notes=Once(lambda: notes_of(self.remarks().notes)),
+            detections=Once(lambda: detections_of(self.remarks().detections)),
+            zeroings=Once(lambda: zeroings_of([remark for _, remark in self.remarks().zeroings])),
         )
 
     def pictures(self) -> Pictures:
@@ -166,17 +167,17 @@ class _Source:
         read = Once(lambda: self.reader().samples())
 
         def samples() -> Samples:
-            arrived, number, t, values, _ = read()
-            rows = values.reshape(len(t), self.array.columns)
+            lines = read()
+            rows = lines.values.reshape(len(lines.t), self.array.columns)
             if stream.get("time") is not None:
-                own = t / float(stream["unit_us"])
-                rows = np.insert(rows, stream["columns"].index(stream["time"]), own, axis=1)
-            return Samples(self.header, arrived, number, t, np.ascontiguousarray(rows))
+                times = lines.t / float(stream["unit_us"])
+                rows = np.insert(rows, stream["columns"].index(stream["time"]), times, axis=1)
+            return Samples(self.header, lines.arrived_ns, lines.number, lines.t, np.ascontiguousarray(rows))
 
         def frames() -> Frames:
-            _, _, t, values, _ = read()
+            t = read().t
             order = np.argsort(t, kind="stable")
-            rows = values.reshape(len(t), 1, self.array.columns)[order]
+            rows = read().values.reshape(len(t), 1, self.array.columns)[order]
             return Frames(rows.astype(np.float32), ascending(t[order]), unit="as sent", array=self.array)
 
         names = tuple(name for name in stream["columns"] if name != stream.get("time"))
@@ -184,9 +185,9 @@ class _Source:
             self.origin,
             self.sensor,
             parts.Readings(Once(frames)),
-            parts.Lines(names, Once(samples, lambda: bool(self.remarks()["samples"] > 0))),
-            timing=parts.Timing(Once(lambda: Clock(read()[2], read()[0]))),
-            losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read()[4]),
+            parts.Lines(names, Once(samples, lambda: self.remarks().samples > 0)),
+            timing=parts.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
+            losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read().found),
         )
 
     def driven(self) -> Array:
@@ -204,11 +205,11 @@ class _Source:
 
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:
         """Return the registers at each change."""
-        return tuple((at, Registers._of(values, self.driven())) for at, values in self.remarks()["registers"])
+        return tuple((at, Registers._of(values, self.driven())) for at, values in self.remarks().registers)
 
     def held(self) -> NDArray[np.uint16] | None:
         """Return the values that the taxels held at the beginning."""
-        held = self.remarks()["held"]
+        held = self.remarks().held
         if held is None or len(held) != self.array.rows * self.array.columns:
             return None
         return np.array(held, np.uint16).reshape(self.array.shape)
@@ -216,7 +217,7 @@ class _Source:
     def rebuilt(self) -> dict[str, int]:
         """Return counts of damage that the reader skipped or repaired."""
         rebuilt = {key: int(value) for key, value in self.opened.items() if key != "unfinished"}
-        return {**rebuilt, "bad_chunks": int(self.remarks()["condition"]["bad_chunks"])}
+        return {**rebuilt, "bad_chunks": int(self.remarks().condition["bad_chunks"])}
 
     def counts(self, read: Callable[[], dict[str, Any]]) -> Once[Mapping[str, Any]]:
         """Return the field of counts: those that are read, or those of the recording that this one was converted from.
@@ -227,42 +228,42 @@ class _Source:
             return Once(read, lambda: True)
         return Once(lambda: {**self.before, **{cause: n for cause, n in self.rebuilt().items() if n}}, lambda: True)
 
-    def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
+    def counts_of_board(self, decoded: _core.Decoded) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
         remarks = self.remarks()
-        counts = self.counted() or remarks["counts"] or {}
-        of_2 = json.loads(decoded[5])
+        counts = self.counted() or remarks.counts or {}
+        of_2 = decoded.version_2
         # What this computer dropped or the file lost is missing among the board's numbers too, and is counted apart.
-        skipped = remarks["condition"]["skipped_numbers"]
+        skipped = remarks.condition["skipped_numbers"]
         of_2["missing"] -= min(of_2["missing"], skipped)
         return {
-            "datagrams": remarks["datagrams"],
-            "bytes": remarks["datagram_bytes"],
+            "datagrams": remarks.datagrams,
+            "bytes": remarks.datagram_bytes,
             "missing_numbers": skipped,
-            "lost_in_file": self.verdict(lambda: decoded[7]).lost.get("lost_in_file", 0),
+            "lost_in_file": self.verdict(lambda: decoded.found).lost.get("lost_in_file", 0),
             **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
-            "decoder": json.loads(decoded[1]),
+            "decoder": decoded.counts,
             **({"decoder_version_2": of_2} if of_2["datagrams"] else {}),
             **self.rebuilt(),
         }
 
-    def counts_of_stream(self, read: tuple[Any, ...]) -> dict[str, Any]:
+    def counts_of_stream(self, read: _core.Samples) -> dict[str, Any]:
         """Return the numbers of received and lost datagrams and lines of a stream, by cause."""
-        found, counts = json.loads(read[4])["damage"], self.counted() or self.remarks()["counts"] or {}
+        found, counts = read.found["damage"], self.counted() or self.remarks().counts or {}
         # What was in no line is not in the file.
         said = {cause: max(n, counts.get("decoder", {}).get(cause, 0)) for cause, n in found.items()}
-        return {"samples": len(read[2]), **said, "received": self.counted().get("received"), **self.rebuilt()}
+        return {"samples": len(read.t), **said, "received": self.counted().get("received"), **self.rebuilt()}
 
     def counted(self) -> dict[str, Any]:
         """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""
         counts = self.ending.get("finished", {}).get("counts") or {}
         return {} if self.header.get("converted") else counts
 
-    def verdict(self, found: Callable[[], str] | None = None) -> Verdict:
+    def verdict(self, found: Callable[[], dict[str, Any]] | None = None) -> Verdict:
         """Return what was lost at which stage; `found` decodes a board or a stream, and returns what it found."""
-        condition = self.remarks()["condition"]
+        condition = self.remarks().condition
         if found is not None and condition["messages"] and (condition["changed"] or self.must_decode()):
-            condition = condition | {"decoded": json.loads(found())}
+            condition = condition | {"decoded": found()}
         return Verdict._of({"file": condition})
 
     def must_decode(self) -> bool:
@@ -282,10 +283,9 @@ def _stated(path: Path, entry: str, read: Callable[[Any], Any], value: Any) -> A
         raise FormatError(f"{path}, header, {entry}: {error}") from None
 
 
-def _clock(decoded: tuple[Any, ...]) -> Clock:
-    arrived, left = decoded[2], decoded[6]
-    has = left > np.iinfo(np.int64).min
-    return Clock(np.ascontiguousarray(left[has]), np.ascontiguousarray(arrived[has]))
+def _clock(decoded: _core.Decoded) -> Clock:
+    has = decoded.left > np.iinfo(np.int64).min
+    return Clock(np.ascontiguousarray(decoded.left[has]), np.ascontiguousarray(decoded.arrived_ns[has]))
 
 
 def ascending(t: NDArray[np.int64]) -> NDArray[np.int64]:

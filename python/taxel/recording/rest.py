@@ -114,7 +114,7 @@ class Rest:
             "tare": "the given tare",
             "calibration": "the calibration's",
             "unit": "0, as the values are force or pressure",
-            "none": "not known, as no half second was quiet with nothing on it; give --tare",
+            "none": "not known, as no half second was quiet with nothing on it; a tare can be given",
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:
@@ -196,10 +196,10 @@ def flickering(frames: Frames) -> NDArray[np.bool_]:
     spans = np.nan_to_num(most.astype(np.float64) - least)
     for _ in range(found.size // _FEW):
         y, x = np.unravel_index(np.argmax(spans), found.shape)
-        own = values[:, y, x]
-        if not spans[y, x] or not np.isfinite(own).all():
+        series = values[:, y, x]
+        if not spans[y, x] or not np.isfinite(series).all():
             return found
-        apart = np.abs(own - np.median(own))
+        apart = np.abs(series - np.median(series))
         far = apart > apart.max() / 2
         times = np.count_nonzero(far[1:] & ~far[:-1])
         if times < _FLICKERS or np.count_nonzero(far) >= 2 * times:
@@ -278,8 +278,8 @@ def found(
     if np.isnan(begins).all():
         return Rest("none", unknown)
     loads = quiet / np.maximum(in_quiet, 1) + np.where(loaded, less / np.maximum(released, 1), 0.0)
-    preload, place = _core.preload(np.where(known > 0, loads, np.nan), columns, LOADED_TICKS / scale, corner)
-    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, preload=preload, preload_at=place)
+    preload, where = _core.preload(np.where(known > 0, loads, np.nan), columns, LOADED_TICKS / scale, corner)
+    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, preload=preload, preload_at=where)
 
 
 def of_pictures(frames: Frames) -> Rest:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -89,7 +88,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     return facts | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
-        "registers": None if recording.registers is None else json.loads(recording.registers._json()),
+        "registers": None if recording.registers is None else recording.registers._held,
         "taxels": of_taxels.named(),
         "taxels_untested": int(np.count_nonzero(of_taxels.untested)),
         "taxels_untested_at": [

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._base.options import with_options
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -75,7 +76,7 @@ def truth(
     held = fitting(preset, sensed)._json()
     contacts, force, narrow = _core.truth(sensed._parts(), held, _parts(acts, sensed))
     _warn(acts, narrow)
-    return [Contact(*contact) for contact in contacts], force
+    return [Contact(**contact) for contact in contacts], force
 
 
 def play(
@@ -136,7 +137,7 @@ def play(
     parts, held = _parts(acts, sensed), fitting(preset, sensed)
     if wire is not None or asynchronous:
         held = held.replace(wire_version=2 if wire is None else whole("wire", wire, 1, 2))
-    events, datagrams, words, taken, narrow = _core.play(
+    played = _core.play(
         sensed._parts(),
         held._json(),
         parameters({} if sensor is None else mapping("sensor", sensor)),
@@ -146,8 +147,8 @@ def play(
         parameters(reading(circuit, asynchronous)),
         callback("watch", watch),
     )
-    _warn(acts, narrow)
-    return Played(Events._from_parts(events), datagrams, words, taken)
+    _warn(acts, played.narrow)
+    return Played(Events._from_parts(played.events), played.datagrams, played.words, played.bytes)
 
 
 @with_options(EmulateOptions)
@@ -240,10 +241,10 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     registers = instance("registers", options.registers, Registers)
     felt: Any = touch._touch(registers) if isinstance(touch, Replay | Pipe) else _checked(touch, sensed)
 
-    def tell(state: str, contacts: list[Any]) -> None:
+    def tell(state: dict[str, Any], contacts: list[Any]) -> None:
         if contacts:
-            options.touched([Contact(*contact) for contact in contacts])
-        options.watch(EmulatorReport._from_json(state))
+            options.touched([Contact(**contact) for contact in contacts])
+        options.watch(EmulatorReport._of(state))
 
     callback("watch", options.watch), callback("touched", options.touched)
     report = _core.emulate(
@@ -256,7 +257,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
         callback("begun", options.begun),
         tell,
     )
-    return EmulatorReport._from_json(report)
+    return EmulatorReport._of(report)
 
 
 def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
@@ -269,7 +270,7 @@ def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
     try:
         return (_part(n, act, array) for n, act in enumerate(iter(acts)))
     except TypeError:
-        raise ProblemError(f"touch is {shown(acts)}: must be acts, a Replay or a Pipe") from None
+        raise refused("touch", f" is {shown(acts)}: must be acts, a Replay or a Pipe") from None
 
 
 def _parts(acts: Sequence[Act], array: Array) -> list[Any]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from taxel.spikes import to_ms
 
@@ -84,8 +84,7 @@ class EmulatorReport:
         )
 
     @classmethod
-    def _from_json(cls, text: str) -> EmulatorReport:
-        report = json.loads(text)
+    def _of(cls, report: Mapping[str, Any]) -> EmulatorReport:
         board, sent, late = report["board"], report["sent"], report["late"]
         return cls(
             frames=board["frames"],

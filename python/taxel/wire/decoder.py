@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any, Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import buffer_bytes, column, flag, instance, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -81,13 +81,13 @@ def decode(
     room, own = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
     if decoder.version == 2:
         if lengths is not None:
-            raise ProblemError("lengths: each datagram of version 2 has its own before it; leave them out")
-        filled = _core.decode_datagrams(stream, decoder.array._parts(), room._parts())[0]
+            raise refused("lengths", ": each datagram of version 2 has its own before it; leave them out")
+        filled = _core.decode_datagrams(stream, decoder.array._parts(), room._parts())
     elif lengths is not None:
         filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())
     else:
         filled = decoder._core.fill(stream, None, room._parts(), pairing == "direct")
-    events = (room._owning if own else room._first)(decoder.array, *filled)
+    events = (room._owning if own else room._first)(decoder.array, **filled)
     if pairing == "taxel":
         markers, events = events.markers, decoder.finish()
         events.markers = markers
@@ -189,7 +189,7 @@ class Decoder:
         """
         stream = buffer_bytes(data)
         columns = Columns._fresh(_core.wire_rows(self.version, len(stream)))
-        return columns._owning(self.array, *self._fill(columns, stream, arrived))
+        return columns._owning(self.array, **self._fill(columns, stream, arrived))
 
     def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
         """Decode into memory that is reused; return the events as views of it.
@@ -219,11 +219,9 @@ class Decoder:
         array([40], dtype=uint16)
         """
         room = instance("columns", columns, Columns)
-        return room._first(self.array, *self._fill(room, buffer_bytes(data), arrived))
+        return room._first(self.array, **self._fill(room, buffer_bytes(data), arrived))
 
-    def _fill(
-        self, columns: Columns, data: NDArray[np.uint8], arrived: int | None
-    ) -> tuple[int, bool, NDArray[np.bool_] | None, list[tuple[int, bool]]]:
+    def _fill(self, columns: Columns, data: NDArray[np.uint8], arrived: int | None) -> _core._Filled:
         """Fill columns; return the number of rows, whether they have intensities, repaired rows, and markers."""
         when = None if arrived is None else whole("arrived", arrived)
         return self._core.fill(data, when, columns._parts(), False)
@@ -261,7 +259,7 @@ class Decoder:
     @property
     def counts(self) -> Counts:
         """The numbers of what was read, dropped and missed so far."""
-        return Counts(**json.loads(self._core.counts()))
+        return Counts(**self._core.counts())
 
     @property
     def last(self) -> Received | None:
@@ -273,7 +271,7 @@ class Decoder:
     def status(self) -> Status | None:
         """The totals that a board of version 2 last sent; None before the first ones, and for version 1."""
         status = self._core.status()
-        return None if status is None else Status(**json.loads(status))
+        return None if status is None else Status(**status)
 
     @property
     def held(self) -> NDArray[np.int32]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from taxel import _core
 from taxel._base.arguments import finite, flag, instance, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.wire.command import Command
@@ -23,7 +24,7 @@ PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
 QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
 
 #: The fields of registers.toml by name.
-_FIELDS: dict[str, Any] = {field["name"]: field for field in json.loads(_core.registers_fields())}
+_FIELDS: dict[str, Any] = {field["name"]: field for field in _core.registers_fields()}
 #: The fields that the registers hold in units of 10 ns; here they are in us.
 _TIMES = tuple(name for name, field in _FIELDS.items() if field["unit"] == "10 ns")
 _FLAGS = tuple(name for name, field in _FIELDS.items() if field["unit"] == "flag")
@@ -93,12 +94,12 @@ class Registers:
     def __init__(self, *, array: Array | None = None, **fields: float) -> None:
         sensor = Array._of(array)
         channels = whole("channels", fields.get("channels", 16), 0, 255)
-        self._set(json.loads(_core.registers_at_reset(sensor._parts(), channels)), fields, sensor)
+        self._set(_core.registers_at_reset(sensor._parts(), channels), fields, sensor)
 
     def _set(self, held: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
         self.array = Array._of(array)
         raw = [(name, _raw(name, value)) for name, value in fields.items()]
-        self._held = json.loads(_core.registers_with(json.dumps(held), raw, self.array._parts()))
+        self._held = _core.registers_with(json.dumps(held), raw, self.array._parts())
 
     @classmethod
     def preset(cls, name: str, *, array: Array | None = None) -> Registers:
@@ -125,7 +126,7 @@ class Registers:
         10
         """
         registers = cls.__new__(cls)
-        registers._set(json.loads(_core.registers_preset(text("preset", name))), {}, array)
+        registers._set(_core.registers_preset(text("preset", name)), {}, array)
         return registers
 
     @classmethod
@@ -139,7 +140,7 @@ class Registers:
     def _of_source(cls, array: Array, rate_hz: float, bits: int) -> tuple[Registers, int]:
         """Return the registers of a board that scans another sensor's frames, and how often it halves their values."""
         held, halved = _core.registers_of_source(array._parts(), rate_hz, bits)
-        return cls._of(json.loads(held), array), halved
+        return cls._of(held, array), halved
 
     @classmethod
     def from_words(cls, words: Sequence[int], *, array: Array | None = None, channels: int = 16) -> Registers:
@@ -170,9 +171,9 @@ class Registers:
         """
         eight = [whole(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(several("words", words))]
         if len(eight) != 8:
-            raise ProblemError(f"words: {len(eight)}, must be 8")
+            raise refused("words", f": {len(eight)}, must be 8")
         held = _core.registers_of_words(eight, whole("channels", channels, 0, 255))
-        return cls._of(json.loads(held), Array._of(array))
+        return cls._of(held, Array._of(array))
 
     def replace(self, **fields: float) -> Registers:
         """Return a set with some fields changed, by taxel's names or the manual's.
@@ -225,7 +226,7 @@ class Registers:
         (7.81, 10, 2)
         """
         preset = text("preset", name)
-        held = json.loads(_core.registers_with_preset(self._json(), preset, self.array._parts()))
+        held = _core.registers_with_preset(self._json(), preset, self.array._parts())
         return self._of(held, self.array)
 
     @property
@@ -332,7 +333,7 @@ def _raw(name: str, value: object) -> int:
         if not 0 <= units < 2**32:
             raise DeviceError(f"{name} {shown(value)} us does not fit its bits (rule 4)")
         if not abs(units - np.rint(units)) < 1e-6:
-            raise ProblemError(f"{name} is {shown(value)} us: must be a whole multiple of 0.01 us")
+            raise refused(name, f" is {shown(value)} us: must be a whole multiple of 0.01 us")
         return int(np.rint(units))
     if _MANUAL.get(name, name) in _FLAGS:
         return int(flag(name, bool(value) if isinstance(value, int) and value in (0, 1) else value))
@@ -344,7 +345,7 @@ def _raw(name: str, value: object) -> int:
         if field is None:
             raise
         least, most = (field[end] - (field["offset"] if name in _MANUAL else 0) for end in ("least", "greatest"))
-        raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {least} to {most}") from None
+        raise refused(name, f" is {shown(value)}: must be a whole number from {least} to {most}") from None
 
 
 #: The length of the board's frames at reset, us.

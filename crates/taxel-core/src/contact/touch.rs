@@ -22,22 +22,6 @@ pub enum TouchKind {
     Pictures,
 }
 
-impl TouchKind {
-    /// Its name in JSON.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::First => "first",
-            Self::Bounce => "bounce",
-            Self::Hand => "hand",
-            Self::Rest => "rest",
-            Self::Roll => "roll",
-            Self::Slide => "slide",
-            Self::Pictures => "pictures",
-        }
-    }
-}
-
 /// One touch: from the moment when force leaves zero to that when it returns there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contact {

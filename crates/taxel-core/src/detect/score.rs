@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use serde::Serialize;
+
 use crate::detect::{Detection, Reference};
 use crate::metrics::matching::in_order;
 use crate::{Result, Stop, problem};
@@ -32,7 +34,7 @@ pub struct Tally {
 }
 
 /// Mean, spread and range of values.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// Arithmetic mean.
     pub mean: f64,
@@ -87,7 +89,7 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
         return Err(problem!("{} windows for {} reference events: must be one each", windows.len(), truth.len()));
     }
     if let Some(window) = windows.iter().find(|w| !(0..=WIDEST_WINDOW_US).contains(*w)) {
-        return Err(problem!("window of {window} us: must lie between 0 and one hour, {WIDEST_WINDOW_US} us"));
+        return Err(problem!("window_us"; " is {window} us: must be from 0 to {WIDEST_WINDOW_US}"));
     }
     let mut labels: BTreeMap<&str, (Vec<usize>, Vec<usize>)> = BTreeMap::new();
     for (k, detection) in found.iter().enumerate() {
@@ -103,9 +105,7 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
         let detected_t: Vec<i64> = detected.iter().map(|&k| found[k].t).collect();
         let events_t: Vec<i64> = events.iter().map(|&k| truth[k].t).collect();
         let reach: Vec<i64> = events.iter().map(|&k| windows[k]).collect();
-        let pairs = in_order(&detected_t, &events_t, &reach, stop).map_err(|error| {
-            if let crate::Error::Problem(text) = error { problem!("{label}: {text}") } else { error }
-        })?;
+        let pairs = in_order(&detected_t, &events_t, &reach, stop).map_err(|error| error.of(label))?;
 
         let mut tally = Tally { label: label.to_owned(), ..Tally::default() };
         let (mut matched, mut met) = (vec![false; detected.len()], vec![false; events.len()]);
@@ -187,7 +187,7 @@ mod tests {
     fn windows_that_make_no_sense_are_refused() {
         let never = Stop::never();
         let one = [Reference { label: "a".into(), t: 0 }];
-        assert!(score(&[], &one, &[-1], never).unwrap_err().to_string().contains("window of -1 us"));
+        assert!(score(&[], &one, &[-1], never).unwrap_err().to_string().contains("window_us is -1 us"));
         assert!(score(&[], &one, &[i64::MAX], never).is_err());
         assert!(score(&[], &[Reference { label: "a".into(), t: 0 }], &[], never).is_err());
     }

@@ -15,7 +15,7 @@ use super::sink::OutputDetection;
 use super::source::Source;
 use crate::capture::{Batch, Origin};
 use crate::locked::lock;
-use crate::recording::{self, BoardChange, Header, LsaWriter, OutputFile, Track, Writer, now_ns};
+use crate::recording::{self, BoardChange, Decoding, Header, LsaWriter, OutputFile, Track, Writer, now_ns};
 use crate::{Error, Result};
 
 /// One recording, from its reservation to its end. A raw `.lsa` contains bytes only: notes, markers and the like are
@@ -170,7 +170,8 @@ impl Recorder {
     fn open(record: &Record, options: &LiveOptions, sources: &[Source], place: &Origin) -> Result<(Self, OutputFile)> {
         let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
         let sources = sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
-        let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
+        let decoding = Decoding { difference: options.differences, ..Decoding::default() };
+        let header = Header { decoding, name: options.name.clone(), sources, ..board };
         let (path, kind) = (&record.path, kind_of_name(&record.path)?);
         if !header.sources.is_empty() && kind != "mcap" {
             return Err(problem!("{}: only a .mcap holds several sources", path.display()).into());
@@ -269,7 +270,7 @@ impl Recorder {
         Ok(match kind_of_name(path)? {
             "mcap" => {
                 let writer = Writer::plan(file, &self.header, self.record.compression, false);
-                writer.begin(self.header.origin_us)?;
+                writer.begin(self.header.decoding.origin_us)?;
                 RecordingFile::Mcap(Box::new(writer))
             }
             _ => RecordingFile::Lsa(Mutex::new(LsaWriter::begin(file)?)),

@@ -114,10 +114,6 @@ pub struct Decoded {
     pub version_2: wire::v2::Counts,
     /// Arrival time of each datagram, ns since 1970.
     pub arrived_ns: Vec<i64>,
-    /// Arrival number of each datagram.
-    pub number: Vec<u64>,
-    /// Index of the first event of each datagram; with pairing by taxel all events are decoded after the last datagram.
-    pub first: Vec<u64>,
     /// Earliest time at which each datagram could leave the board, us; `i64::MIN` if it is not known.
     pub left: Vec<i64>,
     /// What the decoder could not use, as a verdict states it.
@@ -132,8 +128,6 @@ impl Decoded {
             counts,
             version_2,
             arrived_ns: vec![],
-            number: vec![],
-            first: vec![],
             left: vec![],
             found: Found::default(),
         }
@@ -310,10 +304,10 @@ impl Reader {
             skipped_numbers: remarks.numbers.skipped(),
             before_first: before_first(remarks),
             so_far: remarks.counts.clone(),
-            converted: self.header().converted.clone().map(Box::new),
+            converted: self.header().conversion.converted.clone().map(Box::new),
             decoded: None,
             lines: data == Topic::Samples,
-            origin_us: self.header().origin_us,
+            origin_us: self.header().decoding.origin_us,
         }
     }
 
@@ -389,11 +383,11 @@ impl Reader {
                             *last = number;
                             *in_datagrams += data.len() as u64;
                             if *in_datagrams > most {
-                                wrong = Some(Error::format(
+                                wrong = Some(limits::too_large(
                                     &self.blocks.path,
                                     &format!(
                                         "the datagrams up to byte {} unpack to {in_datagrams} bytes; at most {most} are read \
-                                         (100 times the file and 64 MiB): --limit BYTES (limit=) says how many may be",
+                                         (100 times the file and 64 MiB)",
                                         block.offset
                                     ),
                                 ));
@@ -511,7 +505,7 @@ impl Reader {
     pub fn decode(&self, pairing: Pairing, stop: Stop<'_>) -> Result<Decoded> {
         let header = self.header();
         let array = header.array.clone();
-        let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.difference);
+        let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.decoding.difference);
         let mut sender = wire::SenderDecoder::new(decoder, 1);
         let mut decoded = Decoded::empty(Events::empty(array));
         #[allow(clippy::cast_possible_truncation)]
@@ -522,12 +516,11 @@ impl Reader {
                 let arrived = Some(message.at_ns / 1000);
                 let info = sender.push(message.data, arrived, &mut decoded.events);
                 let last = decoded.events.t.get(before..).and_then(<[i64]>::last).copied();
-                let left = leaves(&info, last, message.data.len(), frame_us).map_or(i64::MIN, |t| t + header.origin_us);
+                let left = leaves(&info, last, message.data.len(), frame_us)
+                    .map_or(i64::MIN, |t| t + header.decoding.origin_us);
                 decoded.left.push(left);
                 decoded.arrived_ns.push(message.at_ns);
-                decoded.number.push(message.number);
-                decoded.first.push(before as u64);
-                self.fits("events", decoded.events.size() + 32 * decoded.first.len())?;
+                self.fits("events", decoded.events.size() + 16 * decoded.left.len())?;
             }
             if message.topic == Topic::Held {
                 begin_with(&mut sender, message.data);
@@ -542,12 +535,12 @@ impl Reader {
             Ok(())
         })?;
         sender.finish_into(&mut decoded.events);
-        mark_repaired(&mut decoded.events, &header.repaired);
-        decoded.events.t.iter_mut().for_each(|t| *t += header.origin_us);
-        decoded.events.markers.iter_mut().for_each(|m| m.t += header.origin_us);
+        mark_repaired(&mut decoded.events, &header.decoding.repaired);
+        decoded.events.t.iter_mut().for_each(|t| *t += header.decoding.origin_us);
+        decoded.events.markers.iter_mut().for_each(|m| m.t += header.decoding.origin_us);
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.two().counts();
-        decoded.found = Found::of(&sender, header.origin_us);
+        decoded.found = Found::of(&sender, header.decoding.origin_us);
         Ok(decoded)
     }
 }

@@ -79,7 +79,7 @@ impl Writer {
     pub fn create(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
         header.check()?;
         let writer = Self::plan(OutputFile::open(path, options.overwrite)?, header, options.compression, false);
-        writer.begin(header.origin_us)?;
+        writer.begin(header.decoding.origin_us)?;
         Ok(writer)
     }
 
@@ -90,7 +90,7 @@ impl Writer {
         Self { track: Track::new(queue, 0, header), header: header.clone() }
     }
 
-    /// Begins the file of `Writer::plan` with the offset of decoded times, us ([`Header::origin_us`]); returns whether
+    /// Begins the file of `Writer::plan` with the offset of decoded times, us ([`Decoding::origin_us`](super::Decoding::origin_us)); returns whether
     /// the offset was used, that is, whether the file was not begun with the header's before.
     ///
     /// # Errors
@@ -142,7 +142,7 @@ impl Writer {
     /// `File` if the disk is full or not available, in which case the file keeps everything that was written before; or
     /// if the file was removed, renamed or replaced while it was written, with a description of what is lost.
     pub fn finish(self, counts: Counts) -> Result<Counts> {
-        self.begin(self.header.origin_us)?;
+        self.begin(self.header.decoding.origin_us)?;
         self.track.queue.finish(Some(counts.clone()))?;
         Ok(self.track.queue.lock().written[0].at_end(counts))
     }

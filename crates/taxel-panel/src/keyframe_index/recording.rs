@@ -151,7 +151,7 @@ impl RecordingIndex {
     }
 
     fn decoding(&self) -> Decoding {
-        let decoder = Decoder::new(self.header.array.clone()).differences(self.header.difference);
+        let decoder = Decoder::new(self.header.array.clone()).differences(self.header.decoding.difference);
         match &self.source {
             Source::Mcap(_) => Decoding::Datagrams(Box::new(wire::SenderDecoder::new(decoder, 1))),
             Source::Lsa(..) => Decoding::Bytes(Box::new(decoder)),
@@ -227,7 +227,7 @@ impl RecordingIndex {
             #[allow(clippy::cast_possible_truncation)]
             let taxel = (usize::from(events.y[k]) * columns + usize::from(events.x[k])) as u32;
             Change {
-                t: events.t[k] + self.header.origin_us,
+                t: events.t[k] + self.header.decoding.origin_us,
                 taxel,
                 ticks,
                 up: events.p[k],
@@ -361,7 +361,7 @@ impl RecordingIndex {
             (Source::Lsa(..), Decoding::Datagrams(_)) => return Verdict::default(),
         };
         let decoded = match decoding {
-            Decoding::Datagrams(sender) => Some(Found::of(sender, self.header.origin_us)),
+            Decoding::Datagrams(sender) => Some(Found::of(sender, self.header.decoding.origin_us)),
             Decoding::Bytes(_) => None,
         };
         let condition = reader.condition(&contents.remarks, &contents.unread);

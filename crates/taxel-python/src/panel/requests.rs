@@ -16,7 +16,7 @@ use taxel_panel::{
     Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, LabelConflict, LabelEdit,
     LabelRequests, LabelRow, LabelTable, Opening, PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource,
     PicturesRead, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers, RestSource, TrainingRequests,
-    UnhealthyTaxels, UserPreset, UserPresets,
+    TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 
 use crate::convert::{ArrayParts, array, from_array, slice, to_array};
@@ -167,8 +167,9 @@ impl LabelRequests for PythonHandler {
 }
 
 impl TrainingRequests for PythonHandler {
-    fn train(&self, recording: &Path, out: &Path) -> Reply<String> {
-        self.call(|handler| handler.call_method1("train", (recording, out))?.extract())
+    fn train(&self, recording: &Path, out: &Path) -> Reply<TrainingResult> {
+        let (text, next, options) = self.call(|handler| handler.call_method1("train", (recording, out))?.extract())?;
+        Ok(TrainingResult { text, next, options })
     }
 
     fn command(&self, recording: &Path, out: &Path) -> Reply<String> {

@@ -327,14 +327,14 @@ impl BatchRule for Skim {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
-            return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
+            return Err(problem!("tau_s"; " is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
         }
         if self.thresholds.is_empty() {
-            return Err(problem!("thresholds: must hold at least one"));
+            return Err(problem!("thresholds"; ": must hold at least one"));
         }
         for (name, value) in [("spread", self.spread), ("delay_ms", self.delay_ms)] {
             if self.branches.is_some() && value.is_none() {
-                return Err(problem!("{name}: none was published for a layer of branches, give one"));
+                return Err(problem!(name; ": none was published for a layer of branches, give one"));
             }
         }
         Ok(())
@@ -370,7 +370,7 @@ impl BatchRule for Skim {
 
     fn run(&self, learnt: &Learnt, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         let Some(threshold) = learnt.results.get("threshold").and_then(Value::as_f64) else {
-            return Err(problem!("threshold is missing"));
+            return Err(problem!("threshold"; " is missing"));
         };
         let output = self.output(&learnt.weights, pattern, stop)?;
         Ok(crossings(&output, threshold, Grid::new(pattern.start, self.step_ms)))

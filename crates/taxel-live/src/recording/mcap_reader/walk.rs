@@ -196,8 +196,8 @@ impl<'a> Walk<'a> {
                     let most = limits::unpacked(self.length, self.memory);
                     if self.unpacked > most {
                         let claim = format!("the chunks up to byte {at} say that they unpack to {}", self.unpacked);
-                        let right = "(1000 times the file and 256 MiB): --limit BYTES (limit=) says how many may be";
-                        return Err(Error::format(
+                        let right = "(1000 times the file and 256 MiB)";
+                        return Err(limits::too_large(
                             self.path,
                             &format!("{claim} bytes; at most {most} are read {right}"),
                         ));

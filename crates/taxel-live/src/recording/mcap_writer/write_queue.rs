@@ -183,11 +183,11 @@ impl WriteQueue {
     pub(super) fn begin(self: &Arc<Self>, origin_us: Option<i64>) -> Result<bool> {
         // The lock is held until the file is begun, so that a second caller finds it begun.
         let mut planned = lock(&self.plan);
-        let Some(plan) = planned.take() else {
+        let Some(mut plan) = planned.take() else {
             return self.lock().failure.clone().map_or(Ok(false), |failure| Err(failure.of_file(&self.path)));
         };
-        let header = Header { origin_us: origin_us.unwrap_or(plan.header.origin_us), ..plan.header };
-        let begun = self.start(Plan { header, ..plan });
+        plan.header.decoding.origin_us = origin_us.unwrap_or(plan.header.decoding.origin_us);
+        let begun = self.start(plan);
         if let Err(error) = &begun {
             self.lock().failure = Some(WriteFailure::copy(error));
             self.room.notify_all();
