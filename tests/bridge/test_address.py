@@ -1,6 +1,5 @@
 """Addresses of boards on other computers, and what is said where nothing carries them; parcels without a network."""
 
-import json
 import sys
 import time
 
