@@ -32,7 +32,7 @@ T = TypeVar("T")
 _AGAIN_S = 0.05
 #: Start and stop of a recording: REG7[16] (Table 5.5).
 _RECORD = 1 << 16
-#: Lines that are stored for `Cable.said`.
+#: Lines that are stored for `Cable.take_lines`.
 _RECENT = 256
 
 #: The noise floor: REG5[15:8] (Table 5.5).
@@ -276,7 +276,7 @@ class Cable:
             pass
         return dict(self.faults)
 
-    def said(self) -> list[str]:
+    def take_lines(self) -> list[str]:
         """Return the lines of the board since the last call, answers to commands included; at most the last 256.
 
         Returns

@@ -496,7 +496,7 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
 
 def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
-    monkeypatch.setattr("taxel.report.listening.picture", lambda figure: drawn.append(figure) or picture(figure))
+    monkeypatch.setattr("taxel.report.detections.picture", lambda figure: drawn.append(figure) or picture(figure))
     file, readout = write_gaitpdb(tmp_path), tmp_path / "gait.json"
     assert call(capsys, "train", file, "--labels", "notes", "--folds", 0, "-o", readout)[0] == 0
     assert call(capsys, "detect", file, "--readout", readout, "--report", tmp_path / "r")[0] == 0
@@ -527,7 +527,7 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
 
 
 def test_weights_are_drawn_by_taxel_where_trains_are_taxels() -> None:
-    from taxel.report.listening import _planes
+    from taxel.report.detections import _planes
 
     array = taxel.Array(3, 4)
     for encoder, count in (

@@ -282,7 +282,7 @@ def test_what_lay_there_while_the_rest_was_taken_is_said_above_the_maps(chromium
     values[:300, 2:5, 4:7] += 200
     values[400:460, 1:4, 1:4] += 500
     frames = Frames(np.round(values), np.arange(600) * 10_000, unit="counts", array=Array(8, 8))
-    where = of_pictures(frames).on
+    where = of_pictures(frames).preload_at
     assert where.startswith("rows 2 to 4, columns 4 to 6")
     taxel.convert(frames, tmp_path / "mat.npz")
     with shown(chromium, tmp_path / "mat.npz") as page:
@@ -347,10 +347,10 @@ def test_what_lay_there_is_said_of_events_in_the_same_words(
     taxel.convert(events, tmp_path / "mat.mcap")
     read = readings(taxel.open(tmp_path / "mat.mcap"))
     assert read is not None
-    assert bool(read[1].on) is bool(load)
+    assert bool(read[1].preload_at) is bool(load)
     with shown(chromium, tmp_path / "mat.mcap") as page:
         if load:
             shows(page, "silence", r"^In the quiet stretch that the rest is taken from, something lay on ")
-            assert page.locator("#silence").inner_text().endswith(f"something lay on {read[1].on}.")
+            assert page.locator("#silence").inner_text().endswith(f"something lay on {read[1].preload_at}.")
         else:
             assert page.locator("#silence").is_hidden()

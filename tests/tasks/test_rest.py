@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.recording.test_rest import lain
+from tests.recording.test_rest import preloaded
 from tests.shell import run
 
 import taxel
@@ -99,7 +99,7 @@ def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) 
 
 @pytest.mark.parametrize("events", [False, True])
 def test_what_lay_on_the_array_in_its_first_quiet_stretch_is_no_rest(tmp_path: Path, events: bool) -> None:
-    source, _ = lain(events=events)
+    source, _ = preloaded(events=events)
     taxel.convert(source, tmp_path / "a.npz")
     with pytest.warns(UserWarning, match="something lay on rows 2 to 4, columns 5 to 7 .* of a time without it"):
         taken = rest(taxel.open(tmp_path / "a.npz"))

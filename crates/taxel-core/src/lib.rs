@@ -15,6 +15,7 @@
 pub mod allowed;
 pub mod error;
 pub mod parameters;
+pub mod preload;
 pub mod reading;
 pub mod vectors;
 
@@ -23,7 +24,6 @@ pub mod baseline;
 pub mod events;
 pub mod frames;
 pub mod held;
-pub mod lain;
 pub mod rest;
 pub mod spikes;
 pub mod touch_counts;

@@ -133,7 +133,7 @@ pub struct UnhealthyTaxels {
     /// That change by themselves.
     pub noisy: Vec<(u16, u16)>,
     /// Number of taxels that were not touched enough to say.
-    pub untold: u64,
+    pub untested: u64,
 }
 
 /// What a readout found in a recording.
@@ -260,7 +260,7 @@ pub trait TrainingRequests: Send + Sync {
     /// Returns what does the same in a shell.
     fn command(&self, recording: &Path, out: &Path) -> Reply<String>;
 
-    /// Returns how far the training that runs is, in words; empty where it has not said so.
+    /// Returns how far the training that runs is, in words; empty where it has reported nothing.
     fn progress(&self) -> Reply<String>;
 
     /// Ends the training that runs.

@@ -228,7 +228,7 @@ async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
         Some(Shown { name, trial, indexed: indexed @ Indexed::Pictures(_) }) => {
             let (path, trial, taxels) = (hub.folder.file(name)?, trial.clone(), taxels(indexed.index().array()));
             let found = hub.ask(move |handlers| handlers.files.health_of_pictures(&path, trial.as_deref())).await?;
-            return Ok(Message::Health { source, taxels, heard: taxels, found });
+            return Ok(Message::Health { source, taxels, active: taxels, found });
         }
         None => {
             let live = hub.live().ok_or("nothing is shown")?;
@@ -237,9 +237,9 @@ async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
         }
     };
     let taxels = taxels(&array);
-    let heard = activity.events.iter().filter(|&&n| n > 0).count();
+    let active = activity.events.iter().filter(|&&n| n > 0).count();
     let found = hub.ask(move |handlers| handlers.files.health(&array, &activity)).await?;
-    Ok(Message::Health { source, taxels, heard, found })
+    Ok(Message::Health { source, taxels, active, found })
 }
 
 async fn cut(hub: &Hub, shown: Option<&Shown>, (start_us, stop_us): (i64, i64), to: &str) -> Answer<Message> {

@@ -19,7 +19,7 @@ from taxel._core import Error, ProblemError
 __all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "with_out", "with_typed"]
 
 #: Arguments of Python that are typed as another option.
-_TYPED_AS = {"registers": "preset", "remote": "address"}
+_TYPED_AS = {"registers": "preset"}
 
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
 _Typed = TypeVar("_Typed")

@@ -76,7 +76,7 @@ def detect(
     if csv is not None:
         write_whole(csv, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
     if report is not None:
-        taxel.report.write_listening(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
+        taxel.report.write_detections(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
     say_warnings(found.warnings)
     written = {"written": csv, "report": None if report is None else report / "report.html"}
     places = {name: str(path) for name, path in written.items() if path is not None}

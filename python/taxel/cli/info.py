@@ -262,9 +262,9 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
     for name, places in facts["taxels"].items():
         yield f"{name} taxels", f"{len(places)}{at(places, len(places))}"
-    if untold := facts["taxels_untold"]:
-        where = at(facts["taxels_untold_at"], untold)
-        yield "other taxels", f"{untold} not touched enough to say whether they work{where}"
+    if untested := facts["taxels_untested"]:
+        where = at(facts["taxels_untested_at"], untested)
+        yield "other taxels", f"{untested} not touched enough to say whether they work{where}"
 
 
 def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

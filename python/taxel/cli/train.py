@@ -115,7 +115,7 @@ def train(
         training.readout.save(out, overwrite=overwrite)
         rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     if report is not None:
-        taxel.report.write_listening(
+        taxel.report.write_detections(
             report,
             training.readout,
             training.outcomes,

@@ -17,8 +17,8 @@ from taxel._core import DeviceError
 from taxel.demo.evaluation import Evaluation, evaluate_events
 from taxel.demo.script import script
 from taxel.detect import Readout, run
-from taxel.detections import Detection
-from taxel.live import Live, heard
+from taxel.detections import Detection, Detections
+from taxel.live import Live
 from taxel.simulate import Contact, truth
 from taxel.wire import FRAME_US
 
@@ -105,7 +105,7 @@ def play_live(
         tare = live.tare
         summary = live.stop()
     emulator = json.loads(printed)
-    reported = heard(detections)
+    reported = Detections.from_list(detections)
     events = taxel.open(recording).events
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
     evaluation = evaluate_events(events, acts, readout, reported)

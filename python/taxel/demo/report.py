@@ -207,7 +207,7 @@ def _split(evaluation: Evaluation) -> dict[str, dict[str, float]]:
             begin = np.ceil(stamp / FRAME_US) * FRAME_US
             crossing = mine.t[place] + to_us(delay)
             known = float(mine.known[place])
-            host = float(mine.said[place]) - known if mine.said is not None else 0.0
+            host = float(mine.reported[place]) - known if mine.reported is not None else 0.0
             parts.append([begin - true, crossing - begin, known - crossing, host])
         if parts:
             medians = to_ms(np.median(np.array(parts), axis=0))

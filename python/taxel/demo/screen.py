@@ -58,7 +58,7 @@ class Screen:
             ("events", f"{counters['events']:,}"),
             ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
             ("arrived to decoded", delays(counters["decode_latency"])),
-            ("known to detected", delays(counters["said_latency"])),
+            ("known to detected", delays(counters["report_latency"])),
             *((label, str(sum(detection.label == label for detection in detections))) for label in LABELS),
         ):
             rows.add_row(Text(name, style="dim"), value)
@@ -97,7 +97,7 @@ class Screen:
         if len(true):
             nearest = int(np.abs(true - detection.t).argmin())
             line.append(f"{self._kinds[nearest]:<7} known {to_ms(detection.known - true[nearest]):+6.2f} ms, ")
-            line.append(f"out {to_ms(detection.said - true[nearest]):+6.2f} ms after the truth", style="dim")
+            line.append(f"out {to_ms(detection.reported - true[nearest]):+6.2f} ms after the truth", style="dim")
         return line
 
 

@@ -115,7 +115,7 @@ class Bridge:
     def counts(self) -> dict[str, dict[str, Any]]:
         """Parcels sent and dropped for "block" (recorders) and "drop" (viewers), and whether there is a subscriber."""
         counts = dict(zip(("block", "drop"), with_taxel_errors(self._zenoh.counts), strict=True))
-        return {what: dict(zip(("sent", "dropped", "heard"), row, strict=True)) for what, row in counts.items()}
+        return {what: dict(zip(("sent", "dropped", "subscribed"), row, strict=True)) for what, row in counts.items()}
 
     def stop(self) -> None:
         """Publish what waits, and end; stop the `Live` first if everything must be published.

@@ -281,7 +281,7 @@ class PanelClient:
             self._noise_floor = message["values"]["noise_floor"]
         elif message["type"] == "detection" and self._subject is not None:
             slope = math.nan if message["slope_mv_per_ms"] is None else message["slope_mv_per_ms"]
-            times = message["t_us"], message["known_us"], slope, message["said_us"]
+            times = message["t_us"], message["known_us"], slope, message["reported_us"]
             yield self._subject, Detection(message["label"], *times)
         elif message["type"] == "spikes" and self._subject is not None:
             yield self._subject, _spikes(message)

@@ -193,10 +193,15 @@ class Remote:
         """Whether the board sends differences for intensities."""
         return bool(self._about["differences"])
 
-    def _fed(self, queue_bytes: int | None) -> _core.Feed:
+    @property
+    def _place(self) -> str:
+        """The board's whole address."""
+        return str(self.address._replace(name=self.name))
+
+    def _fed(self, queue_bytes: int) -> _core.Feed:
         """Return the feed for a pipeline."""
         self._only_one()
-        return _core.Feed(str(self.address._replace(name=self.name)), queue_bytes)
+        return _core.Feed(self._place, queue_bytes)
 
     def _begin(self, feed: _core.Feed) -> None:
         """Feed the pipeline from now on."""

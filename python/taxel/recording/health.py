@@ -60,7 +60,7 @@ class Health:
     activity : int64, shape (rows, columns)
         Number of events (or changes of the picture) at each taxel.
     dead, stuck, noisy : bool, shape (rows, columns)
-    untold : bool, shape (rows, columns)
+    untested : bool, shape (rows, columns)
         Not touched enough to say: neither named nor seen to work.
     """
 
@@ -69,7 +69,7 @@ class Health:
     dead: NDArray[np.bool_]
     stuck: NDArray[np.bool_]
     noisy: NDArray[np.bool_]
-    untold: NDArray[np.bool_]
+    untested: NDArray[np.bool_]
 
     def named(self) -> dict[str, list[tuple[int, int]]]:
         """Return column and row (x, y) of the taxels that are dead, stuck and noisy."""
@@ -85,10 +85,10 @@ class Health:
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(places)} {name}" for name, places in self.named().items())
-        untold = int(np.count_nonzero(self.untold))
+        untested = int(np.count_nonzero(self.untested))
         return (
             f"Health({counted(self.array.taxels, 'taxel')}: {counts}"
-            + f", {untold} not touched enough to say" * bool(untold)
+            + f", {untested} not touched enough to say" * bool(untested)
             + ")"
         )
 
@@ -97,9 +97,9 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     """Return which taxels are dead, stuck or noisy, each compared with its neighbours.
 
     A recording cannot show whether taxels work in a region that was never touched: a taxel is named dead or stuck only
-    if its neighbours were touched three times or more. One that was touched less and did nothing is *untold*. States of
-    wire version 2 (`Events.repaired`) and the values held at the beginning count as held values, but not as changes of
-    the taxel. Without neighbours, as in one channel, no taxel is named.
+    if its neighbours were touched three times or more. One that was touched less and did nothing is *untested*. States
+    of wire version 2 (`Events.repaired`) and the values held at the beginning count as held values, but not as changes
+    of the taxel. Without neighbours, as in one channel, no taxel is named.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     loaded = held.values[0] > least
     noisy = result.noisy | flickering(held)
     dead, stuck = (of & ~noisy for of in (result.dead & ~loaded, result.stuck | result.dead & loaded))
-    return replace(result, dead=dead, stuck=stuck, noisy=noisy, untold=result.untold & ~noisy)
+    return replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)
 
 
 class Touches(NamedTuple):
@@ -236,8 +236,8 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
     noisy &= min(array.shape) > 1
     dead &= ~stuck
     works = enough | where(of.pressed > 0) | (activity >= WORKS_FROM)
-    untold = exists & ~dead & ~stuck & ~noisy & ~works
-    return Health(array, activity, dead, stuck, noisy, untold)
+    untested = exists & ~dead & ~stuck & ~noisy & ~works
+    return Health(array, activity, dead, stuck, noisy, untested)
 
 
 def _statistics_of_events(events: Events) -> TaxelStatistics:

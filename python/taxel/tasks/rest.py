@@ -23,7 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
-from taxel.recording.lain import free_of_what_lay, without_what_lay
+from taxel.recording.preload import free_of_preload, without_preload
 from taxel.recording.pressure import quiet_rest
 from taxel.recording.rest import NOISE_FLOOR, by_unit, of_quiet
 from taxel.spikes import to_ms
@@ -121,8 +121,8 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return TakenRest("unit", zero, begin_us)
     found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
-    if found is not None and found.on:
-        span, said = free_of_what_lay(recording, found)
+    if found is not None and found.preload_at:
+        span, said = free_of_preload(recording, found)
         warn(said, stacklevel=2)
     else:
         span = None if found is None else found.quiet_us
@@ -214,7 +214,7 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return zero
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
-    tare, said = without_what_lay(recording, first)
+    tare, said = without_preload(recording, first)
     if said:
         warn(said, stacklevel=2)
     if tare is not None:

@@ -14,7 +14,7 @@ const VERSION: u64 = 1;
 ///
 /// `Format`, beginning with `what`, if the text is not JSON, or if its format or version is another.
 pub(super) fn parts(what: &str, text: &str, formats: &[&'static str]) -> Result<(&'static str, Value)> {
-    let format = |said: String| Error::format(format!("{what}: {said}"));
+    let format = |message: String| Error::format(format!("{what}: {message}"));
     let names = formats.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
     let mut value: Value = reading::from_text(text).map_err(|unfit| Error::format(unfit.of(what)))?;
     let Some(object) = value.as_object_mut() else {

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["write_listening"]
+__all__ = ["write_detections"]
 
 #: How many moments are drawn a label, and how much around each in time constants of the neuron.
 _MOMENTS, _AROUND = 4, 6.0
@@ -65,7 +65,7 @@ class _Moment(NamedTuple):
     badness: float
 
 
-def write_listening(
+def write_detections(
     folder: str | os.PathLike[str],
     readout: Readout | PlainRule,
     listened: Sequence[Outcome],
