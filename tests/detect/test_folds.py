@@ -243,14 +243,14 @@ def test_points_that_differ_in_lambdas_alone_come_to_what_each_comes_to_by_itsel
         for l1 in (0.0, 1.0, 4.0)
     ]
     data = [one._replace(labels={"lift": one.labels["lift"]}) for one in examples(1, 2)]
-    patterns = encoded(data, plans[0], lambda _: None)
-    rows = Fitting(patterns, plans[0], "lift", None, lambda _: None)
+    patterns = encoded(data, plans[0], lambda *_: None)
+    rows = Fitting(patterns, plans[0], "lift", None, lambda *_: None)
     for plan in plans:
         assert rows.fits(plan)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             together = rows.fit(plan)
-            alone = Fitting(patterns, plan, "lift", None, lambda _: None).fit(plan)
+            alone = Fitting(patterns, plan, "lift", None, lambda *_: None).fit(plan)
         assert together.weights_ == pytest.approx(alone.weights_, abs=1e-3)
     slower = dataclasses.replace(plans[0], neurons={"lift": {**plans[0].neurons["lift"], "tau": 9.0}})
     assert not rows.fits(slower)

@@ -193,7 +193,7 @@ def test_an_encoder_that_does_not_fit_pictures_is_refused_with_the_reason(tmp_pa
         assert "values must be finite" in page.until("warning")["text"]
         opened(page, "grasp.npz")
         said = page.ask("encode", encoder={"name": "change_events"})
-        assert (said["type"], "--rate-hz" in said["reason"]) == ("refused", True)
+        assert (said["type"], "give rate_hz" in said["reason"]) == ("refused", True)
 
 
 def test_pictures_without_times_are_numbered(tmp_path):

@@ -352,7 +352,7 @@ def _encoder_of(values: Mapping[str, Any]) -> Encoder:
     if isinstance(single, Mapping) == isinstance(each, Mapping):
         if single is not None and each is not None:
             raise refused("recipe", ": says both encoder and encoders: name one of the two")
-        raise helped(ProblemError("the recipe says no encoder, as [encoder] does"), "encoder", "give")
+        raise helped(ProblemError("recipe: says no encoder, as [encoder] does"), "encoder", "give")
 
     def stated(encoder: Mapping[str, Any]) -> Encoder:
         return Encoder.from_json(parameters({n: None if v == "none" else v for n, v in encoder.items()}))
