@@ -123,14 +123,7 @@ pub struct Decoded {
 impl Decoded {
     fn empty(events: Events) -> Self {
         let (counts, version_2) = (wire::Counts::default(), wire::v2::Counts::default());
-        Self {
-            events,
-            counts,
-            version_2,
-            arrived_ns: vec![],
-            left: vec![],
-            found: Found::default(),
-        }
+        Self { events, counts, version_2, arrived_ns: vec![], left: vec![], found: Found::default() }
     }
 }
 
