@@ -41,7 +41,7 @@ def notes(held: tuple[Note, ...]) -> list[list[Any]]:
 
 
 def detections(found: Detections) -> list[Any]:
-    return [found.label, found.t, found.known, found.slope, found.said, found.repaired]
+    return [found.label, found.t, found.known, found.slope, found.reported, found.repaired]
 
 
 def verdict(of: taxel.Verdict) -> dict[str, Any]:

@@ -1,20 +1,24 @@
-"""The code in CONTRIBUTING works: added to a copy it gives a format, a study, an encoder and a learner."""
+"""The code in CONTRIBUTING works: added to a copy it gives a format, a study, an encoder, a learner, an option ..."""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 import zipfile
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
+from taxel import _core
+
 ROOT = Path(__file__).resolve().parents[1]
-FORMAT, STUDY, ENCODER, LEARNER, PAGE = "channel", "quiet", "binary", "echo", "clients"
+FORMAT, STUDY, ENCODER, LEARNER, PAGE, OPTION = "channel", "quiet", "binary", "echo", "clients", "mounted"
 #: The tests that check the laws and registries of formats, studies, encoders, learners, and parts of the page.
 TESTS = {
     FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
@@ -25,6 +29,7 @@ TESTS = {
     ENCODER: ["tests/encode/test_laws.py", "tests/encode/test_binary.py"],
     LEARNER: ["tests/learn/test_manners.py", "tests/learn/test_echo.py"],
     PAGE: ["tests/panel/test_page.py", "tests/panel/test_page_clients.py"],
+    OPTION: ["tests/test_docstrings.py", "tests/panel/test_page_mounted.py"],
 }
 
 
@@ -91,6 +96,7 @@ def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
     about = {STUDY: f"{name} or registry or without_weight", LEARNER: "echo or Echo or nothing_is_left_out"}
     about[ENCODER] = "binary or nothing_is_left_out"
+    about[OPTION] = "live or option"
     chosen = ["-k", about[name]] if name in about else []
     environment = os.environ | {"PYTHONPATH": f"{root / 'python'}:{root / 'studies'}"}
     return subprocess.run([*command, *chosen], cwd=root, env=environment, capture_output=True, text=True, check=False)
@@ -131,7 +137,11 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         *[(f"{folder}/src/{name}.rs", True) for name in ("assets", "request", "requests", "messages")],
         ("tests/panel/test_page_clients.py", False),
     ]
-    every = [*of(FORMAT), *of(STUDY), *of(ENCODER), *of(LEARNER), *of(PAGE)]
+    assert [(p.path, bool(p.after)) for p in of(OPTION)] == [
+        ("crates/taxel-live/src/pipeline/options.rs", True),
+        ("tests/panel/test_page_mounted.py", False),
+    ]
+    every = [*of(FORMAT), *of(STUDY), *of(ENCODER), *of(LEARNER), *of(PAGE), *of(OPTION)]
     assert sorted(pieces()) == sorted(every)
 
 
@@ -175,7 +185,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in tracked:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
-    for piece in (*of(ENCODER), *of(LEARNER), *of(PAGE)):
+    for piece in (*of(ENCODER), *of(LEARNER), *of(PAGE), *of(OPTION)):
         add(root, piece)
     # Dependencies are not built again: the copy uses the checkout's.
     made = ["build", "--release", "--quiet", "--features", "test-hooks"]
@@ -238,6 +248,46 @@ def test_what_contributing_says_of_the_page_is_enough(built: Path) -> None:
     assert "export interface Clients {" in (built / "crates/taxel-panel/web/messages.d.ts").read_text()
     done = tried(built, PAGE)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_what_contributing_says_of_an_option_is_enough(built: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(built / "python")}
+    subprocess.run([sys.executable, "tools/messages.py"], cwd=built, env=environment, check=True)
+    done = tried(built, OPTION)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    assert " passed" in done.stdout
+
+
+def test_an_option_in_rust_is_one_of_python_and_of_the_command_line(copy: Path) -> None:
+    """Without a build: what Rust hands over, with one more field."""
+    sys.path.insert(0, str(ROOT / "tools"))
+    try:
+        from messages import made
+    finally:
+        sys.path.pop(0)
+    schemas = json.loads(_core.message_schemas())
+    field = {"type": "number", "minimum": 0, "default": 2.5, "description": "How long it rings, s.\n\nOr more."}
+    schemas["options"]["properties"]["rings"] = field
+    for path, text in made(schemas, copy).items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    seen = """if True:
+        import inspect
+        from taxel.live import Live
+        print(inspect.signature(Live).parameters["rings"])
+        print("rings : float, 0 or more\\n        How long it rings, s. Or more." in Live.__doc__)
+    """
+    environment = os.environ | {"PYTHONPATH": str(copy / "python"), "COLUMNS": "200"}
+    run = partial(subprocess.run, env=environment, capture_output=True, text=True, check=False)
+    shown = run([sys.executable, "-m", "taxel", "live", "--help"]).stdout
+    assert re.search(r"--rings <float range> +How long it rings, s\.  \[default: 2\.5; x>=0", shown), shown
+    done = run([sys.executable, "-c", seen])
+    assert done.stdout.splitlines() == ["rings: 'float' = 2.5", "True"], done.stdout + done.stderr
+    refused = run([sys.executable, "-m", "taxel", "live", "--rings", "-1", "--panel"])
+    assert "--rings" in refused.stderr
+    assert "-1" in refused.stderr
 
 
 def test_a_learner_without_its_line_in_rust_is_named(copy: Path) -> None:

@@ -91,7 +91,7 @@ THOUSANDS = {
     "taxel.information.answers": "bits a thousand events",
     "taxel.information.codes": "Hz",
     "taxel.information.wire_rate": "kbit/s",
-    "taxel.report.listening": "seconds",
+    "taxel.report.detections": "seconds",
     "taxel.live._to_foxglove": "ns",
 }
 

@@ -97,7 +97,8 @@ def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
         given = int(value) if whole and math.isfinite(value) else value
         with pytest.raises(taxel.ProblemError) as error:
             make(kind, **{name: [given] * entries if entries else given})
-        assert name in str(error.value)
+        assert error.value.argument == name
+        assert str(error.value).startswith(name)
         assert "\n" not in str(error.value)
         if math.isfinite(value) and not (whole and value < 0):
             assert f"must be {rules['must_be']}" in str(error.value)

@@ -1,13 +1,15 @@
-"""Make the types and the tables of the panel's messages from the structs in Rust (`make messages`).
+"""Make the types and the tables of the panel's messages, and the options of `Live`, from the structs in Rust (`make messages`).
 
 Usage: python tools/messages.py [--check]. The built extension gives their schemas (crates/taxel-panel/src/messages.rs and
-request.rs). With --check no file is written, and the status is 1 where one differs (`make lint`).
+request.rs, crates/taxel-live/src/pipeline/options.rs). With --check no file is written, and the status is 1 where one differs (`make lint`).
 """
 
 from __future__ import annotations
 
 import json
+import re
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 HEAD = "Made from the structs of crates/taxel-panel by tools/messages.py (`make messages`): edit those."
 PAGE, CLIENT = "crates/taxel-panel/web/messages.d.ts", "python/taxel/live/_messages.py"
 DOCS = "docs/panel-protocol.md"
+STRUCT = "crates/taxel-live/src/pipeline/options.rs"
+OPTIONS, LIVE = "python/taxel/live/_stated_options.py", "python/taxel/live/live.py"
 #: The keys of messages, and of their parts, that the Python client reads; it ignores others.
 READS = {
     "ArrayInfo": ("rows", "columns", "name"),
@@ -26,7 +30,7 @@ READS = {
     "RecordedNote": ("text", "t_us"),
     "hello": ("array",),
     "registers": ("values",),
-    "detection": ("label", "t_us", "known_us", "slope_mv_per_ms", "said_us"),
+    "detection": ("label", "t_us", "known_us", "slope_mv_per_ms", "reported_us"),
     "spikes": ("encoder", "t_ms", "train", "value", "left_out"),
     "opened": ("array", "name", "registers", "detections", "notes"),
     "transport": ("state",),
@@ -232,32 +236,132 @@ def tables_of_messages(_requests: Schema, messages: Schema) -> str:
 TABLES = {"requests": table_of_requests, "messages": tables_of_messages}
 
 
-def docs(requests: Schema, messages: Schema) -> str:
+def between(text: str, begin: str, end: str, made: str) -> str:
+    """Return a text with another part between two marks."""
+    before, _, rest = text.partition(begin)
+    return f"{before}{begin}{made}{end}{rest.partition(end)[2]}"
+
+
+def docs(requests: Schema, messages: Schema, root: Path = ROOT) -> str:
     """Return the page of the docs with its tables made anew."""
-    text = (ROOT / DOCS).read_text("utf-8")
+    text = (root / DOCS).read_text("utf-8")
     for name, make in TABLES.items():
         begin, end = f"<!-- {name}: made by tools/messages.py -->\n", f"<!-- end of {name} -->"
-        before, _, rest = text.partition(begin)
-        text = f"{before}{begin}\n{make(requests, messages)}\n\n{end}{rest.partition(end)[2]}"
+        text = between(text, begin, end, f"\n{make(requests, messages)}\n\n")
     return text
 
 
-MADE = {PAGE: page, CLIENT: client, DOCS: docs}
+def in_order(schema: Schema) -> list[tuple[str, Schema]]:
+    """Return the options by name, in the order of the struct, which a schema has not."""
+    order = re.findall(r"^        (\w+): .* = ", (ROOT / STRUCT).read_text("utf-8"), re.MULTILINE)
+    return sorted(schema["properties"].items(), key=lambda one: order.index(one[0]) if one[0] in order else len(order))
+
+
+def in_python(schema: Schema) -> str:
+    """Return the type of an option in Python."""
+    return schema.get("python") or PYTHON.type(schema)
+
+
+def stated(name: str, schema: Schema) -> str:
+    """Write an option as a field: type, default, help, range, and what the command line reads."""
+    kind, default = in_python(schema), schema.get("default")
+    default = None if "None" in kind else () if default == [] else default
+    # The first paragraph is the help.
+    parts = textwrap.wrap(" ".join(schema["description"].split("\n\n")[0].split()), 109, drop_whitespace=False)
+    lines = [repr(default) if not isinstance(default, str) else json.dumps(default)]
+    lines += ["\n        ".join(repr(part) if '"' in part else json.dumps(part) for part in parts)]
+    lines += [f"{key}={schema[word]:_}" for key, word in (("least", "minimum"), ("most", "maximum")) if word in schema]
+    words = ("commands", "flag", "metavar", "typed")
+    lines += [f"{key}={json.dumps(schema[key])}" for key in words if key in schema]
+    # As ruff breaks lines.
+    head, inside = f"    {name}: {kind} = option(", ", ".join(lines)
+    if len(parts) > 1 or len(inside) > 112:
+        inside = "".join(f"\n        {line}," for line in lines) + "\n    "
+    elif len(head) + len(inside) > 119:
+        inside = f"\n        {inside}\n    "
+    return f"{head}{inside})\n"
+
+
+def options(schema: Schema) -> str:
+    """Write the options of `Live` as a dataclass; the first is positional too."""
+    first, *others = [stated(name, one) for name, one in in_order(schema)]
+    return f'''"""The options of a `Live` that Rust reads too.
+
+{HEAD.replace("taxel-panel", "taxel-live")}
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+
+from taxel._base.options import option
+from taxel.array import Array
+from taxel.detect import PlainRule, Readout
+from taxel.live.remote import Remote
+from taxel.tare import Tare
+from taxel.wire import Registers
+
+__all__ = ["StatedOptions"]
+
+
+@dataclass(frozen=True)
+class StatedOptions:
+    """Hold the options of a `Live`, which documents each, with their defaults."""
+
+{first}    _: KW_ONLY
+{"".join(others)}'''
+
+
+#: The words of docstrings for types of Python.
+DOCUMENTED = {
+    "str | os.PathLike[str]": "path",
+    "str | Sequence[str]": "str or sequence of str",
+    "Mapping[str, str]": "mapping of str to str",
+    " | ": " or ",
+}
+
+
+def documented(name: str, schema: Schema) -> str:
+    """Write an option as an entry of a docstring."""
+    kind, least, most = in_python(schema), schema.get("minimum"), schema.get("maximum")
+    optional = ", optional" * kind.endswith(" | None")
+    kind = kind.removesuffix(" | None")
+    for written, word in DOCUMENTED.items():
+        kind = kind.replace(written, word)
+    within = "" if least is None else f", {least} or more" if most is None else f", {least} to {most}"
+    about = textwrap.fill(comment(schema), 120, initial_indent=" " * 8, subsequent_indent=" " * 8)
+    return f"    {name} : {kind}{within}{optional}\n{about}\n"
+
+
+def live(schema: Schema, root: Path = ROOT) -> str:
+    """Return the module of `Live` with its docstring's parameters made anew."""
+    text, end = (root / LIVE).read_text("utf-8"), "    say : callable, optional\n"
+    entries = "".join(documented(name, one) for name, one in in_order(schema))
+    return between(text, "    Parameters\n    ----------\n", end, entries)
+
+
+def made(schemas: dict[str, Schema], root: Path = ROOT) -> dict[Path, str]:
+    """Return the text of each file that is made."""
+    both, of_live = (schemas["requests"], schemas["messages"]), schemas["options"]
+    texts = {PAGE: page(*both), CLIENT: client(*both), DOCS: docs(*both, root)}
+    texts |= {OPTIONS: options(of_live), LIVE: live(of_live, root)}
+    return {root / name: text for name, text in texts.items()}
 
 
 def main() -> int:
     """Write every file, or compare."""
-    schemas = json.loads(_core.message_schemas())
-    made = {ROOT / name: make(schemas["requests"], schemas["messages"]) for name, make in MADE.items()}
+    texts = made(json.loads(_core.message_schemas()))
     if "--check" not in sys.argv[1:]:
-        for path, text in made.items():
+        for path, text in texts.items():
             path.write_text(text, "utf-8")
         return 0
     old = [
-        path.relative_to(ROOT) for path, text in made.items() if not path.exists() or path.read_text("utf-8") != text
+        path.relative_to(ROOT) for path, text in texts.items() if not path.exists() or path.read_text("utf-8") != text
     ]
     for path in old:
-        print(f"{path}: is not what the structs of the panel's messages give; run make messages")
+        print(f"{path}: is not what the structs in Rust give; run make messages")
     return int(bool(old))
 
 

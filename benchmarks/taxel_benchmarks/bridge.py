@@ -164,13 +164,13 @@ def killed() -> dict[str, float]:
             wait_for(lambda: live.counters["bridged"]["parcels"])
             other.process.kill()
             begun = time.monotonic()
-            wait_for(lambda: not live.counters["bridged"]["heard"])
+            wait_for(lambda: not live.counters["bridged"]["received"])
             noticed = time.monotonic() - begun
             with Other(*place) as again:
                 # Starting takes a while: the process has started when its address accepts connections.
                 Remote(f"zenoh:{again.place}", timeout=60.0).stop()
                 begun = time.monotonic()
-                wait_for(lambda: live.counters["bridged"]["heard"])
+                wait_for(lambda: live.counters["bridged"]["received"])
                 back = time.monotonic() - begun
     return {"noticed_s": noticed, "heard_again_s": back}
 

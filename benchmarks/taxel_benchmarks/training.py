@@ -34,7 +34,7 @@ from taxel.detect import run as detect
 from taxel.detect.folds import count_of_folds
 from taxel.detections import Detections
 from taxel.encode import Composite, LocalLoad
-from taxel.live import Live, heard
+from taxel.live import Live
 from taxel.simulate import Contact, Scene, emulate, play, truth, worn
 from taxel_benchmarks._goals import Goal, at_least, at_most
 from taxel_benchmarks._rounds import stamp
@@ -181,7 +181,7 @@ def live_differs(readout: Readout, seed: int, scenes: int) -> dict[str, Any]:
         tare = Tare.take(recording.events, stop_us=recording.events.markers[0][0])
         again = detect(readout, recording, tare=tare)
     start = recording.events.markers[0][0]
-    both = [sorted((d.label, d.t) for d in one if d.t >= start) for one in (heard(said), again)]
+    both = [sorted((d.label, d.t) for d in one if d.t >= start) for one in (taxel.Detections.from_list(said), again)]
     return {
         "live": len(both[0]),
         "recording": len(both[1]),

@@ -27,10 +27,10 @@ fuzz_target!(|input: &[u8]| {
         receiver.push(&datagram, arrived, &mut events);
         // The same again, when its version is certain: of version 2 it gives nothing.
         if kind & 2 != 0 && Header::read(&datagram).is_ok() {
-            let (heard, counts) = (events.len(), receiver.two().counts());
+            let (decoded, counts) = (events.len(), receiver.two().counts());
             bytes += datagram.len() as u64;
             receiver.push(&datagram, arrived, &mut events);
-            assert_eq!((events.len(), receiver.two().counts().intact), (heard, counts.intact));
+            assert_eq!((events.len(), receiver.two().counts().intact), (decoded, counts.intact));
         }
         first.push(datagram);
     }

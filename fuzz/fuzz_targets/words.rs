@@ -34,8 +34,8 @@ fuzz_target!(|input: &[u8]| {
         }
         events.view().check().unwrap();
         assert_eq!(decoder.counts().events, events.len() as u64);
-        let heard = (events, decoder.counts(), decoder.held());
-        let first = first.get_or_insert_with(|| heard.clone());
-        assert_eq!(*first, heard);
+        let decoded = (events, decoder.counts(), decoder.held());
+        let first = first.get_or_insert_with(|| decoded.clone());
+        assert_eq!(*first, decoded);
     }
 });

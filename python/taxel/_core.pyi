@@ -8,12 +8,17 @@ from typing import Any, Final, Literal, Protocol, Self, TypeAlias, TypedDict, fi
 import numpy as np
 from numpy.typing import NDArray
 
-class Error(Exception): ...
+class Error(Exception):
+    argument: str | None
+    hint: str | None
+
 class FormatError(Error): ...
 class ProblemError(Error): ...
 class NotFittedError(ProblemError): ...
 class DeviceError(Error): ...
 class SceneError(Error): ...
+
+def error_line(text: str, argument: str, hint: str | None) -> str: ...
 
 # the door: what it does with a panic, Ctrl-C, each kind of error (for tests)
 
@@ -193,8 +198,6 @@ def pairwise(
 
 # recording: header and counts as JSON where they are written, as dictionaries where they are read
 
-def live_defaults() -> str: ...
-
 UNKNOWN: Final = 65_535
 LOADED_TICKS: Final = 8.0
 
@@ -220,7 +223,7 @@ class TrackedRest:
     @property
     def begins(self) -> NDArray[np.float64]: ...
 
-def lain(
+def preload(
     less: NDArray[np.float64], columns: int, above: float, corner: tuple[int, int]
 ) -> tuple[NDArray[np.float64], str]: ...
 def touched_above(noise_floor: float) -> float: ...
@@ -558,7 +561,7 @@ def registers_words(registers: str) -> tuple[list[int], float]: ...
 def registers_of_words(words: list[int], channels: int) -> dict[str, Any]: ...
 def registers_commands(source: str, target: str, array: _Array) -> list[tuple[int, int]]: ...
 
-# live: options, readout and tare as JSON
+# live: options and tare as JSON
 
 @type_check_only
 class _Detection(TypedDict):
@@ -566,8 +569,8 @@ class _Detection(TypedDict):
     t: int
     known: int
     slope: float
-    said: int
-    said_ns: int
+    reported: int
+    reported_ns: int
     repaired: bool
 
 @type_check_only
@@ -591,16 +594,9 @@ class Ended:
 class Live:
     def __new__(
         cls,
-        host: str,
-        port: int,
-        parts: _Array,
         options: str,
-        record: tuple[str | PathLike[str], str, bool] | None,
-        readout: str | None,
-        tare: str | None,
-        tare_us: int | None,
+        record: str | PathLike[str] | None,
         say: Callable[[_Detection], object] | None,
-        lines: bool,
         feed: Feed | None,
     ) -> Live: ...
     def address(self) -> tuple[str, int]: ...
@@ -627,7 +623,7 @@ class Live:
 
 @final
 class Feed:
-    def __new__(cls, place: str, queue_bytes: int | None) -> Feed: ...
+    def __new__(cls, place: str, queue_bytes: int) -> Feed: ...
     def take(self, parcel: bytes) -> bool: ...
     def begin_session(self) -> None: ...
     def compare(self, asked: int, came: int, answered: int, back: int) -> None: ...
@@ -750,7 +746,7 @@ def fit_batch(
     name: str, parameters: str, patterns: list[_Spikes], targets: list[NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], dict[str, Any]]: ...
 def run_batch(
-    name: str, parameters: str, weights: NDArray[np.float64], said: str, pattern: _Spikes
+    name: str, parameters: str, weights: NDArray[np.float64], results: str, pattern: _Spikes
 ) -> NDArray[np.float64]: ...
 def rows_skim(parameters: str, pattern: _Spikes) -> NDArray[np.float64]: ...
 def output_skim(parameters: str, weights: NDArray[np.float64], pattern: _Spikes) -> NDArray[np.float64]: ...
@@ -884,7 +880,7 @@ class LabelRequests(Protocol):
 
 @type_check_only
 class TrainingRequests(Protocol):
-    def train(self, recording: Path, out: Path) -> str: ...
+    def train(self, recording: Path, out: Path) -> tuple[str, str, list[str]]: ...
     def command(self, recording: Path, out: Path) -> str: ...
     def progress(self) -> str: ...
     def end(self) -> None: ...

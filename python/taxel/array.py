@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, number, numbers, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, warn
 from taxel._core import ProblemError
 
@@ -52,7 +53,7 @@ class Places:
                 continue
             values = numbers(name, getattr(self, name), np.float64).copy()
             if values.ndim not in (1, 2) or values.shape != np.shape(self.x):
-                raise ProblemError(f"{name} has shape {values.shape}: must be one a taxel, as x, {np.shape(self.x)}")
+                raise refused(name, f" has shape {values.shape}: must be one a taxel, as x, {np.shape(self.x)}")
             values.setflags(write=False)
             object.__setattr__(self, name, values)
         if self.unit is not None:
@@ -67,7 +68,7 @@ class Places:
             if values is None:
                 continue
             if values.size != there.size or (values.ndim == 2 and values.shape != there.shape):
-                raise ProblemError(f"places: {name} has shape {values.shape}: must be {array.shape}, one a taxel")
+                raise refused("places", f": {name} has shape {values.shape}: must be {array.shape}, one a taxel")
             # Files hold no NaN.
             values = np.where(there, values.reshape(there.shape), float(name == "area"))
             wrong = ~np.isfinite(values) | ((values <= 0) if name == "area" else False)
@@ -75,7 +76,7 @@ class Places:
                 row, column = np.argwhere(wrong)[0]
                 right = "above 0 and finite" if name == "area" else "finite"
                 value = values[row, column]
-                raise ProblemError(f"places: {name} of row {row}, column {column} is {value}: must be {right}")
+                raise refused("places", f": {name} of row {row}, column {column} is {value}: must be {right}")
             changed[name] = values
         return Places(changed["x"], changed["y"], changed.get("area"), self.unit)
 
@@ -156,7 +157,7 @@ class Array:
         if self.exists is not None:
             exists = numbers("exists", self.exists, np.bool_).copy()
             if exists.shape != self.shape:
-                raise ProblemError(f"exists has shape {exists.shape}: must be {self.shape}")
+                raise refused("exists", f" has shape {exists.shape}: must be {self.shape}")
             exists.setflags(write=False)
             object.__setattr__(self, "exists", exists)
         if self.places is not None:
@@ -167,9 +168,7 @@ class Array:
             names = tuple(text("names", one) for one in several("names", self.names))
             places = self.rows * self.columns
             if len(names) != places:
-                raise ProblemError(
-                    f"names has {counted(len(names), 'entry', 'entries')}: must be one a taxel, {places}"
-                )
+                raise refused("names", f" has {counted(len(names), 'entry', 'entries')}: must be one a taxel, {places}")
             object.__setattr__(self, "names", names)
 
     @classmethod
@@ -227,11 +226,11 @@ class Array:
         column, row = numbers("x", x, np.int64), numbers("y", y, np.int64)
         for name, place, end in (("x", column, self.columns), ("y", row, self.rows)):
             if place.size and not (place.min() >= 0 and place.max() < end):
-                raise ProblemError(f"{name} reaches from {place.min()} to {place.max()}: must lie in 0 to {end - 1}")
+                raise refused(name, f" reaches from {place.min()} to {place.max()}: must be from 0 to {end - 1}")
         try:
             return np.asarray(row * self.columns + column)
         except ValueError:
-            raise ProblemError(f"x has shape {column.shape}, y {row.shape}: must be equal") from None
+            raise refused("x", f" has shape {column.shape}, y {row.shape}: must be equal") from None
 
     def region(self, x: slice, y: slice) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return first and last (exclusive) column and row of a rectangle of columns `x` and rows `y`.
@@ -253,13 +252,11 @@ class Array:
         limits = []
         for name, chosen, size in (("x", x, self.columns), ("y", y, self.rows)):
             if not isinstance(chosen, slice) or chosen.step not in (None, 1):
-                raise ProblemError(f"{name} is {shown(chosen)}: must be a slice without a step, as slice(8, 16)")
+                raise refused(name, f" is {shown(chosen)}: must be a slice without a step, as slice(8, 16)")
             try:
                 first, last, _ = chosen.indices(size)
             except TypeError:
-                raise ProblemError(
-                    f"{name} is {shown(chosen)}: a slice goes from one whole number to another"
-                ) from None
+                raise refused(name, f" is {shown(chosen)}: a slice goes from one whole number to another") from None
             limits.append((first, last))
         return limits[0], limits[1]
 
@@ -492,11 +489,11 @@ def _pitch(pitch: object) -> float | tuple[float, float]:
     """Return a pitch as one number, or as a pair if its two numbers differ."""
     pair = isinstance(pitch, tuple | list) or (isinstance(pitch, np.ndarray) and pitch.ndim > 0)
     if pair and len(pitch) != 2:  # type: ignore[arg-type]
-        raise ProblemError(f"pitch_mm is {shown(pitch)}: must be a number, or two, that of rows and that of columns")
+        raise refused("pitch_mm", f" is {shown(pitch)}: must be a number, or two, that of rows and that of columns")
     values = list(pitch) if pair else [pitch]  # type: ignore[call-overload]
     each = [number("pitch_mm", value, "mm") for value in values]
     if not all(np.isfinite(one) and one > 0 for one in each):
-        raise ProblemError(f"pitch_mm is {shown(pitch)}: must be above 0 and finite")
+        raise refused("pitch_mm", f" is {shown(pitch)}: must be above 0 and finite")
     return each[0] if each[0] == each[-1] else (each[0], each[1])
 
 
@@ -509,7 +506,7 @@ def of_size(size: str, *, of_wire: bool = True) -> Array:
     """
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", size, re.ASCII)
     if match is None:
-        raise ProblemError(f"--array {size}: must be rows x columns, as 64x64, or with the pitch in mm, as 64x64x2.67")
+        raise refused("array", f" is {size}: must be rows x columns, as 64x64, or with the pitch in mm, as 64x64x2.67")
     thesis = Array.thesis()
     rows, columns, pitch = int(match[1]), int(match[2]), thesis.pitch_mm if of_wire else None
     pitch = float(match[3]) if match[3] else pitch
@@ -517,4 +514,4 @@ def of_size(size: str, *, of_wire: bool = True) -> Array:
     try:
         return thesis if same else Array(rows, columns, pitch_mm=pitch, name=size)
     except ProblemError as error:
-        raise ProblemError(f"--array {size}: {error}") from None
+        raise refused("array", f" is {size}: {error}") from None

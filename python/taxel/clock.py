@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import shown
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 
 __all__ = ["Clock", "doubt"]
@@ -182,7 +183,7 @@ def _whole(name: str, values: Any, unit: str) -> NDArray[np.int64]:
     except (ValueError, TypeError, OverflowError):
         times = np.array(None)
     if times.size and (times.dtype.kind not in "iu" or times.max() > np.iinfo(np.int64).max):
-        raise ProblemError(f"{name} is {shown(values)}: must be whole {unit}")
+        raise refused(name, f" is {shown(values)}: must be whole {unit}")
     return times.astype(np.int64)
 
 

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
 
@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import bare, column, fields, nth, shown, window
+from taxel._base.arguments import bare, column, fields, instance, nth, several, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, own, own_column
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import escaped
@@ -30,7 +31,9 @@ if TYPE_CHECKING:
 __all__ = ["Detection", "Detections"]
 
 _CSV = ("label", "t_us", "known_us", "slope_mv_per_ms")
-_SAID, _REPAIRED = "said_us", "repaired"
+_REPORTED, _REPAIRED = "reported_us", "repaired"
+#: Names of columns in older files, and what they are called now.
+_RENAMED = {"said_us": _REPORTED}
 
 
 class Detection(NamedTuple):
@@ -47,16 +50,16 @@ class Detection(NamedTuple):
     slope : float, mV/ms
         Slope of the potential as it comes to the threshold; on a grid its mean over the last step. The steeper,
         the less noise moves `t`. NaN if unknown.
-    said : int, us, optional
+    reported : int, us, optional
         Time of the report, by the host's clock less the estimated offset between the clocks.
-    said_ns : int, ns since 1970, optional
+    reported_ns : int, ns since 1970, optional
         The same by the host's clock, for a detection that is reported live.
     repaired : bool
         Whether it may rest on values that states of wire version 2 repaired after a loss.
 
     Examples
     --------
-    >>> Detection("contact", 1000, 1344, 0.8, said=1500).latency
+    >>> Detection("contact", 1000, 1344, 0.8, reported=1500).latency
     156
     """
 
@@ -64,14 +67,14 @@ class Detection(NamedTuple):
     t: int
     known: int
     slope: float = math.nan
-    said: int | None = None
-    said_ns: int | None = None
+    reported: int | None = None
+    reported_ns: int | None = None
     repaired: bool = False
 
     @property
     def latency(self) -> int | None:
         """The time from `known` to the report, us; None if it is unknown."""
-        return None if self.said is None else self.said - self.known
+        return None if self.reported is None else self.reported - self.known
 
 
 class Detections(Columns):
@@ -89,7 +92,7 @@ class Detections(Columns):
     slope : float, shape (n,), mV/ms, optional
         Slope of the potential, as in `Detection`; None for a detection without one, which reads back as NaN. Default:
         NaN for all.
-    said : int64, shape (n,), us, optional
+    reported : int64, shape (n,), us, optional
         Time of the report, by the host's clock less the estimated offset.
     repaired : bool, shape (n,), optional
         Whether it may rest on values that states of wire version 2 repaired after a loss: the event may have happened
@@ -120,10 +123,10 @@ class Detections(Columns):
         t: ArrayLike,
         known: ArrayLike,
         slope: ArrayLike | None = None,
-        said: ArrayLike | None = None,
+        reported: ArrayLike | None = None,
         repaired: ArrayLike | None = None,
     ) -> None:
-        self._hold(label, t, known, None if slope is None else _slopes(slope), said, repaired)
+        self._hold(label, t, known, None if slope is None else _slopes(slope), reported, repaired)
 
     @classmethod
     def _of(
@@ -132,12 +135,12 @@ class Detections(Columns):
         t: ArrayLike,
         known: ArrayLike,
         slope: ArrayLike | None = None,
-        said: ArrayLike | None = None,
+        reported: ArrayLike | None = None,
         repaired: ArrayLike | None = None,
     ) -> Self:
         """Build detections from columns; the slope of a detection without one is NaN."""
         detections = cls.__new__(cls)
-        detections._hold(label, t, known, slope, said, repaired)
+        detections._hold(label, t, known, slope, reported, repaired)
         return detections
 
     def _hold(
@@ -146,7 +149,7 @@ class Detections(Columns):
         t: ArrayLike,
         known: ArrayLike,
         slope: ArrayLike | None,
-        said: ArrayLike | None,
+        reported: ArrayLike | None,
         repaired: ArrayLike | None,
     ) -> None:
         try:
@@ -155,15 +158,17 @@ class Detections(Columns):
         except (TypeError, ValueError) as error:
             raise ProblemError(f"label: {error}") from None
         if labels.ndim != 1 or labels.dtype.kind != "U":
-            raise ProblemError(f"label is {shown(label)}: must be a list of texts")
+            raise refused("label", f" is {shown(label)}: must be a list of texts")
         self.label: NDArray[np.str_] = own(labels, label)
         self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
         self.known: NDArray[np.int64] = own_column("known", known, np.int64, "us")
         slopes = frozen(np.full(len(labels), np.nan)) if slope is None else slope
         self.slope: NDArray[np.float64] = own_column("slope", slopes, np.float64)
-        self.said: NDArray[np.int64] | None = None if said is None else own_column("said", said, np.int64, "us")
-        if self.said is not None and len(self.said) != len(labels):
-            raise ProblemError(f"said has {len(self.said)} entries: must be {len(labels)}, one a detection")
+        self.reported: NDArray[np.int64] | None = (
+            None if reported is None else own_column("reported", reported, np.int64, "us")
+        )
+        if self.reported is not None and len(self.reported) != len(labels):
+            raise refused("reported", f" has {len(self.reported)} entries: must be {len(labels)}, one a detection")
         marks = frozen(np.zeros(len(labels), np.bool_)) if repaired is None else repaired
         self.repaired: NDArray[np.bool_] = own_column("repaired", marks, np.bool_)
         _core.check_detections(self._parts())
@@ -177,10 +182,10 @@ class Detections(Columns):
         return tuple(str(name) for name in np.unique(self.label))
 
     def __iter__(self) -> Iterator[Detection]:
-        said = [None] * len(self) if self.said is None else self.said.tolist()
+        reported = [None] * len(self) if self.reported is None else self.reported.tolist()
         columns = (self.label, self.t, self.known, self.slope)
         return map(
-            Detection, *(column.tolist() for column in columns), said, [None] * len(self), self.repaired.tolist()
+            Detection, *(column.tolist() for column in columns), reported, [None] * len(self), self.repaired.tolist()
         )
 
     @overload
@@ -199,9 +204,9 @@ class Detections(Columns):
             raise ProblemError(f"detections: choose by a label, a slice, a mask or numbers: {error}") from None
         if places.ndim != 1:
             raise ProblemError(f"detections: {shown(chosen)} has {places.ndim} dimensions, must have one")
-        said = None if self.said is None else self.said[places]
+        reported = None if self.reported is None else self.reported[places]
         label, t, known, slope = self.label[places], self.t[places], self.known[places], self.slope[places]
-        return Detections._of(label, t, known, slope, said, self.repaired[places])
+        return Detections._of(label, t, known, slope, reported, self.repaired[places])
 
     def between(self, start: float, stop: float) -> Detections:
         """Return the detections of ``start <= t < stop`` (us).
@@ -227,19 +232,19 @@ class Detections(Columns):
 
         Raises
         ------
-        ProblemError : only one of the two has the times of its reports (`said`)
+        ProblemError : only one of the two has the times of its reports (`reported`)
         """
         if not isinstance(other, Detections):
             return NotImplemented
-        if (self.said is None) != (other.said is None):
-            raise ProblemError("detections with `said` and without: only alike ones are merged")
+        if (self.reported is None) != (other.reported is None):
+            raise ProblemError("detections with `reported` and without: only alike ones are merged")
         order = np.argsort(np.concatenate([self.t, other.t]), kind="stable")
-        names = ["label", "t", "known", "slope", "repaired"] + ([] if self.said is None else ["said"])
+        names = ["label", "t", "known", "slope", "repaired"] + ([] if self.reported is None else ["reported"])
         columns = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
         return Detections._of(**columns)
 
     def to_pandas(self) -> Any:
-        """Return a table ``label t_us known_us slope_mv_per_ms``; ``said_us`` if known, ``repaired`` if any is.
+        """Return a table ``label t_us known_us slope_mv_per_ms``; ``reported_us`` if known, ``repaired`` if any is.
 
         Raises
         ------
@@ -249,18 +254,18 @@ class Detections(Columns):
 
         columns: list[NDArray[Any]] = [self.label.astype(object), self.t, self.known, self.slope]
         names = list(_CSV)
-        if self.said is not None:
-            columns, names = [*columns, self.said], [*names, _SAID]
+        if self.reported is not None:
+            columns, names = [*columns, self.reported], [*names, _REPORTED]
         if self.repaired.any():
             columns, names = [*columns, self.repaired], [*names, _REPAIRED]
         return pandas.DataFrame(dict(zip(names, columns, strict=True)))
 
     def to_numpy(self) -> NDArray[np.void]:
-        """Return one record a detection: ``label t known slope``; ``said`` if known, ``repaired`` if any is."""
+        """Return one record a detection: ``label t known slope``; ``reported`` if known, ``repaired`` if any is."""
         width = max(1, self.label.dtype.itemsize // 4)
         fields: list[tuple[str, Any]] = [("label", f"U{width}"), ("t", "<i8"), ("known", "<i8"), ("slope", "<f8")]
-        if self.said is not None:
-            fields.append(("said", "<i8"))
+        if self.reported is not None:
+            fields.append(("reported", "<i8"))
         if self.repaired.any():
             fields.append((_REPAIRED, "?"))
         records = np.empty(len(self), np.dtype(fields))
@@ -269,8 +274,30 @@ class Detections(Columns):
         return records
 
     @classmethod
+    def from_list(cls, detections: Iterable[Detection]) -> Detections:
+        """Build detections from a list of `Detection`, as `taxel.live.Live` reports them.
+
+        Parameters
+        ----------
+        detections : sequence of Detection
+
+        Raises
+        ------
+        ProblemError : something that is no detection
+
+        Examples
+        --------
+        >>> Detections.from_list([Detection("contact", 1000, 1344)])
+        Detections(1: contact 1; 1000 to 1000 us)
+        """
+        entries = [instance("detections", one, Detection) for one in several("detections", detections)]
+        columns: list[tuple[Any, ...]] = list(zip(*entries, strict=True)) or [()] * len(Detection._fields)
+        label, t, known, slope, reported, _, repaired = columns
+        return cls._of(label, t, known, slope, None if None in reported else reported, repaired)
+
+    @classmethod
     def from_numpy(cls, records: NDArray[np.void]) -> Detections:
-        """Build detections from records with the fields ``label t known slope``, and optionally ``said``, ``repaired``.
+        """Build detections from records of ``label t known slope``, and optionally ``reported``, ``repaired``.
 
         Parameters
         ----------
@@ -287,11 +314,11 @@ class Detections(Columns):
         Detections(1: a 1; 10 to 10 us)
         """
         names = fields(records, ("label", "t", "known", "slope"))
-        said, repaired = (records[name] if name in names else None for name in ("said", _REPAIRED))
-        return cls._of(records["label"], records["t"], records["known"], records["slope"], said, repaired)
+        reported, repaired = (records[name] if name in names else None for name in ("reported", _REPAIRED))
+        return cls._of(records["label"], records["t"], records["known"], records["slope"], reported, repaired)
 
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write a table ``label,t_us,known_us,slope_mv_per_ms[,said_us][,repaired]`` and return its path.
+        """Write a table ``label,t_us,known_us,slope_mv_per_ms[,reported_us][,repaired]`` and return its path.
 
         Parameters
         ----------
@@ -314,7 +341,7 @@ class Detections(Columns):
         """Return the table; the column ``repaired`` is in it if any detection is repaired, or on request."""
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
-        more = {} if self.said is None else {_SAID: self.said.tolist()}
+        more = {} if self.reported is None else {_REPORTED: self.reported.tolist()}
         shown = self.repaired.any() if repaired is None else repaired
         more |= {_REPAIRED: self.repaired.astype(int).tolist()} if shown else {}
         table.writerow([*_CSV, *more])
@@ -344,8 +371,9 @@ class Detections(Columns):
         """
         place = Path(checked_path("path", path))
         table = HeaderTable.read(place, text_of(place))
-        more: dict[str, list[int]] = {name: [] for name in (_SAID, _REPAIRED) if name in table.header}
-        if table.header != (*_CSV, *more):
+        header = tuple(_RENAMED.get(name, name) for name in table.header)
+        more: dict[str, list[int]] = {name: [] for name in (_REPORTED, _REPAIRED) if name in header}
+        if header != (*_CSV, *more):
             raise FormatError(f"{place}, line 1: {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}")
         rows: list[tuple[str, int, int, float]] = []
         for line, row in table.rows:
@@ -357,7 +385,7 @@ class Detections(Columns):
                 raise FormatError(f"{place}, line {line}: {error}") from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())
         repaired = [value != 0 for value in more[_REPAIRED]] if _REPAIRED in more else None
-        return cls._of(label, t, known, slope, more.get(_SAID), repaired)
+        return cls._of(label, t, known, slope, more.get(_REPORTED), repaired)
 
     def to_neo(self) -> Any:
         """Return a ``neo.Event`` at `t`, with the label of each, and `known` (us) and `slope` as array annotations.
@@ -369,8 +397,8 @@ class Detections(Columns):
         from neo import Event  # noqa: PLC0415  heavy, and an extra
 
         notes: dict[str, NDArray[Any]] = {"known": self.known, "slope": self.slope}
-        if self.said is not None:
-            notes["said"] = self.said
+        if self.reported is not None:
+            notes["reported"] = self.reported
         if self.repaired.any():
             notes[_REPAIRED] = self.repaired
         return Event(self.t, labels=self.label, units="us", array_annotations=notes)
@@ -389,9 +417,11 @@ class Detections(Columns):
         """
         notes = getattr(events, "array_annotations", None)
         if notes is None or "known" not in notes:
-            raise ProblemError(f"events is {shown(events)}: must be a neo.Event with the array annotation known (us)")
+            raise refused("events", f" is {shown(events)}: must be a neo.Event with the array annotation known (us)")
         t = np.rint(events.rescale("us").magnitude).astype(np.int64)
-        return cls._of(events.labels, t, notes["known"], notes.get("slope"), notes.get("said"), notes.get(_REPAIRED))
+        return cls._of(
+            events.labels, t, notes["known"], notes.get("slope"), notes.get("reported"), notes.get(_REPAIRED)
+        )
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each label's detections as marks over time (s)."""
@@ -414,9 +444,9 @@ class Detections(Columns):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Detections):
             return NotImplemented
-        if (self.said is None) != (other.said is None):
+        if (self.reported is None) != (other.reported is None):
             return False
-        names = ["label", "t", "known", "repaired"] + ([] if self.said is None else ["said"])
+        names = ["label", "t", "known", "repaired"] + ([] if self.reported is None else ["reported"])
         same = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
         return same and np.array_equal(self.slope, other.slope, equal_nan=True)
 
@@ -440,5 +470,5 @@ def _slopes(slope: ArrayLike) -> NDArray[np.float64]:
     wrong = np.flatnonzero(~np.isfinite(values) & ~none)
     if len(wrong):
         k = int(wrong[0])
-        raise ProblemError(f"slope[{k}] is {values[k]}: must be finite, or None where it is not known")
+        raise refused("slope", f"[{k}] is {values[k]}: must be finite, or None where it is not known")
     return values

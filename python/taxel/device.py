@@ -18,8 +18,9 @@ from typing import Self, TypeVar
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, number, shown, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
-from taxel._core import DeviceError, ProblemError
+from taxel._core import DeviceError
 from taxel.array import Array
 from taxel.wire import Command, Registers
 
@@ -31,7 +32,7 @@ T = TypeVar("T")
 _AGAIN_S = 0.05
 #: Start and stop of a recording: REG7[16] (Table 5.5).
 _RECORD = 1 << 16
-#: Lines that are stored for `Cable.said`.
+#: Lines that are stored for `Cable.take_lines`.
 _RECENT = 256
 
 #: The noise floor: REG5[15:8] (Table 5.5).
@@ -164,9 +165,9 @@ class Cable:
         self.place = text("place", place)
         self.timeout = number("timeout", timeout)
         if not 0 < self.timeout <= 3600:
-            raise ProblemError(f"timeout is {shown(timeout)}: must lie between 0 and 3600 s")
+            raise refused("timeout", f" is {shown(timeout)}: must be from 0 to 3600")
         if whole("baud", baud) not in _SPEEDS:
-            raise ProblemError(f"baud is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
+            raise refused("baud", f" is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
         self.faults: dict[str, int] = {}
         self.resets = 0
         self._recent: deque[str] = deque(maxlen=_RECENT)
@@ -194,7 +195,7 @@ class Cable:
             except OSError as error:
                 raise OSError(error.errno, error.strerror or str(error), f"TCP {place}") from None
         else:
-            raise ProblemError(f"place is {shown(place)}: must be a serial device (/dev/ttyUSB0) or host:port")
+            raise refused("place", f" is {shown(place)}: must be a serial device (/dev/ttyUSB0) or host:port")
         os.set_blocking(self._file, False)
 
     def command(self, command: Command) -> int:
@@ -275,7 +276,7 @@ class Cable:
             pass
         return dict(self.faults)
 
-    def said(self) -> list[str]:
+    def take_lines(self) -> list[str]:
         """Return the lines of the board since the last call, answers to commands included; at most the last 256.
 
         Returns

@@ -12,6 +12,7 @@ from taxel import _core
 from taxel._base.arguments import column, fields, instance, nth, rows, shown, window
 from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -211,7 +212,7 @@ class Events(Columns):
         try:
             t = self.t[places]
         except (TypeError, ValueError) as error:
-            raise ProblemError(f"events[{shown(chosen)}]: {error}") from None
+            raise refused("events", f"[{shown(chosen)}]: {error}") from None
         return self._unchecked(
             t,
             self.x[places],
@@ -322,7 +323,7 @@ class Events(Columns):
         """
         for name in ("x", "y"):
             if len(self) and getattr(self, name).max() > 32_767:
-                raise ProblemError(f"{name} reaches {getattr(self, name).max()}: tonic's records hold 32767 at most")
+                raise refused(name, f" reaches {getattr(self, name).max()}: tonic's records hold 32767 at most")
         records = np.empty(len(self), np.dtype([("x", "<i2"), ("y", "<i2"), ("t", "<i8"), ("p", "?")]))
         for name in ("x", "y", "t", "p"):
             records[name] = getattr(self, name)
@@ -459,8 +460,8 @@ def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...
         t = column("markers", [at for at, _ in pairs], np.int64, "us")
         starts = column("markers", [start for _, start in pairs], np.bool_)
     except (TypeError, ValueError):
-        raise ProblemError(
-            f"markers is {shown(markers)}: must be pairs of a time (us) and start (True) or stop"
+        raise refused(
+            "markers", f" is {shown(markers)}: must be pairs of a time (us) and start (True) or stop"
         ) from None
     return tuple(zip(t.tolist(), starts.tolist(), strict=True))
 

@@ -12,6 +12,7 @@ from taxel import _core
 from taxel._base.arguments import finite, instance, shown, text, whole, window
 from taxel._base.columns import Columns, frozen, own_column, own_numbers
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -63,16 +64,16 @@ class Frames(Columns):
         self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
         if self.values.ndim != 3:
             found = counted(self.values.ndim, "dimension")
-            raise ProblemError(f"values have {found}: must have three (n, rows, columns)")
+            raise refused("values", f" have {found}: must have three (n, rows, columns)")
         if len(self.t) != len(self.values):
-            raise ProblemError(f"t has shape {self.t.shape}: must be ({len(self.values)},), one time a picture")
+            raise refused("t", f" has shape {self.t.shape}: must be ({len(self.values)},), one time a picture")
         back = np.flatnonzero(self.t[1:] <= self.t[:-1])
         if len(back):
             k = int(back[0])
-            raise ProblemError(f"t[{k + 1}] is {self.t[k + 1]} us, not after t[{k}] = {self.t[k]} us")
+            raise refused("t", f"[{k + 1}] is {self.t[k + 1]} us, not after t[{k}] = {self.t[k]} us")
         self.unit = text("unit", unit)
         if not unit:
-            raise ProblemError("unit is '': must say what the values are in")
+            raise refused("unit", " is '': must say what the values are in")
         self.array = Array(*self.values.shape[1:]) if array is None else instance("array", array, Array)
         if self.array.shape != self.values.shape[1:]:
             raise ProblemError(f"pictures have shape {self.values.shape[1:]}: the array has {self.array.shape}")
@@ -132,7 +133,7 @@ class Frames(Columns):
         t = np.arange(pictures, dtype=np.int64) * period + first
         begins = None if held is None else own_numbers("held", held, np.float32)
         if begins is not None and begins.shape != array.shape:
-            raise ProblemError(f"held has shape {begins.shape}: must have the array's, {array.shape}")
+            raise refused("held", f" has shape {begins.shape}: must have the array's, {array.shape}")
         if begins is not None:
             _refuse_infinite("held", begins)
         values = _core.HeldValues(events._parts(), None, None if begins is None else begins.reshape(-1)).at(t)
@@ -318,7 +319,7 @@ class Frames(Columns):
         array([[1. , 0.5]])
         """
         if finite("above", above) < 0:
-            raise ProblemError(f"above is {shown(above)}: must be 0 or more, as values are weights")
+            raise refused("above", f" is {shown(above)}: must be 0 or more, as values are weights")
         weights = np.where(self._loaded(above), self.values, 0.0)
         x, y = self.array.positions()
         across, down = weights.sum(axis=1, dtype=np.float64), weights.sum(axis=2, dtype=np.float64)
@@ -390,4 +391,4 @@ def _refuse_infinite(name: str, values: NDArray[np.float32]) -> None:
     """Refuse readings that are infinite; NaN is a missing one."""
     if np.isinf(values).any():
         place = ", ".join(map(str, np.argwhere(np.isinf(values))[0].tolist()))
-        raise ProblemError(f"{name}[{place}] is infinite: must be finite, or NaN where it is missing")
+        raise refused(name, f"[{place}] is infinite: must be finite, or NaN where it is missing")

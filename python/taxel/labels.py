@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown, text
+from taxel._base.errors import refused
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named, whole_file
 from taxel._base.header_table import HeaderTable, text_of
@@ -173,7 +174,7 @@ class Labels:
         """
         # The class is checked, not the attribute: reading the clock may take long.
         if isinstance(recording, type) or not (hasattr(recording, "path") and hasattr(type(recording), "clock")):
-            raise ProblemError(f"recording is {shown(recording)}: must be a taxel.Recording")
+            raise refused("recording", f" is {shown(recording)}: must be a taxel.Recording")
         source = getattr(recording, "label", "")
         trial = trial_of(getattr(recording, "name", ""), source)
         return self._of(recording.path, lambda: recording.clock, source, trial)

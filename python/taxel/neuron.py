@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, number, numbers
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.parameters import Value, defaults
-from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 
 __all__ = ["Neuron"]
@@ -166,10 +166,10 @@ class Neuron(Value):
         single = isinstance(source, np.ndarray) and source.dtype == np.float32
         matrix = numbers("weights", source, np.float32 if single else np.float64)
         if matrix.ndim != 2:
-            raise ProblemError(f"weights has {matrix.ndim} dimensions: must have two, neurons and trains")
+            raise refused("weights", f" has {matrix.ndim} dimensions: must have two, neurons and trains")
         if matrix.shape[1] != len(_trains(trains)):
-            raise ProblemError(
-                f"weights: {matrix.shape[1]} a neuron for {counted(len(trains), 'train')}, must be one a train"
+            raise refused(
+                "weights", f": {matrix.shape[1]} a neuron for {counted(len(trains), 'train')}, must be one a train"
             )
         factor = number("threshold", threshold)
         return SpikeTrains._from_parts(
@@ -227,5 +227,5 @@ class Neuron(Value):
 
 def _trains(trains: SpikeTrains) -> SpikeTrains:
     if not isinstance(trains, SpikeTrains):
-        raise ProblemError(f"trains is a {type(trains).__name__}: must be SpikeTrains")
+        raise refused("trains", f" is a {type(trains).__name__}: must be SpikeTrains")
     return trains

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.errors import helped
 from taxel._base.messages import counted, warn
 from taxel._core import ProblemError
 from taxel.clock import Clock
@@ -101,10 +102,7 @@ def refuse_numbered(recording: Recorded) -> None:
     ProblemError : pictures without times
     """
     if not recording.timed:
-        raise ProblemError(
-            f"{recording.path}: its pictures have no times; say how many there are a second: --rate-hz HZ, or "
-            "recording.at_rate(HZ)"
-        )
+        raise helped(ProblemError(f"{recording.path}: its pictures have no times"), "rate_hz", "give")
 
 
 def _begun(events: Events, held: NDArray[np.float32] | None) -> Events:

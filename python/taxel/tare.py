@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import instance, shown, whole
 from taxel._base.arguments import text as checked_text
+from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
 from taxel._base.saved import Saved
 from taxel._core import FormatError, ProblemError
@@ -98,7 +99,7 @@ class Tare(Saved):
         given, x = x, recorded(x)
         if isinstance(x, Events | Frames) and not len(x.t):
             what, why = ("event" if isinstance(x, Events) else "picture"), getattr(given, "_why_empty", str)()
-            raise ProblemError(f"tare: there is no {what}{why}")
+            raise refused("tare", f": there is no {what}{why}")
         if isinstance(x, Events | Frames) and window[1] is not None and x.t.min() >= window[1]:
             raise ProblemError(f"tare to {stop_us} us: nothing came before it, but from {x.t.min()} to {x.t.max()} us")
         if isinstance(x, Events):
@@ -141,7 +142,7 @@ class Tare(Saved):
         ProblemError : a tare whose parts contradict each other
         """
         if not isinstance(text, str):
-            raise ProblemError(f"tare is {shown(text)}: must be JSON text")
+            raise refused("tare", f" is {shown(text)}: must be JSON text")
         if other := _OTHER.match(text):
             raise FormatError(
                 f"is a {other[1]}, not a tare: must be a file that Tare.save or taxel live --save-tare wrote"

@@ -1,6 +1,5 @@
 """Addresses of boards on other computers, and what is said where nothing carries them; parcels without a network."""
 
-import json
 import sys
 import time
 
@@ -70,11 +69,8 @@ def test_what_only_a_remote_board_takes_is_refused_without_one(capsys):
 def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path):
     """The same as over a network, with a queue for one."""
     near = Live(0, host="127.0.0.1", record=tmp_path / "near.mcap")
-    copies, feed = near._core.copy(), _core.Feed("zenoh:there:1/left", None)
-    far = _core.Live(
-        "", 0, near.array._parts(), json.dumps(OPTIONS), (tmp_path / "far.mcap", "none", False), None, None, None, None,
-        False, feed,
-    )  # fmt: skip
+    copies, feed = near._core.copy(), _core.Feed("zenoh:there:1/left", 1 << 20)
+    far = _core.Live("{}", tmp_path / "far.mcap", None, feed)
     assert far.place() == "zenoh:there:1/left"
     now = time.time_ns()
     feed.begin_session()
@@ -96,15 +92,3 @@ def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path):
     ours, theirs = (taxel.open(tmp_path / f"{name}.mcap").events for name in ("near", "far"))
     assert ours == theirs
     assert len(ours)
-
-
-OPTIONS = {
-    "name": "board",
-    "sources": [],
-    "registers": "5.2 kHz",
-    "differences": False,
-    "record_later": False,
-    "guard_frames": 5.0,
-    "gap_frames": 1.0,
-    "send": [],
-}

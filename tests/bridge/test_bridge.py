@@ -36,7 +36,7 @@ def test_what_a_board_sends_there_is_recorded_here(tmp_path, place, wire):
             Remote(f"zenoh:{place}/left") as remote,
             Live(remote=remote, record=tmp_path / "far.mcap") as far,
         ):
-            until(lambda: published.counts["block"]["heard"])
+            until(lambda: published.counts["block"]["subscribed"])
             report = emulate("{}:{}".format(*near.address), acts, seed=1, tare_ms=20.0, wire=wire)
             sent = near.stop()
             published.stop()
@@ -119,8 +119,8 @@ def test_pictures_and_detections_of_the_other_computer_are_heard(place):
         for thread in threads:
             thread.join()
         said += iter(lambda: near.next(0.5), None)
-    lines = {(one["label"], one["t_us"], one["known_us"], one["said_ns"]) for one in heard["detections"]}
-    assert lines <= {(one.label, one.t, one.known, one.said_ns) for one in said}
+    lines = {(one["label"], one["t_us"], one["known_us"], one["reported_ns"]) for one in heard["detections"]}
+    assert lines <= {(one.label, one.t, one.known, one.reported_ns) for one in said}
     picture = heard["pictures"][-1]
     assert (picture["rows"], picture["columns"], len(picture["ticks"])) == (64, 64, 4096)
     assert max(picture["ticks"]) > 0
@@ -132,7 +132,7 @@ def test_a_clock_that_is_ahead_and_drifts_is_one_clock_here(tmp_path, place):
     with Live(0, host="127.0.0.1", record=tmp_path / "near.mcap") as near:
         published = Bridge(near, listen=place, clock_ahead_s=AHEAD_S, clock_drift_ppm=DRIFT_PPM)
         with Remote(f"zenoh:{place}") as remote, Live(remote=remote, record=tmp_path / "far.mcap") as far:
-            until(lambda: published.counts["block"]["heard"])
+            until(lambda: published.counts["block"]["subscribed"])
             send([words], *near.address, period_us=2000, seconds=8.0)
             clock = far.counters["bridged"]["clock"]
             sent = near.stop()
@@ -164,13 +164,13 @@ def test_three_processes_lose_nothing_and_a_killed_one_comes_back(tmp_path, plac
         ):
             until(lambda: far.counters["decoded"] > 500)
             bridge.process.kill()
-            until(lambda: not far.counters["bridged"]["heard"])
+            until(lambda: not far.counters["bridged"]["received"])
             before = far.counters["decoded"]
             with command(*skewed) as again:
                 again.says("listening on UDP")
                 until(lambda: far.counters["decoded"] > before + 500)
                 bridged = far.counters["bridged"]
-                assert bridged["heard"]
+                assert bridged["received"]
                 assert bridged["restarts"] == 1
                 assert abs(bridged["clock"]["ahead_ns"] / 1e9 - AHEAD_S) < 0.05
                 printed, _ = again.end()
@@ -219,7 +219,7 @@ def test_what_a_viewer_was_too_slow_for_is_counted_to_the_last_datagram(tmp_path
     with Live(0, host="127.0.0.1") as near:
         published = Bridge(near, listen=place)
         with command("record", "--from", f"zenoh:{place}", "--json", str(tmp_path / "far.mcap")) as recorder:
-            until(lambda: published.counts["block"]["heard"])
+            until(lambda: published.counts["block"]["subscribed"])
             # Stops the recorder for one of three bursts, so that datagrams before and after the loss are recorded.
             for how in (signal.SIGCONT, signal.SIGSTOP, signal.SIGCONT):
                 recorder.process.send_signal(how)

@@ -28,7 +28,7 @@ with Remote(sys.argv[1], timeout=60.0) as remote, Live(remote=remote, record=sys
     before = None
     while True:
         bridged = far.counters["bridged"]
-        now = {name: bridged[name] for name in ("heard", "ended", "restarts")}
+        now = {name: bridged[name] for name in ("received", "ended", "restarts")}
         if now != before:
             say(**now)
         if now["ended"]:
@@ -100,7 +100,7 @@ def all_came(tmp_path, near, far, place):
     with taxel_on(near, "bridge", "--name", "left", "--listen", place, "--record", tmp_path / "near.mcap") as bridge:
         bridge.says("listening on UDP")
         with On(far, "-c", LISTENS, f"zenoh:{place}/left", tmp_path / "far.mcap") as listener:
-            listener.tells(heard=True)
+            listener.tells(received=True)
             with taxel_on(
                 near, "emulate", "--wire", "2", "--preset", "2 kHz", "--seed", "1", "--scenes", "1", "--json"
             ) as board:
@@ -135,17 +135,17 @@ def test_a_cable_that_is_pulled_for_5_s_is_noticed_and_what_was_lost_meanwhile_c
         bridge = begin(taxel_on(near, "bridge", "--name", "left", "--listen", f"{BOARD}:7447", "--json"))
         time.sleep(3.0)
         listener = begin(On(far, "-c", LISTENS, f"zenoh:{BOARD}:7447/left", tmp_path / "far.mcap"))
-        listener.tells(heard=True)
+        listener.tells(received=True)
         board = begin(taxel_on(near, "emulate", "--wire", "2", "--preset", "2 kHz", "--seed", "1"))
         board.says("seed 1")
         time.sleep(3.0)
         pulled = time.monotonic()
         ip("-n", far, "link", "set", "cable", "down")
-        assert listener.tells(heard=False)["at"] - pulled < 2.0
+        assert listener.tells(received=False)["at"] - pulled < 2.0
         time.sleep(5.0)
         ip("-n", far, "link", "set", "cable", "up")
         plugged = time.monotonic()
-        assert listener.tells(heard=True)["at"] - plugged < 30.0
+        assert listener.tells(received=True)["at"] - plugged < 30.0
         time.sleep(2.0)
         board.end()
         time.sleep(0.5)

@@ -138,7 +138,7 @@ def test_taxels_whose_rest_is_not_in_the_tare_are_said(folder: Path, trained: Pa
     known = np.count_nonzero(~np.isnan(taxel.Tare.take(events, stop_us=int(events.t[0]) + 50_000).rest))
     assert code == 0
     assert f"the rest of {heard.sum() - known} of {heard.sum()} taxels is not known" in error
-    assert "--tare FILE" in error
+    assert "give a tare's file" in error
     code, _, error = call(capsys, "detect", folder / "9.npz", "--readout", trained, "--tare", 0.05)
     assert (code, error) == (0, "")
 
@@ -148,7 +148,7 @@ def test_a_tare_that_holds_a_touch_is_said(folder: Path, trained: Path, capsys) 
     code, _, error = call(capsys, *arguments, 0.2)
     assert (code, error.count("\n")) == (0, 1)
     assert re.search(
-        r"warning: --tare 0\.2: the beginning of .*9\.npz is not quiet but holds a touch of \d+ taxels", error
+        r"warning: tare is 0\.2: the beginning of .*9\.npz is not quiet but holds a touch of \d+ taxels", error
     )
     assert call(capsys, *arguments, 0.05)[2] == ""
 
@@ -168,7 +168,7 @@ def test_a_tare_longer_than_half_of_the_recording_is_refused(folder: Path, train
     arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare")
     code, _, error = call(capsys, *arguments, half + 0.001)
     assert (code, error.count("\n")) == (2, 1)
-    assert f"--tare {half + 0.001}: more than half of {folder / '9.npz'}" in error
+    assert f"--tare is {half + 0.001}: more than half of {folder / '9.npz'}" in error
     assert call(capsys, *arguments, half - 0.001)[0] == 0
 
 
@@ -286,7 +286,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
             ("detect", "9.npz", "--readout", "touch.json"),
             "9.npz: the rest of its taxels is not known, as no half second is quiet with nothing on it; give --tare S",
         ),
-        (("detect", "9.npz", "--readout", "touch.json", "--tare", "-1"), "--tare -1: must be seconds above 0"),
+        (("detect", "9.npz", "--readout", "touch.json", "--tare", "-1"), "--tare is -1: must be seconds above 0"),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "none.json"), "none.json: no such file"),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "tare.json", "--frame-us", "0"), "--frame-us is 0"),
         (("detect", "9.npz", "--readout", "touch.json", "--truth", "recipe.toml"), "recipe.toml, line 1"),
@@ -340,7 +340,7 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     code, said, _ = call(capsys, *arguments, "-o", tmp_path / "by_itself.json")
     first = min(row.t for row in taxel.Labels(folder / "truth.csv").rows)
     assert code == 0
-    assert f"tare: what the recording holds from 0 to {first / 1000 - 20:g} ms; --tare gives another" in said
+    assert f"tare: what the recording holds from 0 to {first / 1000 - 20:g} ms; another can be given" in said
     taxel.Tare.take(events, stop_us=first - 20_000).save(tmp_path / "tare.json")
     assert call(capsys, *arguments, "--tare", tmp_path / "tare.json", "-o", tmp_path / "said.json")[0] == 0
     assert taxel.Readout.load(tmp_path / "by_itself.json") == taxel.Readout.load(tmp_path / "said.json")
@@ -348,7 +348,7 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     code, _, error = call(capsys, "train", folder / "9.npz", "--labels", tmp_path / "early.csv", *plan, "-o", "no.json")
     assert (code, error.count("\n")) == (2, 1)
     assert "before its first label" in error
-    assert "--tare SECONDS" in error
+    assert "give --tare SECONDS|FILE" in error
 
 
 @pytest.mark.parametrize("given", [None, "tare.json", "0.05"])
@@ -496,7 +496,7 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
 
 def test_a_report_shows_the_sum_of_each_foot(capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
-    monkeypatch.setattr("taxel.report.listening.picture", lambda figure: drawn.append(figure) or picture(figure))
+    monkeypatch.setattr("taxel.report.detections.picture", lambda figure: drawn.append(figure) or picture(figure))
     file, readout = write_gaitpdb(tmp_path), tmp_path / "gait.json"
     assert call(capsys, "train", file, "--labels", "notes", "--folds", 0, "-o", readout)[0] == 0
     assert call(capsys, "detect", file, "--readout", readout, "--report", tmp_path / "r")[0] == 0
@@ -527,7 +527,7 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
 
 
 def test_weights_are_drawn_by_taxel_where_trains_are_taxels() -> None:
-    from taxel.report.listening import _planes
+    from taxel.report.detections import _planes
 
     array = taxel.Array(3, 4)
     for encoder, count in (

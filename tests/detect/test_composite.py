@@ -147,7 +147,7 @@ def test_one_encoder_has_no_inputs() -> None:
 def test_live_they_detect_what_they_detect_in_the_recording(tmp_path: Path) -> None:
     from live.boards import LOOPBACK, SMALL, play, wait_for
 
-    from taxel.live import Live, heard
+    from taxel.live import Live
 
     events = held(7)
     readout = Readout(Composite(PARTS), neurons(8, tau=0.5, refractory=5.0), array=SMALL, delays_ms=DELAYS)
@@ -161,7 +161,7 @@ def test_live_they_detect_what_they_detect_in_the_recording(tmp_path: Path) -> N
     live.stop()
     recorded = taxel.open(tmp_path / "several.mcap")
     again = run(readout, recorded, tare=REST)
-    found = heard(called)
+    found = taxel.Detections.from_list(called)
     assert len(found) > 20
     assert list(found.label) == list(again.label[: len(found)])
     np.testing.assert_array_equal(found.t, again.t[: len(found)])

@@ -335,7 +335,7 @@ def test_what_a_search_reports_is_in_plain_words() -> None:
     plan = {"ub": 1e-6, "search": [{"ub": 2.0}]}
     searched = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "delay_ms": 1.0}, {"press": plan})
     data = [one._replace(labels={"press": one.labels["press"]}) for one in presses(1, 0, 1)]
-    judge(data, searched, 2, search=True, progress=said.append)
+    judge(data, searched, 2, search=True, progress=lambda step, *_: said.append(step))
     assert "trying parameters 2 of 2 for press, on part 1 of 3" in said
     rounds = [line for line in said if ", round 1: " in line]
     assert rounds

@@ -187,7 +187,7 @@ def test_a_training_that_is_ended_while_its_report_is_drawn_leaves_no_folder(
         raise KeyboardInterrupt
 
     arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
-    monkeypatch.setattr("taxel.report.listening.render", ended)
+    monkeypatch.setattr("taxel.report.detections.render", ended)
     assert call(capsys, *arguments, "--report", tmp_path / "a" / "b")[0] != 0
     assert not (tmp_path / "a").exists()
 
@@ -257,7 +257,12 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     monkeypatch.setattr(training, "follow", lambda *of: followed.append(of[1]) or follow(*of))
     frames, labels = touched((8, 8), 6, gain=200.0, noise=1.0)
     example = Example(frames, labels, Tare.take(frames, stop_us=900_000))
-    judge([example], Recipe.load("touch", None, LABELS, measured_floor([example])), 2, progress=said.append)
+    judge(
+        [example],
+        Recipe.load("touch", None, LABELS, measured_floor([example])),
+        2,
+        progress=lambda step, *_: said.append(step),
+    )
     assert ([one for one in said if one.startswith("encoding")], followed) == (["encoding 1 of 1"] * 2, [])
     # With a floor above every touch area and levels find nothing; two quantities are tried, and followed once.
     floors = {
@@ -267,7 +272,7 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     }
     blind = Recipe.load("touch", floors, LABELS, 3.0)
     said.clear()
-    made = training.trained([example], blind, said.append)
+    made = training.trained([example], blind, lambda step, *_: said.append(step))
     assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 4
     assert sorted(followed) == ["contact", "lift"]
     assert {one.inputs for one in made.readout.neurons.values()} <= {("area",), ("load",), ()}
@@ -277,10 +282,10 @@ def test_a_training_estimates_how_long_it_takes_by_the_folds_that_are_done(monke
     now = [0.0]
     monkeypatch.setattr(progress, "perf_counter", lambda: now[0])
     steps, said = progress.Steps(), []
-    line = progress.lines_to(steps.update)
-    for at, step in ((0, "reading"), (10, "fold 1 of 5"), (15, "learning"), (20, "fold 2 of 5"), (29, "learning")):
+    folds = [(10, "fold 1 of 5", 0, 5), (15, "learning", 0, 0), (20, "fold 2 of 5", 1, 5), (29, "learning", 0, 0)]
+    for at, *step in [(0, "reading", 0, 0), *folds]:
         now[0] = float(at)
-        line(step)
+        steps.update(*step)
         said.append(str(steps))
     # Reading is no part of a fold; the training on all data and the plain rules count as two.
     told = ["fold 2 of 5, after 20 s; about 80 s in all", "learning, after 29 s; about 80 s in all"]
@@ -331,7 +336,7 @@ def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path
     example = Example(grid, {"contact": [100_000, 250_000]}, Tare.take(grid, stop_us=50_000))
     taxel.detect.fit([example], recipe).save(tmp_path / "readout.json")
     said = call(capsys, "detect", tmp_path / "flat.npy", "--readout", tmp_path / "readout.json", "--tare", "0.05")[2]
-    assert "1 x 12 taxels: the readout was trained on 3 x 4; give --array 3x4, or rows and columns in a layout" in said
+    assert "12 taxels: the readout was trained on 3 x 4; give --array ROWSxCOLUMNS[xMM], or rows and columns in" in said
 
 
 def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_path: Path) -> None:
@@ -363,10 +368,10 @@ def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["train", "a.npy", "-o", "r.json"], "names no event in a.npy; give --labels FILE, a table label,t_us"),
+        (["train", "a.npy", "-o", "r.json"], "notes: names no event in a.npy; give --labels FILE"),
         (["info", "a.npy", "--topic", "/a"], "a.npy: no ROS bag; topic, field, types and ros are of one"),
         (["info", "b.npy", "--rate-hz", "-3"], "must be above 0"),
-        (["info", "a.npy", "--array", "0x5"], "--array 0x5: rows is 0: must be a whole number from 1 to 65535"),
+        (["info", "a.npy", "--array", "0x5"], "--array is 0x5: rows is 0: must be a whole number from 1 to 65535"),
         (["info", "labels.csv"], "line 1: a table of labels (docs/command-line.md), no recording"),
     ],
 )  # fmt: skip

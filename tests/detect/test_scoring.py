@@ -114,7 +114,7 @@ def test_the_spread_is_numpys(values: list[float]) -> None:
         ({1: [5]}, 50, "1 is not a label"),
         ({"a": None}, 50, "truth"),
         ([1, 2], 50, "truth has no labels, found has a, b"),
-        ({"a": [1]}, -1, "window_ms is -1: must lie between 0 and 3600000"),
+        ({"a": [1]}, -1, "window_ms is -1: must be from 0 to 3600000"),
         ({"a": [1]}, math.nan, "window_ms is nan"),
         ({"a": [1]}, math.inf, "window_ms is inf"),
         ({"a": [1]}, "wide", "window_ms"),
@@ -136,8 +136,8 @@ def test_a_score_takes_detections_only(found: object) -> None:
 
 def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
     found = some()
-    with_said = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], said=[9, 8, 7])
-    for one in (found, with_said, found[:0]):
+    with_reported = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], reported=[9, 8, 7])
+    for one in (found, with_reported, found[:0]):
         assert taxel.Detections.from_numpy(one.to_numpy()) == one
         path = tmp_path / f"{len(list(tmp_path.iterdir()))}.csv"
         assert one.to_csv(path) == path
@@ -151,8 +151,8 @@ def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
 
 def test_detections_come_back_from_neo() -> None:
     found = some()
-    with_said = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], said=[9, 8, 7])
-    for one in (found, with_said):
+    with_reported = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], reported=[9, 8, 7])
+    for one in (found, with_reported):
         event = one.to_neo()
         assert taxel.Detections.from_neo(event) == one
         assert taxel.Detections.from_neo(event.rescale("ms")).t.tolist() == one.t.tolist()
@@ -215,7 +215,7 @@ def test_detections_are_chosen_by_label_time_and_place() -> None:
         ((None, [], []), "label is .*: must be a list of texts"),
         (("a", [1], [1]), "label is .*: must be a list of texts"),
         ((["a"], [1], [1], ["steep"]), "slope"),
-        ((["a"], [1], [1], [1.0], [1, 2]), "said has 2 entries"),
+        ((["a"], [1], [1], [1.0], [1, 2]), "reported has 2 entries"),
     ],
 )
 def test_nonsense_in_detections_is_one_clear_error(columns: tuple[object, ...], said: str) -> None:

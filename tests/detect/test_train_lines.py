@@ -133,7 +133,7 @@ def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_pa
     [
         (1, (), "of contact there is 1, and two folds need 4"),
         (3, (), "of contact there are 3, and two folds need 4"),
-        (6, ("--folds", 0), "--folds 0"),
+        (6, ("--folds", 0), "folds is 0"),
     ],
 )
 def test_what_cannot_be_held_out_or_is_not_to_be_says_why(
@@ -152,7 +152,7 @@ def test_what_cannot_be_held_out_or_is_not_to_be_says_why(
 def test_one_fold_is_refused(tmp_path: Path, capsys) -> None:
     recording, labels = recorded(tmp_path, 1)
     code, _, error = call(capsys, "train", recording, "--labels", labels, "--folds", 1, "-o", tmp_path / "r.json")
-    assert (code, error) == (2, "taxel: --folds 1: must be 2 or more, or 0 for none\n")
+    assert (code, error) == (2, "taxel: --folds is 1: must be 2 or more, or 0 for none\n")
 
 
 def test_a_recording_without_a_spike_is_refused_in_one_line(tmp_path: Path, capsys) -> None:

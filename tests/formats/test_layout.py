@@ -525,12 +525,15 @@ def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: 
     np.save(palm, VALUES)
     assert OpenOptions(rate_hz=100.0, array=["2x3"]).one(palm).array.shape == (2, 3)
     refused = CliRunner().invoke(app, ["info", str(palm)])
-    assert ", or --rate-hz HZ, says what it is" in str(refused.exception)
+    assert ", or rate_hz, says what it is" in str(refused.exception)
 
 
 @pytest.mark.parametrize(
     ("encoder", "end"),
-    [("fa1", "; give --set period_ms=10"), ("level_crossing", "levels is missing; give --set levels=...")],
+    [
+        ("fa1", "10 ms after the last: must come every 1 ms; give --set period_ms=VALUE"),
+        ("level_crossing", "--set levels is missing"),
+    ],
 )
 def test_an_error_of_an_encoder_names_the_option_that_sets_the_value(tmp_path: Path, encoder: str, end: str) -> None:
     np.save(tmp_path / "palm.npy", VALUES.reshape(3, 2, 3))

@@ -342,13 +342,13 @@ def test_a_bag_without_definitions_names_both_options_and_opens_by_them(tmp_path
     bag = without_definitions(bags.write(tmp_path / "grasp.db3", palms()))
     (listed,) = ros.topics(bag)
     assert (listed.messages, listed.trouble) == (6, f"no definition of {PALM}")
-    said = rf"no definition of {PALM} \(topic /palm\); give it by --types DIR .* or by --ros NAME .*humble"
+    said = rf"no definition of {PALM} \(topic /palm\); a folder of .* release of ROS, one of .*humble.*; give types"
     with pytest.raises(FormatError, match=said):
         taxel.open(bag, topic="/palm")
     (tmp_path / "skins_msgs" / "msg").mkdir(parents=True)
     own = tmp_path / "skins_msgs" / "msg" / "Palm.msg"
     own.write_text(bags.DEFINITIONS[PALM])
-    with pytest.raises(FormatError, match=r"no definition of std_msgs/msg/Header .*--ros NAME"):
+    with pytest.raises(FormatError, match=r"no definition of std_msgs/msg/Header .*release of ROS"):
         taxel.open(bag, topic="/palm", types=tmp_path / "skins_msgs")
     flat = tmp_path / "flat"
     flat.mkdir()
@@ -377,9 +377,9 @@ def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("given", "error", "said"),
     [
-        ({}, FormatError, "say what to open of it: --topic NAME .*; taxel info .*grasp.* lists its topics"),
+        ({}, FormatError, "is opened; taxel info .*grasp.* lists its topics; give topic"),
         ({"topic": "/foot"}, FormatError, "has no topic /foot; its topics are /hand, /palm"),
-        ({"topic": "/hand"}, FormatError, "topic /hand: say which field .*; there are thumb, index"),
+        ({"topic": "/hand"}, FormatError, "topic /hand: has several fields with numbers, thumb, index.*; give field"),
         ({"topic": "/palm", "field": "thumb"}, FormatError, "field thumb: no field with numbers; there are taxels"),
         ({"topic": "/hand", "field": "note"}, FormatError, "field note: no field with numbers"),
         ({"topic": "/palm", "field": "taxels.3"}, FormatError, r"field taxels\.3: no field with numbers"),
@@ -471,7 +471,7 @@ def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:
     opened = taxel.open_all(tmp_path, topic="/palm", array=PALM_ARRAY)
     assert [one.name for one in opened] == ["gra0.bag", "gra1.db3", "gra2.mcap", "gra3"]
     assert [len(one.notes) for one in opened] == [0, 1, 0, 0]
-    with pytest.raises(FormatError, match=r"gra2\.mcap: a ROS bag; say what to open"):
+    with pytest.raises(FormatError, match=r"gra2\.mcap: a ROS bag, of which a topic"):
         taxel.open_all(tmp_path)
 
 

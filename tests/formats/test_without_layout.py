@@ -21,7 +21,7 @@ def layout_said_of(place: Path) -> str:
         taxel.open(place)
     said, _, lines = str(caught.value).partition("\n")
     name = f"{place.name.removesuffix('.gz').rpartition('.')[0]}.layout.toml"
-    assert f", not written by taxel; a layout file beside it, {name}, or one given by --layout, says " in said
+    assert f", not written by taxel; a layout file beside it, {name}, or one given as layout, " in said
     assert said.endswith(" (docs/files.md):")
     return lines
 

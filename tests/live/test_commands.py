@@ -183,7 +183,7 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, difference
         lines += [json.loads(line) for line in process.stdout]
     assert process.returncode == 0
     keys = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired"}
-    assert [set(line) for line in lines] == [keys | {"said_us", "said_ns"}] * 5
+    assert [set(line) for line in lines] == [keys | {"reported_us", "reported_ns"}] * 5
     heard_again = ("detect", tmp_path / "live.mcap", "--readout", tmp_path / "touch.json", "--json")
     detected = json.loads(run(*heard_again).stdout)["detections"]
     assert detected == [{key: line[key] for key in keys} for line in lines], "one schema"

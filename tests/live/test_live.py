@@ -15,7 +15,7 @@ import taxel
 from taxel import Array, Detection, DeviceError, Events, Neuron, ProblemError, Readout, Tare, wire
 from taxel.detect import PlainRule
 from taxel.encode import ContactArea
-from taxel.live import Live, heard, send
+from taxel.live import Live, send
 
 from .boards import (
     LOOPBACK,
@@ -77,13 +77,13 @@ def test_detections_come_live_and_are_those_of_the_recording(tmp_path: Path) -> 
     recorded = taxel.open(tmp_path / "said.mcap")
     again = taxel.detect.run(touch(), recorded)
     assert len(again) == 6
-    for found in (heard(called), recorded.detections):
+    for found in (taxel.Detections.from_list(called), recorded.detections):
         assert list(found.label) == ["touch"] * len(found)
         assert len(found) >= 5
         np.testing.assert_array_equal(found.t, again.t[: len(found)])
         np.testing.assert_array_equal(found.known, again.known[: len(found)])
     assert iterated == called[:5]
-    assert heard(called).said is not None
+    assert taxel.Detections.from_list(called).reported is not None
 
 
 @pytest.mark.parametrize("tared", [False, True])
@@ -110,7 +110,7 @@ def test_a_board_that_lags_its_own_clock_gives_the_detections_of_its_recording(
     if tared:
         np.testing.assert_array_equal(taken.rest, Tare.take(recorded.events, start_us=0, stop_us=50_000).rest)
     again = taxel.detect.run(readout, recorded, **({"tare": taken} if tared else {}))
-    found = {(one.label, one.t, one.known) for one in heard(recorded.detections)}
+    found = {(one.label, one.t, one.known) for one in taxel.Detections.from_list(recorded.detections)}
     assert len(again) >= 10
     assert {(one.label, one.t, one.known) for one in again} <= found
     assert counters["late"] == 0

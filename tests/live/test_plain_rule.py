@@ -11,7 +11,7 @@ from shell import call
 import taxel
 from taxel import Events, Frames, Tare
 from taxel.detect import PlainRule, run
-from taxel.live import Live, heard
+from taxel.live import Live
 
 from .boards import LOOPBACK, SMALL, play, wait_for
 
@@ -54,7 +54,7 @@ def test_a_rule_detects_live_what_it_detects_in_the_recording(rule: PlainRule, t
     assert recorded.registers is not None
     assert again == run(rule, events, frame_us=recorded.registers.frame_us, tare=TARE)
     assert len(again) == 6 * (2 if rule.age_ms is None else 1)
-    for found in (heard(called), recorded.detections):
+    for found in (taxel.Detections.from_list(called), recorded.detections):
         # Nothing moved the time on after the last event.
         assert len(found) >= len(again) - 2
         assert list(found.label) == list(again.label[: len(found)])
@@ -70,7 +70,7 @@ def test_in_a_fresh_tare_nothing_is_detected_live_or_from_the_recording(tmp_path
         play(events, live.address[1])
         wait_for(live, len(np.unique(events.t)))
     live.stop()
-    detections = heard(taxel.open(tmp_path / "rule.mcap").detections)
+    detections = taxel.Detections.from_list(taxel.open(tmp_path / "rule.mcap").detections)
     asked = ("detect", tmp_path / "rule.mcap", "--readout", tmp_path / "rule.json", "--tare", 0.05, "--json")
     again = [one["t_us"] for one in json.loads(call(capsys, *asked)[1])["detections"]]
     assert len(again) == 8, "two of six touches lie in the tare"

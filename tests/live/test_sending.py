@@ -20,7 +20,7 @@ from taxel.live import Live
 from .boards import LOOPBACK, SMALL, command, play, presses, touch, wait_for
 
 LONG_BEFORE_ANY = {"guard_frames": 1e6}
-KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "said_us", "said_ns"}
+KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "reported_us", "reported_ns"}
 
 
 @pytest.mark.parametrize(

@@ -253,10 +253,10 @@ def test_foxglove_hears_a_board_with_what_is_detected(tmp_path: Path) -> None:
         wait_for(live, play(presses(8), live.address[1], pace=0.002))
         page.listen(lambda: len(page.heard.get("/detections", [])) == live.counters["detections"] > 0, quiet=False)
     rows = [row for _, row in page.heard["/detections"]]
-    assert [(row["label"], row["t_us"], row["known_us"], row["said_us"]) for row in rows] == [
-        (s.label, s.t, s.known, s.said) for s in said
+    assert [(row["label"], row["t_us"], row["known_us"], row["reported_us"]) for row in rows] == [
+        (s.label, s.t, s.known, s.reported) for s in said
     ]
-    assert [row["latency_us"] for row in rows] == [s.said - s.known for s in said]
+    assert [row["latency_us"] for row in rows] == [s.reported - s.known for s in said]
     assert [row["slope"] for row in rows] == pytest.approx([s.slope for s in said], rel=1e-6)
 
 
@@ -416,8 +416,8 @@ def test_what_no_viewer_is_is_refused(to: Any) -> None:
 def test_nonsense_is_refused_by_name(tmp_path: Path) -> None:
     taxel.convert(presses(1), tmp_path / "one.mcap")
     for name, value, said in (
-        ("speed", 0.0, "must lie in 0.001 to 100"),
-        ("rate_hz", 61.0, "must lie in 1 to 60"),
+        ("speed", 0.0, "must be from 0.001 to 100"),
+        ("rate_hz", 61.0, "must be from 1 to 60"),
         ("encoder", "fa1", "encoder is 'fa1'"),
     ):
         with pytest.raises(ProblemError, match=said):

@@ -63,7 +63,7 @@ def test_what_is_iterated_is_what_the_columns_hold(seed: int, n: int, other: boo
         assert (one.label, one.t, one.known, one.slope) == tuple(
             getattr(detections, name)[k] for name in ("label", "t", "known", "slope")
         )
-        assert one.said == (one.t + 9 if other else None)
+        assert one.reported == (one.t + 9 if other else None)
     assert (len(list(events)), len(list(detections))) == (n, n)
     for noun in (events, detections):
         for outside in (n, -n - 1, 10**30):

@@ -83,6 +83,7 @@ def test_options_that_the_advice_names_are_given_in_a_shell(chromium: Any, recor
     labelled(recording)
     text = "held out: contact, neuron: 3 of 5\nmore labels help most, else --search (about 60 s) or --recipe gait_plate"
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": text}
+    trained |= {"next": "taxel detect RECORDING", "options": ["--search", "--recipe"]}
     detections = {"train": [trained, {"type": "done"}], "read_out": [{"type": "done"}]}
     with answered(chromium, recording, detections) as page:
         shows(page, "train-shell", r"^The same in a shell: taxel train")
@@ -100,6 +101,7 @@ def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, ch
     table.write_text("label,t_us\n" + "".join(f"contact,{200_000 * k}\n" for k in range(1, count + 1)))
     printed = "\n".join(f"held out: contact, neuron: {k} of 5 found, 0 missed, 0 false" for k in range(30))
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": printed}
+    trained |= {"next": "taxel detect RECORDING", "options": []}
     found = [{"label": "contact", "t_us": 10**5 * k, "known_us": 10**5 * k} for k in range(40)]
     detected = {"type": "detections", "source": recording.name, "readout": "walk.readout.json", "labels": ["contact"]}
     answers = {"train": [trained, {"type": "done"}], "read_out": [{**detected, "detections": found}, {"type": "done"}]}
@@ -128,22 +130,24 @@ for done in range(2):
     time.sleep(0.6)
 while not pathlib.Path({str(end)!r}).exists():
     time.sleep(0.02)
-print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": {{"warnings": ["3 are alone"]}}}}))
+result = {{"warnings": ["3 are alone"], "options": ["--search"]}}
+print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": result}}))
 """
     )
     command.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(command))
     handler = TrainingRequests(Opening(), ShownFiles())
     assert handler.progress() == ""
-    printed: list[str] = []
+    printed: list[tuple[str, str, list[str]]] = []
     training = threading.Thread(target=lambda: printed.append(handler.train(tmp_path / "a.npz", tmp_path / "a.json")))
     training.start()
     until(lambda: re.fullmatch(r"fold 2 of 5, after \d+ s; about \d+ s in all", handler.progress()), "its estimate")
     end.touch()
     training.join()
-    [*lines, last] = printed[0].splitlines()
-    assert (lines[0], last) == ("held out: all found", "warning: 3 are alone")
-    assert lines[2].startswith("written to a.json; next: taxel detect RECORDING --readout ")
+    [(text, following, options)] = printed
+    assert text.splitlines() == ["held out: all found", "warning: 3 are alone"]
+    assert following.startswith("taxel detect RECORDING --readout ")
+    assert options == ["--search"]
     assert handler.progress() == ""
 
 
@@ -278,7 +282,7 @@ def test_what_lay_there_while_the_rest_was_taken_is_said_above_the_maps(chromium
     values[:300, 2:5, 4:7] += 200
     values[400:460, 1:4, 1:4] += 500
     frames = Frames(np.round(values), np.arange(600) * 10_000, unit="counts", array=Array(8, 8))
-    where = of_pictures(frames).on
+    where = of_pictures(frames).preload_at
     assert where.startswith("rows 2 to 4, columns 4 to 6")
     taxel.convert(frames, tmp_path / "mat.npz")
     with shown(chromium, tmp_path / "mat.npz") as page:
@@ -343,10 +347,10 @@ def test_what_lay_there_is_said_of_events_in_the_same_words(
     taxel.convert(events, tmp_path / "mat.mcap")
     read = readings(taxel.open(tmp_path / "mat.mcap"))
     assert read is not None
-    assert bool(read[1].on) is bool(load)
+    assert bool(read[1].preload_at) is bool(load)
     with shown(chromium, tmp_path / "mat.mcap") as page:
         if load:
             shows(page, "silence", r"^In the quiet stretch that the rest is taken from, something lay on ")
-            assert page.locator("#silence").inner_text().endswith(f"something lay on {read[1].on}.")
+            assert page.locator("#silence").inner_text().endswith(f"something lay on {read[1].preload_at}.")
         else:
             assert page.locator("#silence").is_hidden()

@@ -157,7 +157,7 @@ def test_health_of_what_is_shown_is_that_of_taxel_health(live, panel):
         health = next(m for m in page.said if m["type"] == "health")
         assert (health["dead"], health["stuck"], health["noisy"]) == ([[2, 2]], [], [])
         # Of the others, those that moved work.
-        assert health["untold"] == 64 * 64 - 25
+        assert health["untested"] == 64 * 64 - 25
 
 
 def test_a_dead_taxel_of_a_board_of_version_2_is_found_though_states_tell_of_it(live, panel):

@@ -95,7 +95,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ((), "nothing to calibrate by: give --load, --loads, --table or --law"),
+        ((), "there is no law and no table to calibrate by; give --loads"),
         (("--load", "0"), "load 1 is 0: must be above 0"),
         (("--load", "3", "--from", "7", "--to", "9"), "--load: nothing was recorded from 7.0 to 9.0 s"),
         (("--load", "3", "--from", "99"), "--load: nothing was recorded from 99.0 s on"),
@@ -106,7 +106,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
         (("--law",), "--law: turns ticks of a board into N;"),
         (("--from", "1"), "--from and --to are the time of --load: give --load"),
         (("--loads", "loads.csv"), "loads.csv, line 2: unit is 'kg'; must be N or kPa"),
-        (("--set", "exponent=9", "--load", "3"), "--set: values of the law; give --law with it"),
+        (("--set", "exponent=9", "--load", "3"), "sensor holds values of the law; give --law"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path: Path, options: tuple[str, ...], said: str) -> None:

@@ -109,7 +109,10 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
         (("convert", "WALK", "WALK"), "exists already"),
         (("convert", "WALK", "a.npz", "--array", "6x6"), "holds its own sensor, Array("),
         (("info", "WALK", "--array", "6x6"), "holds its own sensor, Array("),
-        (("info", "WALK", "--array", "6 by 6"), "--array 6 by 6: must be rows x columns, as 64x64, or with the pitch"),
+        (
+            ("info", "WALK", "--array", "6 by 6"),
+            "--array is 6 by 6: must be rows x columns, as 64x64, or with the pitch",
+        ),
         (("convert", "WALK", "nowhere/a.csv"), "nowhere: no such folder"),
         (("convert", "WALK", "a.mcap", "--compression", "gzip"), "compression is 'gzip'"),
         (("convert", "WALK", "a.csv", "--frames", "-3"), "frames_hz is -3"),

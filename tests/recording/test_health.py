@@ -78,8 +78,8 @@ def test_nothing_is_named_on_boards_joined_in_mid_stream(seed: int) -> None:
         sensor.touch(y, x, sensor.random.uniform(1, 3))
     found = taxel.health(sensor.events(since=300_000))
     assert found.named() == NOTHING
-    assert found.untold.any()
-    assert not (found.untold & (found.activity > 10)).any()
+    assert found.untested.any()
+    assert not (found.untested & (found.activity > 10)).any()
     assert taxel.health(sensor.events()).named() == NOTHING
 
 
@@ -112,7 +112,7 @@ def test_a_taxel_that_was_touched_twice_is_not_enough_to_say() -> None:
     for touches, named in ((1, []), (2, []), (3, [(x, y)])):
         sensor.touch(y, x)
         found = taxel.health(sensor.events())
-        assert (found.named()["dead"], bool(found.untold[y, x])) == (named, touches < 3)
+        assert (found.named()["dead"], bool(found.untested[y, x])) == (named, touches < 3)
     assert "not touched enough to say" in repr(found)
 
 
@@ -142,7 +142,7 @@ def touched(**bad: tuple[int, int]) -> Sensor:
 
 def test_a_sound_array_has_no_bad_taxel() -> None:
     found = taxel.health(touched().events())
-    assert (found.named(), bool(found.untold.any())) == (NOTHING, False)
+    assert (found.named(), bool(found.untested.any())) == (NOTHING, False)
     assert repr(found) == "Health(100 taxels: 0 dead, 0 stuck, 0 noisy)"
 
 
@@ -363,4 +363,4 @@ def test_a_missing_cell_of_pictures_was_not_pressed() -> None:
     values = np.concatenate([touch] * 2)
     values[:, 1, 1] = np.nan
     found = taxel.health(taxel.Frames(values, np.arange(10) * 100_000, unit="N"))
-    assert found.untold.tolist() == [[False] * 3, [False, True, False], [False] * 3]
+    assert found.untested.tolist() == [[False] * 3, [False, True, False], [False] * 3]

@@ -262,7 +262,7 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
     taxel.convert(both, tmp_path / "a.mcap")
     code, _, errors = call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")
     assert code == 0
-    assert re.search(r"warning: --tare 0\.5: the beginning of .*a\.mcap right is not quiet but holds", errors)
+    assert re.search(r"warning: tare is 0\.5: the beginning of .*a\.mcap right is not quiet but holds", errors)
 
 
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
@@ -306,7 +306,7 @@ def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest
     assert "that its pictures have no times" in taxel.convert(opened[0], tmp_path / "one.csv")
     one = taxel.open(tmp_path / "one.mcap")
     assert decoded(tmp_path / "one.mcap")[0][1]["clock"] == "false"
-    with pytest.raises(ProblemError, match="its pictures have no times; say how many there are a second: --rate-hz"):
+    with pytest.raises(ProblemError, match="its pictures have no times; give rate_hz"):
         LevelCrossing([100.0]).encode(one)
     with pytest.raises(ProblemError, match="have no rate"):
         one.frames(50)

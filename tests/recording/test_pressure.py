@@ -199,15 +199,15 @@ def test_silence_is_read_at_few_times_and_shows_the_same(monkeypatch: pytest.Mon
     all_of_them = series(recording)
     assert few is not None
     assert all_of_them is not None
-    assert (few.rest.source, few.rest.quiet_us, few.rest.on) == (
+    assert (few.rest.source, few.rest.quiet_us, few.rest.preload_at) == (
         all_of_them.rest.source,
         all_of_them.rest.quiet_us,
-        all_of_them.rest.on,
+        all_of_them.rest.preload_at,
     )
     for name in ("t", "area", "peak", "total", "centre"):
         np.testing.assert_allclose(getattr(few, name), getattr(all_of_them, name), rtol=1e-3, atol=1e-2)
     np.testing.assert_allclose(few.rest.values, all_of_them.rest.values, atol=1e-3)
-    lay, same = (np.array([] if one.rest.lay is None else one.rest.lay) for one in (few, all_of_them))
+    lay, same = (np.array([] if one.rest.preload is None else one.rest.preload) for one in (few, all_of_them))
     np.testing.assert_allclose(lay, same, atol=1e-3)
 
 

@@ -115,7 +115,9 @@ def test_what_is_never_quiet_has_no_rest_and_the_page_says_so(tmp_path: Path) ->
     assert "--tare" in refused.stderr
 
 
-def lain(*, until_s: float = 0.8, events: bool = False) -> tuple[taxel.Events | taxel.Frames, dict[str, list[int]]]:
+def preloaded(
+    *, until_s: float = 0.8, events: bool = False
+) -> tuple[taxel.Events | taxel.Frames, dict[str, list[int]]]:
     """A hand that lies on rows 2 to 4, columns 5 to 7 from the beginning, then presses of 0.3 s elsewhere, labelled."""
     rng, hz = np.random.default_rng(3), 200
     values = 50 + rng.integers(-1, 2, (8 * hz, 8, 10)).astype(np.float32)
@@ -141,7 +143,7 @@ def lain(*, until_s: float = 0.8, events: bool = False) -> tuple[taxel.Events | 
 def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_training(
     tmp_path: Path, events: bool
 ) -> None:
-    source, truth = lain(events=events)
+    source, truth = preloaded(events=events)
     path, where = tmp_path / "a.npz", "something lay on rows 2 to 4, columns 5 to 7 (up to 4"
     taxel.convert(source, path)
     rows = sorted((t, label) for label, times in truth.items() for t in times)
@@ -152,7 +154,7 @@ def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_
     assert "so the tare is of a time without it" in trained.stderr
     assert "tare: what the recording holds from 800 to 19" in trained.stdout.replace("from 810", "from 800")
     # Until the first label: then the tare is of a later quiet stretch.
-    source, _ = lain(until_s=2, events=events)
+    source, _ = preloaded(until_s=2, events=events)
     taxel.convert(source, path, overwrite=True)
     trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
     assert "so the tare is of a time without it" in trained.stderr
@@ -162,7 +164,7 @@ def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_
 
 @pytest.mark.parametrize("drift", [0.0, 30.0])
 def test_where_nothing_lay_or_the_whole_array_drifts_nothing_is_said(tmp_path: Path, drift: float) -> None:
-    frames, _ = lain(until_s=0)
+    frames, _ = preloaded(until_s=0)
     assert isinstance(frames, taxel.Frames)
     falling = np.linspace(drift, 0, len(frames))[:, None, None].astype(np.float32)
     taxel.convert(taxel.Frames(frames.values + falling, frames.t, unit="ticks", array=frames.array), tmp_path / "a.npz")

@@ -75,7 +75,7 @@ SOUND: dict[str, Sound] = {
     ),
     "taxel.live.Live.expect_version": plain(on_live("expect_version"), version=2),
     "taxel.live.Live.next": fresh(ended, "next", timeout=1.0),
-    "taxel.live.Live.note": plain(on_live("note", record="live.mcap", overwrite=True), said="a note"),
+    "taxel.live.Live.note": plain(on_live("note", record="live.mcap", overwrite=True), message="a note"),
     "taxel.live.Live.record": plain(
         on_live("record", record_later=True), path="live.mcap", compression="none", overwrite=True
     ),
@@ -105,7 +105,6 @@ SOUND: dict[str, Sound] = {
         seconds=0.001,
         segment=False,
     ),
-    "taxel.live.heard": plain(taxel.live.heard, said=[taxel.Detection("a", 5, 6)]),
 }
 
 #: For each type that only taxel constructs, a call that returns an instance.

@@ -77,8 +77,11 @@ SOUND: dict[str, Sound] = {
     "taxel.SpikeTrains.from_neo": plain(taxel.SpikeTrains.from_neo, trains=TRAINS.to_neo()),
     "taxel.SpikeTrains.save": method(TRAINS, "save", path="trains.npz", overwrite=True),
     "taxel.SpikeTrains.load": plain(taxel.SpikeTrains.load, path="here.npz"),
-    "taxel.Detections": plain(taxel.Detections, label=["a"], t=[1], known=[2], slope=[0.5], said=[3], repaired=[True]),
+    "taxel.Detections": plain(
+        taxel.Detections, label=["a"], t=[1], known=[2], slope=[0.5], reported=[3], repaired=[True]
+    ),
     "taxel.Detections.between": method(FOUND, "between", start=0, stop=15),
+    "taxel.Detections.from_list": plain(taxel.Detections.from_list, detections=[taxel.Detection("a", 5, 6)]),
     "taxel.Detections.from_numpy": plain(taxel.Detections.from_numpy, records=FOUND.to_numpy()),
     "taxel.Detections.from_neo": plain(taxel.Detections.from_neo, events=FOUND.to_neo()),
     "taxel.Detections.to_csv": method(FOUND, "to_csv", path="found.csv", overwrite=True),

@@ -26,8 +26,8 @@ pub(crate) fn open(listen: &[String], connect: &[String]) -> PyResult<Session> {
 
 /// The first line of an error, without the source file that its library names.
 pub(crate) fn first_line(error: &zenoh::Error) -> String {
-    let said = error.to_string();
-    let line = said.lines().next().unwrap_or_default();
+    let text = error.to_string();
+    let line = text.lines().next().unwrap_or_default();
     line.split(" at /").next().unwrap_or(line).to_owned()
 }
 
@@ -50,13 +50,13 @@ fn config(listen: &[String], connect: &[String]) -> PyResult<String> {
 
 /// Formats endpoints in Zenoh's syntax.
 fn places(places: &[String]) -> PyResult<String> {
-    let mut said = vec![];
+    let mut quoted = vec![];
     for place in places {
         // Characters that could end the surrounding JSON text are refused.
         if !place.chars().all(|c| c.is_ascii_alphanumeric() || "-_.:[]%".contains(c)) || !place.contains(':') {
             return Err(PyValueError::new_err(format!("{place:?}: must be HOST:PORT")));
         }
-        said.push(format!("\"tcp/{place}\""));
+        quoted.push(format!("\"tcp/{place}\""));
     }
-    Ok(said.join(", "))
+    Ok(quoted.join(", "))
 }

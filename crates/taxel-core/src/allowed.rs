@@ -134,9 +134,9 @@ impl Parameter {
                 let near = if range.spans(value) { format!(", {LEAST:e} at least") } else { String::new() };
                 let value = written(value);
                 outcome = Err(match unit.strip_prefix('1') {
-                    Some(per) => problem!("{name}{place} is {value}{per}: must be {range}{near}"),
-                    None if unit.is_empty() => problem!("{name}{place} is {value}: must be {range}{near}"),
-                    None => problem!("{name}{place} is {value} {unit}: must be {range}{near}"),
+                    Some(per) => problem!(name; "{place} is {value}{per}: must be {range}{near}"),
+                    None if unit.is_empty() => problem!(name; "{place} is {value}: must be {range}{near}"),
+                    None => problem!(name; "{place} is {value} {unit}: must be {range}{near}"),
                 });
             }
         });
@@ -231,7 +231,7 @@ pub fn is_weight(weight: f64) -> bool {
 /// `Problem`, naming the weight.
 pub fn one_weight_a_train(weights: &[f64], trains: usize) -> Result<()> {
     if weights.len() != trains {
-        return Err(problem!("weights: {} for {trains} trains, must be one a train", weights.len()));
+        return Err(problem!("weights"; ": {} for {trains} trains, must be one a train", weights.len()));
     }
     weights.iter().position(|&w| !is_weight(w)).map_or(Ok(()), |n| Err(no_weight(&format!("weights[{n}]"), weights[n])))
 }

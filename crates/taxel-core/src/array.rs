@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::above_0;
-use crate::{Result, problem};
+use crate::{Hint, Result, problem};
 
 /// The geometry of a sensor: rows, columns, which taxels exist, and how far apart or where they are, if that is known.
 ///
@@ -145,7 +145,7 @@ impl Array {
         let of_each = |name: &str, entries: usize| {
             (entries == self.len())
                 .then_some(())
-                .ok_or_else(|| problem!("{name} has {entries} entries for {rows} x {columns} taxels"))
+                .ok_or_else(|| problem!(name; " has {entries} entries for {rows} x {columns} taxels"))
         };
         if let Some(exists) = &self.exists {
             of_each("exists", exists.len())?;
@@ -233,7 +233,7 @@ impl Array {
     pub fn pitch(&self, what: &str) -> Result<Pitch> {
         let name = &self.name;
         self.pitch_mm.ok_or_else(|| match self.places {
-            None => problem!("{what} needs mm, and the pitch of {name} is not known: give its pitch_mm"),
+            None => problem!("{what} needs mm, and the pitch of {name} is not known").helped_by("array", Hint::Pitch),
             Some(_) => problem!("{what} needs one pitch, and {name} has a place for each taxel"),
         })
     }
@@ -268,7 +268,8 @@ impl Array {
             self.name,
             self.rows,
             self.columns
-        ))
+        )
+        .helped_by("array", Hint::LayOut))
     }
 }
 

@@ -197,13 +197,13 @@ impl Board {
     /// board compares with the last sample.
     pub fn asynchronous(mut self) -> Result<Self> {
         if self.written.wire_version != 2 {
-            return Err(problem!("asynchronous: wire_version is 1: must be 2, for stamps of 1 us"));
+            return Err(problem!("asynchronous"; ": wire_version is 1: must be 2, for stamps of 1 us"));
         }
         if self.written.mechanoreceptor {
-            return Err(problem!("asynchronous: mechanoreceptor is set: must not be, afferents are scanned"));
+            return Err(problem!("asynchronous"; ": mechanoreceptor is set: must not be, afferents are scanned"));
         }
         if self.previous == Previous::LastSample {
-            return Err(problem!("asynchronous: previous is last_sample: must be last_sent"));
+            return Err(problem!("asynchronous"; ": previous is last_sample: must be last_sent"));
         }
         self.asynchronous = Some(Asynchronous::default());
         self.link.reset(self.settings(), &self.array)?;

@@ -45,7 +45,7 @@ pub use trajectory::Track;
 
 /// The pitch of an array that a scene is played on, mm.
 fn pitch_of(array: &Array) -> Result<f64> {
-    array.square_pitch("a scene").map_err(|error| Error::Scene(error.to_string()))
+    array.square_pitch("a scene").map_err(scene)
 }
 
 /// Checks that a value of a scene is within its range; `place` names its owner in the error.
@@ -55,8 +55,10 @@ fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range
 
 /// The outcome of a check as that of a scene; `place` names its owner in the error.
 fn of_scene(place: &str, outcome: Result<()>) -> Result<()> {
-    outcome.map_err(|error| match error {
-        Error::Problem(text) => Error::Scene(format!("{place}: {text}")),
-        other => other,
-    })
+    outcome.map_err(|error| scene(error).of(place))
+}
+
+/// The same error as one of the scene.
+fn scene(error: Error) -> Error {
+    if let Error::Problem(reason) = error { Error::Scene(reason) } else { error }
 }

@@ -40,7 +40,7 @@ use stream::{spikes_of_events, spikes_of_frames};
 use crate::parameters::Described;
 use crate::reading::{self, Unfit};
 use crate::spikes::ms;
-use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeKind, SpikeTrains, Stop, problem};
+use crate::{Array, EventsView, FramesView, Result, Spike, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The registry: one line per encoder, `NAME: Kind`; the encoder's file is `encode/NAME.rs`, and its name in JSON is
 /// `NAME`.
@@ -123,8 +123,7 @@ impl Encoder {
     ///
     /// `Problem`, naming the parameter.
     pub fn from_json(json: &str) -> Result<Self> {
-        let mut given: Map<String, Value> =
-            reading::from_text(json).map_err(|unfit| Error::Problem(unfit.of("encoder")))?;
+        let mut given: Map<String, Value> = reading::from_text(json).map_err(|unfit| unfit.problem("encoder"))?;
         let names = NAMES.join(", ");
         let name = match given.remove("name") {
             Some(Value::String(name)) => name,
@@ -139,7 +138,7 @@ impl Encoder {
         }
         let encoder = Self::read(&name, given.into())
             .ok_or_else(|| problem!("encoder {name}: must be one of {names}"))?
-            .map_err(|unfit| Error::Problem(unfit.of(&format!("encoder {name}"))))?;
+            .map_err(|unfit| unfit.problem(&format!("encoder {name}")))?;
         encoder.check()?;
         Ok(encoder)
     }
@@ -253,13 +252,13 @@ impl Composite {
         for (n, name) in names.iter().enumerate() {
             if !self.parts.contains_key(name) {
                 let known: Vec<&str> = self.parts.keys().map(String::as_str).collect();
-                return Err(problem!("inputs: no encoder {name:?}: there are {}", known.join(", ")));
+                return Err(problem!("inputs"; ": no encoder {name:?}: there are {}", known.join(", ")));
             }
             if names[..n].contains(name) {
-                return Err(problem!("inputs: {name:?} comes twice"));
+                return Err(problem!("inputs"; ": {name:?} comes twice"));
             }
         }
-        let chosen = |name: &str| names.is_empty() || names.iter().any(|one| one == name);
+        let chosen = |name: &str| names.is_empty() || names.iter().any(|given| given == name);
         Ok(self.parts.iter().map(|(name, part)| (name.as_str(), part)).filter(|(name, _)| chosen(name)).collect())
     }
 
@@ -270,7 +269,7 @@ impl Composite {
     /// As [`Composite::named`].
     pub fn of_parts(&self, names: &[String], array: &Array) -> Result<Vec<bool>> {
         let named = self.named(names)?;
-        let chosen = |name: &str| named.iter().any(|(one, _)| *one == name);
+        let chosen = |name: &str| named.iter().any(|(given, _)| *given == name);
         let parts = self.parts.iter();
         Ok(parts.flat_map(|(name, part)| std::iter::repeat_n(chosen(name), inputs(part, array))).collect())
     }

@@ -1,5 +1,9 @@
 //! The error type of the crate, and the flag by which a caller stops a long call.
 
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
 /// An error, in kinds that a caller can distinguish.
 ///
 /// Each text is one line: the place, the value there, and what is valid.
@@ -7,27 +11,142 @@
 pub enum Error {
     /// Bytes or files with invalid content.
     #[error("{0}")]
-    Format(String),
+    Format(Reason),
     /// Arguments, spike trains or a learning problem that are not valid.
-    #[error("{}", readable(.0))]
-    Problem(String),
+    #[error("{0}")]
+    Problem(Reason),
     /// An error of the board, its registers or its commands.
-    #[error("{}", readable(.0))]
-    Device(String),
+    #[error("{0}")]
+    Device(Reason),
     /// A simulated scene that cannot be played.
-    #[error("{}", readable(.0))]
-    Scene(String),
+    #[error("{0}")]
+    Scene(Reason),
     /// The caller asked to stop (Ctrl-C).
     #[error("stopped before the end")]
     Interrupted,
 }
 
 impl Error {
+    /// The error of bytes or a file. Its text stays as it is: a file's name may hold many digits.
+    #[must_use]
+    pub fn format(text: impl Into<String>) -> Self {
+        Self::Format(Reason { text: text.into(), argument: None, hint: None })
+    }
+
+    /// The error of a board.
+    #[must_use]
+    pub fn device(text: impl Into<Reason>) -> Self {
+        Self::Device(text.into())
+    }
+
+    /// The error of a scene.
+    #[must_use]
+    pub fn scene(text: impl Into<Reason>) -> Self {
+        Self::Scene(text.into())
+    }
+
+    /// The error of a parameter: its text continues after the parameter's name.
+    #[must_use]
+    pub fn argument(name: impl Into<String>, text: &str) -> Self {
+        Self::Problem(Reason { argument: Some(name.into()), ..text.into() })
+    }
+
+    /// The same error with a remedy, of which `argument` is the parameter that helps.
+    #[must_use]
+    pub fn helped_by(self, argument: &str, hint: Hint) -> Self {
+        self.with(|reason| Reason { argument: Some(argument.to_owned()), hint: Some(hint), ..reason })
+    }
+
     /// The same error, with the name of the part that it is of in front of its text.
     #[must_use]
     pub fn of(self, part: &str) -> Self {
-        if let Self::Problem(text) = self { Self::Problem(format!("{part}: {text}")) } else { self }
+        self.with(|reason| reason.of(part))
     }
+
+    fn with(self, change: impl FnOnce(Reason) -> Reason) -> Self {
+        match self {
+            Self::Format(reason) => Self::Format(change(reason)),
+            Self::Problem(reason) => Self::Problem(change(reason)),
+            Self::Device(reason) => Self::Device(change(reason)),
+            Self::Scene(reason) => Self::Scene(change(reason)),
+            Self::Interrupted => self,
+        }
+    }
+}
+
+/// What is refused and why, and what helps, as data.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reason {
+    /// What is wrong. It continues after the name of the parameter unless there is a hint.
+    pub text: String,
+    /// The parameter that is wrong, or that helps, as the caller writes it.
+    pub argument: Option<String>,
+    /// The kind of remedy.
+    pub hint: Option<Hint>,
+}
+
+impl Reason {
+    /// The line of the error, in which the parameter has the name that the reader knows it by.
+    #[must_use]
+    pub fn line(&self, argument: &str) -> String {
+        let text = &self.text;
+        match self.hint {
+            None => format!("{argument}{text}"),
+            Some(Hint::Give) => format!("{text}; give {argument}"),
+            Some(Hint::Larger) => format!("{text}; a larger {argument} reads more"),
+            Some(Hint::LayOut) => format!(
+                "{text}; give {argument}, or rows and columns in a layout file, if they are a grid's taxels row by row"
+            ),
+            Some(Hint::Unfelt) => format!(
+                "{text}; either the tare holds a touch, as it ends before the first label, which may be late (give \
+                 {argument}), or readings fall with pressure (falls = true in a layout file), or another source felt \
+                 it (a column source in the labels); taxel info shows what was touched"
+            ),
+            Some(Hint::Pitch) => format!("{text}; give {argument} with the pitch in mm, or pitch_mm in a layout file"),
+        }
+    }
+
+    /// The parameter is one of the part, so that a caller of the whole has no argument of that name; a remedy stays.
+    fn of(self, part: &str) -> Self {
+        match self.hint {
+            None => Self { text: format!("{part}: {self}"), argument: None, hint: None },
+            Some(_) => Self { text: format!("{part}: {}", self.text), ..self },
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.line(self.argument.as_deref().unwrap_or_default()))
+    }
+}
+
+impl From<&str> for Reason {
+    fn from(text: &str) -> Self {
+        Self { text: readable(text), argument: None, hint: None }
+    }
+}
+
+impl From<String> for Reason {
+    fn from(text: String) -> Self {
+        text.as_str().into()
+    }
+}
+
+/// What helps against an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hint {
+    /// Give the parameter, which is left out.
+    Give,
+    /// Give the limit, or a larger one.
+    Larger,
+    /// Lay a row of channels out as a grid.
+    LayOut,
+    /// Give the distance of the taxels.
+    Pitch,
+    /// See why nothing was felt of what was labelled.
+    Unfelt,
 }
 
 /// Digits of a number that people read: more than that of any time in us or ns, or of a rounded fraction.
@@ -51,10 +170,11 @@ fn readable(text: &str) -> String {
 /// The result of each function in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Makes an [`Error::Problem`] from a format string.
+/// Makes an [`Error::Problem`] from a format string; after a parameter's name and a semicolon, one of that parameter.
 #[macro_export]
 macro_rules! problem {
-    ($($text:tt)*) => { $crate::Error::Problem(format!($($text)*)) };
+    ($argument:expr; $($text:tt)*) => { $crate::Error::argument($argument, &format!($($text)*)) };
+    ($($text:tt)*) => { $crate::Error::Problem(format!($($text)*).into()) };
 }
 
 /// Checks at intervals whether the caller asked a long call to end early.
@@ -96,7 +216,7 @@ impl<'a> Stop<'a> {
 mod tests {
     #[test]
     fn a_number_that_nobody_reads_digit_by_digit_is_in_scientific_notation() {
-        let told = |value: f64| problem!("tau is {value} ms: must lie below 1.5").to_string();
+        let told = |value: f64| problem!("tau"; " is {value} ms: must lie below 1.5").to_string();
         assert_eq!(told(1e308), "tau is 1e308 ms: must lie below 1.5");
         assert_eq!(told(-5e-324), "tau is -5e-324 ms: must lie below 1.5");
         assert_eq!(told(1_700_000_000_000_000_000.0), "tau is 1700000000000000000 ms: must lie below 1.5");

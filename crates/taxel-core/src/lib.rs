@@ -15,6 +15,7 @@
 pub mod allowed;
 pub mod error;
 pub mod parameters;
+pub mod preload;
 pub mod reading;
 pub mod vectors;
 
@@ -23,7 +24,6 @@ pub mod baseline;
 pub mod events;
 pub mod frames;
 pub mod held;
-pub mod lain;
 pub mod rest;
 pub mod spikes;
 pub mod touch_counts;
@@ -43,7 +43,7 @@ pub mod learn;
 pub mod metrics;
 
 pub use array::Array;
-pub use error::{Error, Result, Stop};
+pub use error::{Error, Hint, Reason, Result, Stop};
 pub use events::{Events, EventsView, Intensities, IntensitiesView, Marker};
 pub use frames::FramesView;
 pub use spikes::{Spike, SpikeKind, SpikeTrains};

@@ -25,7 +25,7 @@ use pairwise::Matrix;
 
 use crate::parameters::Described;
 use crate::reading::{self, Unfit};
-use crate::{Error, Result, Stop, problem};
+use crate::{Result, Stop, problem};
 
 /// The registry: one line for each metric, `NAME: Kind`, with its file `metrics/NAME.rs` and `NAME` as its name in
 /// JSON.
@@ -96,23 +96,22 @@ impl Metric {
     ///
     /// `Problem`, naming the parameter.
     pub fn from_json(json: &str) -> Result<Self> {
-        let mut given: Map<String, Value> =
-            reading::from_text(json).map_err(|unfit| Error::Problem(unfit.of("metric")))?;
+        let mut given: Map<String, Value> = reading::from_text(json).map_err(|unfit| unfit.problem("metric"))?;
         let name = given.remove("name").unwrap_or_default();
         let name = name.as_str().unwrap_or_default();
         let Some(Described { defaults, required, .. }) = Self::described(name) else {
             let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
-            return Err(problem!("metric is '{name}': must be one of {}", names.join(", ")));
+            return Err(problem!("metric"; " is '{name}': must be one of {}", names.join(", ")));
         };
         // A metric may contain the parameters of another type, whose reader ignores unknown keys, so all keys are
         // checked here.
         let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
         if let Some(unknown) = given.keys().find(|key| !known.contains(&key.as_str())) {
-            return Err(problem!("{unknown}: {name} takes {}", known.join(", ")));
+            return Err(problem!(unknown.as_str(); " is not known: {name} takes {}", known.join(", ")));
         }
         Self::read(name, given.into())
             .ok_or_else(|| problem!("metric {name}: cannot be read"))?
-            .map_err(|unfit| Error::Problem(unfit.of(name)))
+            .map_err(|unfit| unfit.problem(name))
     }
 
     /// Checks every parameter.

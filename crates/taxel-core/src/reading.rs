@@ -4,6 +4,8 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use serde_json::error::Category;
 
+use crate::Error;
+
 /// The part of a JSON text that is not valid: its place, its value, and what is valid.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unfit {
@@ -19,6 +21,15 @@ impl Unfit {
     pub fn of(&self, what: &str) -> String {
         let colon = if self.message.starts_with(" is ") && self.place.is_empty() { "" } else { ": " };
         format!("{what}{colon}{}{}", self.place, self.message)
+    }
+
+    /// The error of the parameter, for a caller who passed `what` its parameters.
+    #[must_use]
+    pub fn problem(self, what: &str) -> Error {
+        match self.place.find(['.', '[']).map_or((self.place.as_str(), ""), |end| self.place.split_at(end)) {
+            ("", _) => Error::Problem(self.of(what).into()),
+            (argument, rest) => Error::argument(argument, &format!("{rest}{}", self.message)),
+        }
     }
 
     /// The error for a caller who passed the parameter by its own name and does not know the groups that contain it.

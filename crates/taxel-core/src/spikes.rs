@@ -54,7 +54,7 @@ impl SpikeKind {
         Self::ALL
             .into_iter()
             .find(|kind| kind.name() == name)
-            .ok_or_else(|| problem!("kind is {name}: must be one of {names}"))
+            .ok_or_else(|| problem!("kind"; " is {name}: must be one of {names}"))
     }
 
     /// The number of inputs of a neuron for each train: two for signed trains.
@@ -202,14 +202,13 @@ impl SpikeTrains {
             return Ok(all);
         }
         // Trains are merged instead of sorted, because a sort of this many spikes could not be interrupted.
-        let next =
-            |n: usize, k: usize| (k < self.offsets[n + 1]).then(|| Reverse(NextSpike { t: self.times[k], n, k }));
+        let next = |n: usize, k: usize| (k < self.offsets[n + 1]).then(|| Reverse((Ordered(self.times[k], n), k)));
         let mut heads: BinaryHeap<_> = (0..self.len()).filter_map(|n| next(n, self.offsets[n])).collect();
         while let Some(mut head) = heads.peek_mut() {
             if all.len().is_multiple_of(BETWEEN_CHECKS) {
                 stop.check()?;
             }
-            let NextSpike { n, k, .. } = head.0;
+            let Reverse((Ordered(_, n), k)) = *head;
             all.push(spike(n, k));
             match next(n, k + 1) {
                 Some(following) => *head = following,
@@ -227,7 +226,9 @@ impl SpikeTrains {
     /// `Problem` for graded trains, whose values are factors of the weight.
     pub fn split_by_sign(&self) -> Result<Self> {
         if self.kind == SpikeKind::Graded {
-            return Err(problem!("trains are graded: their values multiply the weight and are never split by sign"));
+            return Err(
+                problem!("trains"; " are graded: their values multiply the weight and are never split by sign"),
+            );
         }
         let Some(values) = &self.values else { return Ok(self.clone()) };
         let (mut times, mut offsets) = (Vec::with_capacity(self.times.len()), vec![0]);
@@ -266,33 +267,23 @@ impl SpikeTrains {
 /// Number of spikes that are copied, sorted or merged between two checks for Ctrl-C.
 const BETWEEN_CHECKS: usize = 1 << 18;
 
-/// The next spike of train `n`, with index `k` among all; ordered by time, then by train.
-#[derive(Debug, Clone, Copy)]
-struct NextSpike {
-    t: f64,
-    n: usize,
-    k: usize,
-}
+/// A number and an index, ordered by the number, then by the index.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ordered(pub(crate) f64, pub(crate) usize);
 
-impl Ord for NextSpike {
+impl Eq for Ordered {}
+
+impl Ord for Ordered {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.t.total_cmp(&other.t).then(self.n.cmp(&other.n))
+        self.0.total_cmp(&other.0).then(self.1.cmp(&other.1))
     }
 }
 
-impl PartialOrd for NextSpike {
+impl PartialOrd for Ordered {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
-
-impl PartialEq for NextSpike {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for NextSpike {}
 
 /// [`SpikeTrains::check`] for borrowed columns.
 ///
@@ -346,15 +337,15 @@ fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Resul
         return Err(problem!("unsigned trains have no values: choose kind signed or graded, or leave the values out"));
     }
     if values.len() != spikes {
-        return Err(problem!("values: must be one a spike, {spikes}"));
+        return Err(problem!("values"; ": must be one a spike, {spikes}"));
     }
     if let Some(k) = values.iter().position(|value| !value.is_finite()) {
-        return Err(problem!("values[{k}] is {}: must be finite", format!("{}", values[k]).to_lowercase()));
+        return Err(problem!("values"; "[{k}] is {}: must be finite", format!("{}", values[k]).to_lowercase()));
     }
     if kind == SpikeKind::Graded
         && let Some(k) = values.iter().position(|&value| value == 0.0)
     {
-        return Err(problem!("values[{k}] is 0: a graded value of 0 is no spike, leave it out"));
+        return Err(problem!("values"; "[{k}] is 0: a graded value of 0 is no spike, leave it out"));
     }
     Ok(())
 }

@@ -21,7 +21,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["rest"],
             &["baseline", "circuit"],
             &["tracked_rest"],
-            &["lain", "touch_counts"],
+            &["preload", "touch_counts"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],

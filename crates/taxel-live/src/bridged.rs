@@ -28,7 +28,6 @@ pub struct Bridged {
     /// Number of times that nothing was received for a second or more.
     pub silences: u64,
     /// Whether something was received within the last second.
-    #[serde(rename = "heard")]
     pub received: bool,
     /// Whether the bridge reported its end.
     pub ended: bool,

@@ -92,7 +92,7 @@ impl Receiver {
     pub fn bind(address: SocketAddr, options: ReceiverOptions) -> Result<Self> {
         if options.queue_bytes < socket::LARGEST {
             return Err(taxel_core::problem!(
-                "queue_bytes is {}: must be {} or more, the largest datagram",
+                "queue_bytes"; " is {}: must be {} or more, the largest datagram",
                 options.queue_bytes,
                 socket::LARGEST
             )

@@ -177,10 +177,12 @@ impl Emulator {
             return Err(taxel_core::problem!("command {}: its frame lies before that of command {k}", k + 1).into());
         }
         if let Some(every) = options.reset_every_s.filter(|every| !(1e-3..=1e9).contains(every)) {
-            return Err(taxel_core::problem!("reset each {every} s: must be 0.001 to 1e9").into());
+            return Err(taxel_core::problem!("reset_every_s"; " is {every}: must be from 0.001 to 1e9").into());
         }
         if !(-100_000.0..=100_000.0).contains(&options.drift_ppm) {
-            return Err(taxel_core::problem!("drift of {} ppm: must lie within 100000 of 0", options.drift_ppm).into());
+            return Err(
+                taxel_core::problem!("drift_ppm"; " is {}: must be from -100000 to 100000", options.drift_ppm).into()
+            );
         }
         let network = options.faults.map(Network::new).transpose()?;
         let circuit = options.circuit.clone();

@@ -40,7 +40,7 @@ impl Error {
 
     /// An error about the content of a file.
     pub(crate) fn format(path: &Path, text: &str) -> Self {
-        taxel_core::Error::Format(format!("{}: {text}", path.display())).into()
+        taxel_core::Error::format(format!("{}: {text}", path.display())).into()
     }
 
     /// Adds the address to an error of the operating system.

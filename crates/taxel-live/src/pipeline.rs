@@ -51,7 +51,7 @@ use crate::{Error, Result};
 pub use copies::{Copied, Copies};
 pub use counters::{Arrival, ArrivalState, BoardState, Counters, DecodingCounts, ReadoutCounts, SourceCounts, Summary};
 pub use handle::Handle;
-pub use options::{LiveOptions, Record};
+pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
 use readout_queue::ReadoutQueue;
 use recorder::{Part, Recorder};
@@ -96,7 +96,7 @@ impl Live {
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        let capture = options.capture;
+        let capture = options.capture();
         // The socket is opened before the file, so that a port that is in use leaves no empty file.
         Self::start_from(|| Receiver::bind(address, capture), options, readout, sinks)
     }
@@ -126,29 +126,31 @@ impl Live {
                 taxel_core::problem!("recordings that begin later, and one from the beginning: choose one").into()
             );
         }
-        if let (None, false, Some(source)) = (&options.record, options.record_later, options.sources.first()) {
-            return Err(
-                taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
-            );
+        if let (None, false, Some((name, _))) = (&options.record, options.record_later, options.sources.first()) {
+            return Err(taxel_core::problem!("source {name} without a recording: nothing would keep it").into());
         }
-        Self::begin(Box::new(receiver), options, readout, sinks, None)
+        let sources = options.sources.iter();
+        let sources = sources.map(|(name, what)| Ok(Source { name: name.clone(), kind: what.parse()? }));
+        let sources = sources.collect::<Result<_>>()?;
+        Self::begin(Box::new(receiver), options, sources, readout, sinks, None)
     }
 
     /// Starts the pipeline; `host` is the pipeline whose recording contains this one's as a part.
     fn begin(
         receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
+        sources: Vec<Source>,
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
         host: Option<Part>,
     ) -> Result<Self> {
         for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
             if !(frames.is_finite() && frames >= 0.0) {
-                return Err(taxel_core::problem!("{name} is {frames}: must be 0 or more").into());
+                return Err(taxel_core::problem!(name; " is {frames}: must be 0 or more and finite").into());
             }
         }
         if options.readout_events == 0 {
-            return Err(taxel_core::problem!("readout_events is 0: must be 1 or more").into());
+            return Err(taxel_core::problem!("readout_events"; " is 0: must be 1 or more").into());
         }
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
@@ -157,16 +159,17 @@ impl Live {
         }
         match &readout {
             ReadoutSetup::Taring(stretch_us, _) if *stretch_us <= 0 => {
-                return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
+                return Err(taxel_core::problem!("tare"; " of {stretch_us} us: must be above 0").into());
             }
             ReadoutSetup::Taring(_, readout) => readout.check()?,
             ReadoutSetup::None | ReadoutSetup::Reading(_) => {}
         }
-        let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
+        let record = options.recording()?;
+        let sending = options.send.iter().map(|to| Sending::open(&to.parse()?)).collect::<Result<Vec<_>>>()?;
         let receiver = receiver()?;
-        let recorder = match (&options.record, host) {
+        let recorder = match (&record, host) {
             (None, _) => None,
-            (Some(record), None) => Some(Recorder::create(record, &options, receiver.place())?),
+            (Some(record), None) => Some(Recorder::create(record, &options, &sources, receiver.place())?),
             (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, receiver.place())),
         };
         let published = Published { picture: vec![0; options.array.len()], ..Published::default() };
@@ -181,6 +184,7 @@ impl Live {
             sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
             options: options.clone(),
+            sources,
             begun: Instant::now(),
             expected: AtomicU8::new(0),
             ended: AtomicBool::new(false),
@@ -188,8 +192,9 @@ impl Live {
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
         let reads_out = !matches!(readout, ReadoutSetup::None);
         let board = |address, own: LiveOptions, part| {
-            let capture = own.capture;
-            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, ReadoutSetup::None, vec![], Some(part))
+            let capture = own.capture();
+            let receiver = move || Receiver::bind(address, capture);
+            Self::begin(Box::new(receiver), own, vec![], ReadoutSetup::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing arrived: a new file is removed.

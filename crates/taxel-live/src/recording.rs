@@ -174,7 +174,7 @@ impl std::str::FromStr for Compression {
             "none" => Ok(Self::None),
             "lz4" => Ok(Self::Lz4),
             "zstd" => Ok(Self::Zstd),
-            _ => Err(taxel_core::problem!("compression is {name:?}: must be none, lz4 or zstd")),
+            _ => Err(taxel_core::problem!("compression"; " is {name:?}: must be none, lz4 or zstd")),
         }
     }
 }
@@ -201,7 +201,7 @@ impl Header {
             return Err(problem!("a sensor of {rows} x {columns} taxels; at most {} are read", limits::TAXELS));
         }
         if !(-limits::TIME_US..=limits::TIME_US).contains(&self.decoding.origin_us) {
-            return Err(problem!("origin_us is {}: must lie within 142 years of 0", self.decoding.origin_us));
+            return Err(problem!("origin_us"; " is {}: must lie within 142 years of 0", self.decoding.origin_us));
         }
         if let Some(stream) = &self.stream {
             stream.check(&self.name)?;

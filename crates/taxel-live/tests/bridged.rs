@@ -8,8 +8,8 @@ use taxel_core::{Array, Stop};
 use taxel_live::bridged::Bridged;
 use taxel_live::capture::{Feed, Receiver, ReceiverOptions, Sender};
 use taxel_live::host_clock::RoundTrip;
-use taxel_live::pipeline::{Copied, Live, LiveOptions, ReadoutSetup, Record, Summary};
-use taxel_live::recording::{Compression, Reader, Topic, now_ns};
+use taxel_live::pipeline::{Copied, Live, LiveOptions, ReadoutSetup, Summary};
+use taxel_live::recording::{Reader, Topic, now_ns};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
@@ -31,8 +31,7 @@ impl Scratch {
     }
 
     fn options(&self) -> LiveOptions {
-        let record = Record { path: self.0.clone(), compression: Compression::None, overwrite: false };
-        LiveOptions { record: Some(record), ..LiveOptions::new(Array::thesis()) }
+        LiveOptions { record: Some(self.0.clone()), ..LiveOptions::new(Array::thesis()) }
     }
 
     /// Datagrams with their arrival times, ns.

@@ -16,8 +16,8 @@ use taxel_core::wire::{Command, Decoder, Registers};
 use taxel_core::{Array, Events, Stop};
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{self, Emulator, Report, Touch};
-use taxel_live::pipeline::{Live, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Summary};
-use taxel_live::recording::{Compression, Reader, Topic};
+use taxel_live::pipeline::{Live, LiveOptions, OutputDetection, ReadoutSetup, Sink, Summary};
+use taxel_live::recording::{Reader, Topic};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
@@ -111,9 +111,9 @@ fn reading(readout: &Readout) -> ReadoutSetup {
 }
 
 fn options(record: Option<&Scratch>) -> LiveOptions {
-    let record = record.map(|s| Record { path: s.0.clone(), compression: Compression::Lz4, overwrite: false });
+    let record = record.map(|s| s.0.clone());
     // A machine too slow for real time holds frames back: here the host's clock moves nothing on, so no event is late.
-    LiveOptions { record, guard_frames: 1e9, ..LiveOptions::new(Array::thesis()) }
+    LiveOptions { record, compression: "lz4".to_owned(), guard_frames: 1e9, ..LiveOptions::new(Array::thesis()) }
 }
 
 fn wait_for(live: &Live, what: impl Fn(&Live) -> bool) {
@@ -213,7 +213,7 @@ fn detections_live_are_those_of_the_recording() {
     assert_eq!(again, output);
     assert!(again.len() > 5, "the presses are detected: {}", again.len());
     // By the host's clock less the offset no detection can be output before it was known, but for the clocks' estimate.
-    assert!(delivered.iter().all(|s| s.output_us >= s.detection.known - 192), "{delivered:?}");
+    assert!(delivered.iter().all(|s| s.reported_us >= s.detection.known - 192), "{delivered:?}");
 }
 
 /// The board's times of a recording's pictures, us.

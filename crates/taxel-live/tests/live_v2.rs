@@ -11,8 +11,8 @@ use taxel_core::encode::Encoder;
 use taxel_core::neuron::{Neuron, Time};
 use taxel_core::wire::{Pairing, Registers, v2};
 use taxel_core::{Array, Events, Stop};
-use taxel_live::pipeline::{Live, LiveOptions, ReadoutSetup, Record};
-use taxel_live::recording::{Compression, Reader};
+use taxel_live::pipeline::{Live, LiveOptions, ReadoutSetup};
+use taxel_live::recording::Reader;
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
@@ -31,9 +31,15 @@ impl Drop for Scratch {
 }
 
 fn options(array: &Array, registers: Registers, record: Option<&Scratch>) -> LiveOptions {
-    let record = record.map(|s| Record { path: s.0.clone(), compression: Compression::Lz4, overwrite: false });
+    let record = record.map(|s| s.0.clone());
     // The host's clock moves nothing on.
-    LiveOptions { record, registers, guard_frames: 1e9, ..LiveOptions::new(array.clone()) }
+    LiveOptions {
+        record,
+        compression: "lz4".to_owned(),
+        registers,
+        guard_frames: 1e9,
+        ..LiveOptions::new(array.clone())
+    }
 }
 
 /// The datagrams of frames in which a square comes and goes.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use serde_json::json;
 use taxel_core::encode::{Encoder, Stream};
-use taxel_core::{Array, Events, Intensities, Spike, SpikeKind, problem};
+use taxel_core::{Array, Events, Hint, Intensities, Spike, SpikeKind, problem};
 
 use super::keyframe_index::Pictures;
 use super::messages::Message;
@@ -107,10 +107,8 @@ impl EncodedSpikes {
         since: Option<i64>,
     ) -> Result<Self> {
         if pictures.numbered() {
-            return Err(problem!(
-                "spikes have times, and these pictures are numbered: say how many there are in a second with --rate-hz"
-            )
-            .into());
+            let text = "spikes have times, and these pictures are numbered, so their rate is not known";
+            return Err(problem!("{text}").helped_by("rate_hz", Hint::Give).into());
         }
         let sensors = pictures.sensors();
         let mut spikes = Self::begun(encoder, &sensors, pictures.array(), column_us)?;

@@ -42,6 +42,17 @@ pub enum PresetValue {
 /// A preset of the user: value by register name.
 pub type UserPreset = BTreeMap<String, PresetValue>;
 
+/// What a training has made.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct TrainingResult {
+    /// How well the readout detects, in words.
+    pub text: String,
+    /// The command that detects by it in a shell.
+    pub next: String,
+    /// Options of the command that trains that may help.
+    pub options: Vec<String>,
+}
+
 /// The presets of the user.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct UserPresets {
@@ -122,7 +133,7 @@ pub struct UnhealthyTaxels {
     /// That change by themselves.
     pub noisy: Vec<(u16, u16)>,
     /// Number of taxels that were not touched enough to say.
-    pub untold: u64,
+    pub untested: u64,
 }
 
 /// What a readout found in a recording.
@@ -243,13 +254,13 @@ pub trait LabelRequests: Send + Sync {
 /// Requests about readouts: training one on a recording, and running it on another.
 #[allow(clippy::missing_errors_doc)]
 pub trait TrainingRequests: Send + Sync {
-    /// Trains a readout on the labels of a recording, writes it to `out`, and returns how well it detects, in words.
-    fn train(&self, recording: &Path, out: &Path) -> Reply<String>;
+    /// Trains a readout on the labels of a recording, and writes it to `out`.
+    fn train(&self, recording: &Path, out: &Path) -> Reply<TrainingResult>;
 
     /// Returns what does the same in a shell.
     fn command(&self, recording: &Path, out: &Path) -> Reply<String>;
 
-    /// Returns how far the training that runs is, in words; empty where it has not said so.
+    /// Returns how far the training that runs is, in words; empty where it has reported nothing.
     fn progress(&self) -> Reply<String>;
 
     /// Ends the training that runs.

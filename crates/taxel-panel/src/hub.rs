@@ -235,6 +235,7 @@ impl Hub {
             taxel: env!("CARGO_PKG_VERSION"),
             live: live.is_some(),
             array: live.map(|live| ArrayInfo::from(live.array())),
+            options: live.map(|live| Box::new(live.handle.options().clone())),
             udp: live.and_then(|live| match live.handle.place() {
                 Origin::Udp(address) => Some(address.to_string()),
                 Origin::Bridge(_) => None,

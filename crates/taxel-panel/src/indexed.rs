@@ -138,7 +138,7 @@ impl Indexed {
                 Self::Pictures(index) => index.file.verdict.clone(),
             },
             unfinished: events.is_some_and(|index| index.unfinished),
-            on: events.map_or_else(String::new, |index| index.on.clone()),
+            preload_at: events.map_or_else(String::new, |index| index.preload_at.clone()),
             pace: events.and_then(|index| index.pace.clone()),
             registers,
             frame_us: registers.map(|registers| registers.frame_us()),
@@ -154,14 +154,14 @@ impl Indexed {
 /// What `opened` says of pictures.
 fn about_pictures(index: &PictureIndex) -> Pictures {
     let file = &index.file;
-    let source = |(place, rest, falls, on): (&PicturePlace, RestSource, bool, &str)| PictureSource {
+    let source = |(place, rest, falls, preload_at): (&PicturePlace, RestSource, bool, &str)| PictureSource {
         name: place.name.clone(),
         left: place.left,
         rows: place.rows,
         columns: place.columns,
         rest: rest.name(),
         falls,
-        on: on.to_owned(),
+        preload_at: preload_at.to_owned(),
     };
     Pictures {
         count: index.pictures,

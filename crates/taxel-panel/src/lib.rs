@@ -40,21 +40,23 @@ mod taxel_history;
 mod time_columns;
 mod weights;
 
-/// The JSON schemas of the requests (`requests`) and of the messages that are text (`messages`), for `tools/messages.py`.
+/// The JSON schemas of the requests (`requests`), of the messages that are text (`messages`) and of the options of a live source
+/// (`options`), for `tools/messages.py`.
 #[cfg(feature = "development")]
 #[must_use]
 pub fn message_schemas() -> String {
     let settings = schemars::generate::SchemaSettings::draft2020_12;
     let requests = settings().into_generator().into_root_schema_for::<request::Request>();
     let messages = settings().for_serialize().into_generator().into_root_schema_for::<messages::Message>();
-    serde_json::json!({ "requests": requests, "messages": messages }).to_string()
+    let options = settings().into_generator().into_root_schema_for::<taxel_live::pipeline::LiveOptions>();
+    serde_json::json!({ "requests": requests, "messages": messages, "options": options }).to_string()
 }
 
 pub use array_state::RestSource;
 pub use handler::{
     BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, LabelConflict, LabelEdit, LabelRequests,
     LabelRow, LabelTable, Opening, PicturesRead, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
-    TrainingRequests, UnhealthyTaxels, UserPreset, UserPresets,
+    TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
 pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource};

@@ -127,7 +127,7 @@ impl LiveSource {
                 panel: self.missing(),
             },
             queue: now.capture.waiting,
-            latency: Latency { decode: now.decode_latency, said: now.output_latency },
+            latency: Latency { decode: now.decode_latency, report: now.report_latency },
             wire_version: now.decoding.wire_version,
             marked_start: now.board.marked_start,
             taring: now.readout.taring,

@@ -10,7 +10,7 @@ use taxel_core::encode;
 use taxel_core::wire::Registers;
 use taxel_live::Quantiles;
 use taxel_live::clock::Pace;
-use taxel_live::pipeline::{Arrival, OutputDetection};
+use taxel_live::pipeline::{Arrival, LiveOptions, OutputDetection};
 use taxel_live::ports::Port;
 
 use super::handler::{LabelRow, UnhealthyTaxels, UserPreset};
@@ -32,6 +32,9 @@ pub(super) enum Message {
         /// False: no board, recordings only (`taxel view`).
         live: bool,
         array: Option<ArrayInfo>,
+        /// The options of the session by their names in Python, but for sensor, registers, readout and tare; null without a board.
+        #[cfg_attr(feature = "development", schemars(with = "Option<serde_json::Map<String, Value>>"))]
+        options: Option<Box<LiveOptions>>,
         /// Where datagrams are received.
         udp: Option<String>,
         /// Whether intensities are differences; null without a board.
@@ -120,7 +123,7 @@ pub(super) enum Message {
         label: String,
         t_us: i64,
         known_us: i64,
-        said_us: i64,
+        reported_us: i64,
         /// From known to reported, us.
         latency_us: i64,
         /// How steeply the potential crosses the threshold; null for a rule.
@@ -175,9 +178,18 @@ pub(super) enum Message {
         /// The folder's readouts and plain rules (`.json`).
         readouts: Vec<String>,
     },
-    /// A training has ended; `text` is what it printed.
-    Trained { name: String, readout: String, text: String },
-    /// When asked: the last that the training that runs has said of its progress, first after 2 s; empty before, and where none
+    /// A training has ended.
+    Trained {
+        name: String,
+        readout: String,
+        /// How well the readout detects, in words.
+        text: String,
+        /// The command that detects by it in a shell.
+        next: String,
+        /// Options of `taxel train` that may help.
+        options: Vec<String>,
+    },
+    /// When asked: the latest progress of the training that runs, first after 2 s; empty before, and where none
     /// runs.
     Training { text: String },
     /// When asked: what a readout found in a recording.
@@ -207,7 +219,7 @@ pub(super) enum Message {
         verdict: String,
         unfinished: bool,
         /// Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of pictures.
-        on: String,
+        preload_at: String,
         /// The pace of the recorded arrivals, where the recording holds them.
         pace: Option<Pace>,
         #[cfg_attr(feature = "development", schemars(with = "Option<shapes::Registers>"))]
@@ -251,7 +263,7 @@ pub(super) enum Message {
         source: Option<String>,
         taxels: usize,
         /// Taxels with events.
-        heard: usize,
+        active: usize,
         #[serde(flatten)]
         found: UnhealthyTaxels,
     },
@@ -291,13 +303,13 @@ impl Message {
     }
 
     pub(super) fn detection(output: &OutputDetection) -> Self {
-        let OutputDetection { detection, output_us, .. } = output;
+        let OutputDetection { detection, reported_us, .. } = output;
         Self::Detection {
             label: detection.label.clone(),
             t_us: detection.t,
             known_us: detection.known,
-            said_us: *output_us,
-            latency_us: output_us - detection.known,
+            reported_us: *reported_us,
+            latency_us: reported_us - detection.known,
             slope_mv_per_ms: (!detection.slope.is_nan()).then_some(detection.slope),
         }
     }
@@ -352,7 +364,7 @@ pub(super) struct Lost {
 pub(super) struct Latency {
     pub(super) decode: Quantiles,
     /// Of detections, from known to reported.
-    pub(super) said: Quantiles,
+    pub(super) report: Quantiles,
 }
 
 /// A taxel that was zeroed.
@@ -465,7 +477,7 @@ pub(super) struct PictureSource {
     pub(super) falls: bool,
     /// Where something lay in that stretch and was taken away later, as text (`rows 2 to 4, columns 5 to 7 (up to 41 above
     /// rest)`); empty where nothing did.
-    pub(super) on: String,
+    pub(super) preload_at: String,
 }
 
 /// A marker of the board's own recording.

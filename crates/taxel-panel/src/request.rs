@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_refusal_names_the_innermost_key_and_what_would_be_right() {
-        for (request, field, said) in [
+        for (request, field, reason) in [
             (json!({ "type": "credit", "n": 9 }), Some("n"), "n: must be a whole number from 1 to 8"),
             (json!({ "type": "credit" }), None, "missing field `n`"),
             (json!({ "type": "credit", "n": 1, "m": 1 }), Some("m"), "m: unknown field `m`, expected `n`"),
@@ -278,7 +278,7 @@ mod tests {
                 "on: invalid type: string \"yes\", expected a boolean",
             ),
         ] {
-            let refusal = Refusal { reason: said.to_owned(), field: field.map(str::to_owned) };
+            let refusal = Refusal { reason: reason.to_owned(), field: field.map(str::to_owned) };
             assert_eq!(read(request.clone()).err(), Some(refusal), "{request}");
         }
         let unknown = read(json!({ "type": "dance" })).expect_err("no request");

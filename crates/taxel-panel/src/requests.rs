@@ -9,7 +9,7 @@ use taxel_live::locked::lock;
 use taxel_live::ports::ports;
 
 use super::clients::Broadcast;
-use super::handler::{Cut, Detected, LabelRow};
+use super::handler::{Cut, Detected, LabelRow, TrainingResult};
 use super::hub::Hub;
 use super::indexed::{Indexed, Shown};
 use super::labels::LabelChange;
@@ -187,9 +187,10 @@ async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
     let name = shown.ok_or("train: open a recording with labels first")?.name.clone();
     let readout = readout_of(&name);
     let (recording, out) = (hub.folder.file(&name)?, hub.folder.file(&readout)?);
-    let text = hub.ask(move |handlers| handlers.training.train(&recording, &out)).await?;
+    let TrainingResult { text, next, options } =
+        hub.ask(move |handlers| handlers.training.train(&recording, &out)).await?;
     hub.clients.send_message(&hub.recordings_message().await);
-    Ok(Message::Trained { name, readout, text })
+    Ok(Message::Trained { name, readout, text, next, options })
 }
 
 /// The name of the readout that is trained on a recording.
@@ -227,7 +228,7 @@ async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
         Some(Shown { name, trial, indexed: indexed @ Indexed::Pictures(_) }) => {
             let (path, trial, taxels) = (hub.folder.file(name)?, trial.clone(), taxels(indexed.index().array()));
             let found = hub.ask(move |handlers| handlers.files.health_of_pictures(&path, trial.as_deref())).await?;
-            return Ok(Message::Health { source, taxels, heard: taxels, found });
+            return Ok(Message::Health { source, taxels, active: taxels, found });
         }
         None => {
             let live = hub.live().ok_or("nothing is shown")?;
@@ -236,9 +237,9 @@ async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
         }
     };
     let taxels = taxels(&array);
-    let heard = activity.events.iter().filter(|&&n| n > 0).count();
+    let active = activity.events.iter().filter(|&&n| n > 0).count();
     let found = hub.ask(move |handlers| handlers.files.health(&array, &activity)).await?;
-    Ok(Message::Health { source, taxels, heard, found })
+    Ok(Message::Health { source, taxels, active, found })
 }
 
 async fn cut(hub: &Hub, shown: Option<&Shown>, (start_us, stop_us): (i64, i64), to: &str) -> Answer<Message> {

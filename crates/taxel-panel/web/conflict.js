@@ -29,8 +29,8 @@ export class LabelConflict {
     this.block = part("label-conflict", HTMLElement);
     /** The conflict that is shown. @type {number | null} */
     this.id = null;
-    /** What the notice said of it. */
-    this.said = "";
+    /** The text of its notice. */
+    this.notice = "";
     this.buttons = [part("conflict-restore", HTMLButtonElement), part("conflict-accept", HTMLButtonElement)];
     this.buttons.forEach((button, i) => {
       button.onclick = () => {
@@ -48,7 +48,7 @@ export class LabelConflict {
     if (!message || conflict === null || conflict.conflict_id === this.id) {
       if (conflict === null && this.id !== null) {
         this.id = null;
-        silence(this.said);
+        silence(this.notice);
       }
       return;
     }
@@ -66,7 +66,7 @@ export class LabelConflict {
       ...returned.map((row) => line("deleted or changed", described(row), "returned")),
       ...added.map((row) => line("–", `${described(row)} (new)`, "new")),
     );
-    this.said = what;
+    this.notice = what;
     notify(what, true, { text: "Look", action: () => this.look() });
   }
 

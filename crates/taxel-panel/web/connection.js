@@ -123,7 +123,7 @@ export class Connection {
   }
 
   /** @param {Hello} hello */
-  greet({ live, udp, control, delta_intensity }) {
+  greet({ live, options, udp, control, delta_intensity }) {
     const where = part("where", HTMLDetailsElement);
     where.hidden = !live;
     // Without a line there is something to choose.
@@ -134,6 +134,8 @@ export class Connection {
     this.events.at(udp);
     part("control-drop", HTMLButtonElement).disabled = control === null;
     part("delta-intensity", HTMLInputElement).checked = delta_intensity ?? false;
+    const stated = Object.entries(options ?? {}).filter(([, value]) => value !== null && String(value) !== "");
+    part("session-options", HTMLElement).replaceChildren(...stated.map(([name, value]) => make("li", {}, `${name}: ${value}`)));
     write(part("where-info", HTMLElement), control ?? "no control line");
   }
 

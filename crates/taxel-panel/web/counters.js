@@ -40,7 +40,7 @@ export function writeCounters(counters, drawn) {
   part("lost-block", HTMLElement).classList.toggle("bad", all > 0);
   put("queue", number(counters.queue, whole));
   // The latency of detections, where there are any; else that of decoding.
-  const shown = latency.said?.count ? latency.said : latency.decode;
+  const shown = latency.report?.count ? latency.report : latency.decode;
   put("latency", shown && shown.p50_us !== null && shown.p99_us !== null ? `${whole(shown.p50_us)} / ${whole(shown.p99_us)}` : "–");
   const places = part("loss-list", HTMLElement);
   for (const [place, count] of Object.entries(lost)) {

@@ -7,8 +7,8 @@ const AROUND_MAP = 50;
 /** Below the maps: room for two lines, so that nothing moves where a sentence comes or goes. */
 const UNDER = { above: 41, beside: 50 };
 const GAP = 20;
-/** Below what is said above the maps. */
-const BELOW_SAID = 8;
+/** Below the message above the maps. */
+const BELOW_BANNER = 8;
 /** The least that lanes need: the flags, the detections, the axis, and each lane with its title. */
 const FLAGS_AND_AXIS = 79;
 const LANE = { raster: 96, channels: 96, taxel: 72, force: 72, centre: 62 };
@@ -32,20 +32,20 @@ export class Layout {
     this.shown = shown;
     this.arranged = arranged;
     this.views = part("views", HTMLElement);
-    /** What is said above the maps, at times. */
-    this.said = part("silence", HTMLElement);
+    /** The message above the maps, shown at times. */
+    this.banner = part("silence", HTMLElement);
     this.done = "";
     const resized = new ResizeObserver(() => this.arrange());
     resized.observe(this.views);
-    resized.observe(this.said);
+    resized.observe(this.banner);
   }
 
   /** @returns {{ place: Place, width: number }} of the maps, and of one map, CSS pixels */
   best() {
     const { aspect, maps, lanes } = this.shown();
     const { clientWidth: wide } = this.views;
-    const said = this.said.offsetHeight;
-    const high = this.views.clientHeight - (said && said + BELOW_SAID);
+    const banner = this.banner.offsetHeight;
+    const high = this.views.clientHeight - (banner && banner + BELOW_BANNER);
     const low = FLAGS_AND_AXIS + lanes.reduce((sum, lane) => sum + LANE[lane], 0);
     const beside = Math.min(BESIDE * wide, wide - LANES_WIDE - GAP);
     /** @type {[Place, number][]} */

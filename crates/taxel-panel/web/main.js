@@ -346,7 +346,7 @@ function greet(message) {
 }
 
 /**
- * Another recording is shown, or the live source: a reload of the page shows it again, and what was said of the last one goes.
+ * Another recording is shown, or the live source: a reload of the page shows it again, and messages about the last one go.
  * @param {Opened | null} shown
  */
 function turnTo(shown) {

@@ -107,7 +107,7 @@ export interface LastRecording {
 export interface Latency {
   decode: Quantiles;
   /** Of detections, from known to reported. */
-  said: Quantiles;
+  report: Quantiles;
 }
 
 /** What was lost, by cause. */
@@ -156,7 +156,7 @@ export interface PictureSource {
   /** Whether values fall from that of a quiet stretch, so that less may mean more pressure. */
   falls: boolean;
   /** Where something lay in that stretch and was taken away later, as text (`rows 2 to 4, columns 5 to 7 (up to 41 above rest)`); empty where nothing did. */
-  on: string;
+  preload_at: string;
 }
 
 /** A recording of pictures. */
@@ -249,6 +249,8 @@ export interface Hello {
   /** False: no board, recordings only (`taxel view`). */
   live: boolean;
   array: ArrayInfo | null;
+  /** The options of the session by their names in Python, but for sensor, registers, readout and tare; null without a board. */
+  options: Record<string, unknown> | null;
   /** Where datagrams are received. */
   udp: string | null;
   /** Whether intensities are differences; null without a board. */
@@ -342,7 +344,7 @@ export interface Detection {
   label: string;
   t_us: number;
   known_us: number;
-  said_us: number;
+  reported_us: number;
   /** From known to reported, us. */
   latency_us: number;
   /** How steeply the potential crosses the threshold; null for a rule. */
@@ -415,15 +417,20 @@ export interface Recordings {
   readouts: string[];
 }
 
-/** A training has ended; `text` is what it printed. */
+/** A training has ended. */
 export interface Trained {
   type: "trained";
   name: string;
   readout: string;
+  /** How well the readout detects, in words. */
   text: string;
+  /** The command that detects by it in a shell. */
+  next: string;
+  /** Options of `taxel train` that may help. */
+  options: string[];
 }
 
-/** When asked: the last that the training that runs has said of its progress, first after 2 s; empty before, and where none runs. */
+/** When asked: the latest progress of the training that runs, first after 2 s; empty before, and where none runs. */
 export interface Training {
   type: "training";
   text: string;
@@ -459,7 +466,7 @@ export interface Opened {
   verdict: string;
   unfinished: boolean;
   /** Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of pictures. */
-  on: string;
+  preload_at: string;
   /** The pace of the recorded arrivals, where the recording holds them. */
   pace: Pace | null;
   registers: Record<string, boolean | number> | null;
@@ -520,7 +527,7 @@ export interface Health {
   source: string | null;
   taxels: number;
   /** Taxels with events. */
-  heard: number;
+  active: number;
   /** That did nothing while they were touched, and hold 0 as far as is known. */
   dead: [number, number][];
   /** That did nothing while they were touched, and hold another value. */
@@ -528,7 +535,7 @@ export interface Health {
   /** That change by themselves. */
   noisy: [number, number][];
   /** Number of taxels that were not touched enough to say. */
-  untold: number;
+  untested: number;
 }
 
 /** `lost` is what the new file's kind cannot hold. */

@@ -31,9 +31,9 @@ export function notify(text, bad = false, offer) {
   timer = setTimeout(() => silence(), SHOWN_MS);
 }
 
-/** Takes the notice away. @param {string} [said] only if it says this */
-export function silence(said) {
-  if (said !== undefined && part("notice-text", HTMLElement).textContent !== said) return;
+/** Takes the notice away. @param {string} [text] only if this is its text */
+export function silence(text) {
+  if (text !== undefined && part("notice-text", HTMLElement).textContent !== text) return;
   part("notice", HTMLElement).hidden = true;
   write(part("notice-text", HTMLElement), "");
 }

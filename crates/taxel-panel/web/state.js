@@ -20,10 +20,10 @@ const FIRST_WITHIN_S = 1;
  */
 function silence(counters, place) {
   if (!counters) return null;
-  const { arrival, board_us, seconds: listening, taring } = counters;
+  const { arrival, board_us, seconds: elapsed_s, taring } = counters;
   const since = `since ${seconds(board_us)} of the board, for ${short(1e6 * arrival.silent_s)}`;
   if (arrival.state === "nothing") {
-    return listening < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text: `Nothing has arrived at ${place} so far. Is the board on, and does it send to this address and port?` };
+    return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text: `Nothing has arrived at ${place} so far. Is the board on, and does it send to this address and port?` };
   }
   if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing ${since}, though it sent a heartbeat every ${short(arrival.heartbeat_us ?? 0)} or sooner.` };
   if (taring) return { word: "Tare", text: "Taking a tare: leave the sensor at rest." };
@@ -40,10 +40,10 @@ function fall(opened) {
 }
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
-function lain(opened) {
-  const sources = opened?.pictures?.sources ?? [{ name: "", on: opened?.on ?? "" }];
-  const lay = sources.filter(({ on }) => on).map(({ name, on }) => (sources.length > 1 ? `${name}, ${on}` : on));
-  return lay.length ? `In the quiet stretch that the rest is taken from, something lay on ${lay.join("; ")}.` : "";
+function preload(opened) {
+  const sources = opened?.pictures?.sources ?? [{ name: "", preload_at: opened?.preload_at ?? "" }];
+  const places = sources.filter((source) => source.preload_at).map(({ name, preload_at }) => (sources.length > 1 ? `${name}, ${preload_at}` : preload_at));
+  return places.length ? `In the quiet stretch that the rest is taken from, something lay on ${places.join("; ")}.` : "";
 }
 
 /** @param {Opened | null} opened @param {Hello | null} hello @returns {string} how many pictures there are, and rows and columns of each sensor */
@@ -84,7 +84,7 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const nothing = connected && source === null && !hello?.live;
   const banner = part("silence", HTMLElement);
-  write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && fall(opened), connected && lain(opened)].filter(Boolean).join(" "));
+  write(banner, [silent?.text, doubt && `${doubt[0].toUpperCase()}${doubt.slice(1)}.`, nothing && refused, connected && fall(opened), connected && preload(opened)].filter(Boolean).join(" "));
   banner.hidden = !banner.textContent;
   const place = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
   const text = [place, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");

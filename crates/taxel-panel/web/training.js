@@ -48,19 +48,15 @@ export class Training {
     this.server.request({ type: "train_stop" }).catch(failed);
   }
 
-  /** @param {string} printed what the training has printed */
-  text(printed) {
+  /** @param {string} text how far the training is, or its result @param {string} [next] the command that detects @param {string[]} [options] of the command that trains */
+  text(text, next = "", options = []) {
     const place = part("train-text", HTMLElement);
-    // The page says by itself where the readout is, and what to do with it.
-    const [last, next] = printed.match(/^written to .+; next: (taxel detect .+)$/m) ?? ["", ""];
-    const text = printed.replace(last, "").trim();
     place.hidden = !text;
     place.classList.remove("bad");
     write(place, ...text.split("\n"));
     part("train-next", HTMLElement).hidden = !next;
     write(part("train-detect", HTMLElement), next);
-    // The page has no options of the command line, which an advice may name.
-    const options = [...new Set(text.match(/--[a-z][a-z-]*/g))];
+    // The page has no options of the command line.
     write(part("train-how", HTMLElement), options.length ? `Options (${options.join(", ")}) are given in a shell, at the end of this command:` : "The same in a shell:");
   }
 
@@ -70,8 +66,8 @@ export class Training {
   }
 
   /** @param {Trained} trained */
-  take({ name, readout, text }) {
-    this.text(text);
+  take({ name, readout, text, next, options }) {
+    this.text(text, next, options);
     if (name === this.source) this.read(readout);
   }
 

@@ -130,7 +130,7 @@ export class View {
   takeHealth(health) {
     const kinds = /** @type {const} */ (["dead", "stuck", "noisy"]);
     const counts = kinds.map((kind) => `${health[kind].length} ${kind}`).join(", ");
-    write(part("health-info", HTMLElement), `${counts}, of ${counted(health.taxels, "taxel")}; ${health.untold} not touched enough to say`);
+    write(part("health-info", HTMLElement), `${counts}, of ${counted(health.taxels, "taxel")}; ${health.untested} not touched enough to say`);
     const items = kinds.flatMap((kind) =>
       health[kind].slice(0, 200).map(([x, y]) => {
         const button = make("button", { type: "button", class: "link" }, make("span", { class: `unwell ${kind}` }), ` ${kind}: row ${y}, column ${x}`);

@@ -35,10 +35,8 @@ impl Feed {
 impl Feed {
     /// A feed from `place`; so many bytes may wait for the decoder.
     #[new]
-    fn new(place: &str, queue_bytes: Option<usize>) -> Self {
-        let usual = ReceiverOptions::default();
-        let options = ReceiverOptions { queue_bytes: queue_bytes.unwrap_or(usual.queue_bytes), ..usual };
-        let (receiver, feed) = Receiver::fed(place, options);
+    fn new(place: &str, queue_bytes: usize) -> Self {
+        let (receiver, feed) = Receiver::fed(place, ReceiverOptions { queue_bytes, ..ReceiverOptions::default() });
         Self { feed, receiver: Mutex::new(Some(receiver)) }
     }
 

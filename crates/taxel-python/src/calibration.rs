@@ -12,7 +12,7 @@ use crate::errors::core;
 use crate::parameters::Plain;
 
 fn law(json: &str) -> Result<Sensor> {
-    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::Scene(unfit.of("law")))?;
+    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::scene(unfit.of("law")))?;
     sensor.check()?;
     Ok(sensor)
 }

@@ -2,7 +2,7 @@
 
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError};
 use pyo3::prelude::*;
-use taxel_core::Error as CoreError;
+use taxel_core::{Error as CoreError, Reason, reading};
 use taxel_live::Error as LiveError;
 
 pyo3::create_exception!(taxel, Error, PyException, "Anything that taxel refuses; its kinds are its subclasses.");
@@ -18,15 +18,33 @@ pyo3::create_exception!(taxel, DeviceError, Error, "The board, its registers or 
 pyo3::create_exception!(taxel, SceneError, Error, "A simulated scene that cannot be played.");
 
 pub(crate) fn core(error: CoreError) -> PyErr {
-    let text = error.to_string();
     // No wildcard arm: a new kind does not compile until it has a class.
     match error {
-        CoreError::Format(_) => FormatError::new_err(text),
-        CoreError::Problem(_) => ProblemError::new_err(text),
-        CoreError::Device(_) => DeviceError::new_err(text),
-        CoreError::Scene(_) => SceneError::new_err(text),
+        CoreError::Format(reason) => with_help(FormatError::new_err, reason),
+        CoreError::Problem(reason) => with_help(ProblemError::new_err, reason),
+        CoreError::Device(reason) => with_help(DeviceError::new_err, reason),
+        CoreError::Scene(reason) => with_help(SceneError::new_err, reason),
         CoreError::Interrupted => PyKeyboardInterrupt::new_err(()),
     }
+}
+
+/// The exception of a reason: its argument and its hint are attributes, of which `error_line` makes what is shown.
+fn with_help(raised: fn(String) -> PyErr, Reason { text, argument, hint }: Reason) -> PyErr {
+    let error = raised(text);
+    let hint = hint.and_then(|hint| Some(serde_json::to_value(hint).ok()?.as_str()?.to_owned()));
+    let set = Python::attach(|py| {
+        let value = error.value(py);
+        value.setattr("argument", argument)?;
+        value.setattr("hint", hint)
+    });
+    set.err().unwrap_or(error)
+}
+
+/// The line of an error, in which its argument has the name that the reader knows it by.
+#[pyfunction]
+fn error_line(text: String, argument: &str, hint: Option<&str>) -> PyResult<String> {
+    let hint = reading::from_value(hint.into()).map_err(|unfit| core(unfit.problem("hint")))?;
+    Ok(Reason { text, argument: None, hint }.line(argument))
 }
 
 pub(crate) fn live(error: LiveError) -> PyErr {
@@ -75,7 +93,11 @@ impl IntoPyErr for LiveError {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
-    module.add("Error", py.get_type::<Error>())?;
+    let error = py.get_type::<Error>();
+    error.setattr("argument", py.None())?;
+    error.setattr("hint", py.None())?;
+    module.add("Error", error)?;
+    module.add_function(wrap_pyfunction!(error_line, module)?)?;
     module.add("FormatError", py.get_type::<FormatError>())?;
     module.add("ProblemError", py.get_type::<ProblemError>())?;
     module.add("NotFittedError", py.get_type::<NotFittedError>())?;

@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
-use taxel_core::lain as lying;
+use taxel_core::preload::{place, preload as preload_of};
 use taxel_core::rest::{Rest, Value, touched_from};
 use taxel_core::touch_counts::{BIN_US, TouchCounts};
 use taxel_core::tracked_rest::TrackedRest;
@@ -230,16 +230,16 @@ pub fn touched_above(noise_floor: f64) -> f64 {
     touched_from(0.0, noise_floor)
 }
 
-/// What lay on a sensor in its quiet stretch, and where that was, for people.
+/// The preload of each taxel, and its place as text.
 #[pyfunction]
-pub fn lain<'py>(
+pub fn preload<'py>(
     py: Python<'py>,
     less: PyReadonlyArray1<'py, f64>,
     columns: usize,
     above: f64,
     corner: (usize, usize),
 ) -> PyResult<(Bound<'py, PyArray1<f64>>, String)> {
-    let lay = lying::lain(slice("less", &less)?, columns, above);
-    let on = lying::place(&lay, columns, corner);
-    Ok((array(py, lay), on))
+    let loads = preload_of(slice("less", &less)?, columns, above);
+    let at = place(&loads, columns, corner);
+    Ok((array(py, loads), at))
 }

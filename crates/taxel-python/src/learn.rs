@@ -24,7 +24,7 @@ pub(crate) fn to_online(json: &str) -> PyResult<(ConeR, usize)> {
     let mut given: Map<String, Value> = parsed("OnlineConeR", json)?;
     let window = given.remove("window").unwrap_or(Value::Null);
     let window = window.as_u64().and_then(|window| usize::try_from(window).ok());
-    let window = window.ok_or_else(|| core(problem!("window: must be a whole number, 1 or more")))?;
+    let window = window.ok_or_else(|| core(problem!("window"; ": must be a whole number, 1 or more")))?;
     Ok((to_cone_r(&Value::Object(given).to_string())?, window))
 }
 

@@ -38,7 +38,7 @@ mod wire_v2;
 mod _core {
     use pyo3::prelude::*;
     use taxel_core::held::UNKNOWN;
-    use taxel_core::lain::LOADED_TICKS;
+    use taxel_core::preload::LOADED_TICKS;
 
     #[pymodule_export]
     use crate::bridge::{Copies, Feed};
@@ -66,7 +66,7 @@ mod _core {
     };
     #[pymodule_export]
     use crate::held::{
-        HeldValues, PyTrackedRest, above_rest, changes_of_frames, held_as_events, lain, touched_above,
+        HeldValues, PyTrackedRest, above_rest, changes_of_frames, held_as_events, preload, touched_above,
         touches_of_events, touches_of_frames,
     };
     #[pymodule_export]
@@ -74,7 +74,7 @@ mod _core {
     #[pymodule_export]
     use crate::learn::{ConeRFitOut, ConeRProblem, OnlineConeR, Plastic};
     #[pymodule_export]
-    use crate::live::{Ended, Live, live_defaults, send, serial_ports};
+    use crate::live::{Ended, Live, send, serial_ports};
     #[pymodule_export]
     use crate::metrics::{distance, match_spikes, metric_names, pairwise};
     #[pymodule_export]

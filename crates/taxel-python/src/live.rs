@@ -7,80 +7,34 @@ use std::time::Duration;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use serde::Deserialize;
 use serde_json::{Value, json};
-use taxel_core::detect::{Detection, Detector};
+use taxel_core::detect::Detection;
 use taxel_core::encode::{Tare, Zeroing};
-use taxel_core::wire::Registers;
-use taxel_core::{Array, problem};
+use taxel_core::problem;
 use taxel_live::address::of_host;
-use taxel_live::capture::{self, Sender};
+use taxel_live::capture::Sender;
 use taxel_live::pipeline::{
-    Handle, Lines, Live as Pipeline, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Source, Summary,
+    Handle, Lines, Live as Pipeline, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Summary,
 };
 use taxel_live::ports;
 
 use crate::bridge::{Copies, Feed};
-use crate::convert::{ArrayParts, array, to_array};
+use crate::convert::array;
 use crate::enter::enter;
 use crate::errors::{ProblemError, core, live};
 use crate::parameters::{Plain, parsed};
 use crate::thread_state;
 use crate::threaded::Threaded;
 
-/// The defaults of the options that Python's `LiveOptions` has too, as JSON.
-#[pyfunction]
-pub fn live_defaults() -> String {
-    let LiveOptions { differences, guard_frames, gap_frames, record_later, name, .. } =
-        LiveOptions::new(Array::thesis());
-    json!({
-        "differences": differences, "guard_frames": guard_frames, "gap_frames": gap_frames,
-        "record_later": record_later, "name": name,
-    })
-    .to_string()
-}
-
-/// The options that Python sets; all others have Rust's defaults.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Chosen {
-    /// A preset's name, or the registers.
-    registers: Value,
-    differences: bool,
-    guard_frames: f64,
-    gap_frames: f64,
-    readout_events: Option<usize>,
-    kernel_buffer_bytes: Option<usize>,
-    queue_bytes: Option<usize>,
-    gro: Option<bool>,
-    /// Where detections go as lines.
-    send: Vec<String>,
-    /// The board's name in a recording.
-    name: String,
-    /// The other sources of the recording: name, and description.
-    sources: Vec<(String, String)>,
-    /// Whether recordings begin and end while it runs.
-    record_later: bool,
-}
-
-impl Chosen {
-    fn registers(&self, array: &Array) -> PyResult<Registers> {
-        match &self.registers {
-            Value::String(name) => Registers::preset_on(name, array).map_err(core),
-            held => Registers::deserialize(held).map_err(|e| ProblemError::new_err(format!("registers: {e}"))),
-        }
-    }
-}
-
-/// A detection, by name: `said` is its output in us of the board's clock, `said_ns` in ns of the host's.
+/// A detection, by name: `reported` is the time of its report in us of the board's clock, `reported_ns` in ns of the host's.
 #[derive(IntoPyObject)]
 pub(crate) struct DetectionOut {
     label: String,
     t: i64,
     known: i64,
     slope: f64,
-    said: i64,
-    said_ns: i64,
+    reported: i64,
+    reported_ns: i64,
     repaired: bool,
 }
 
@@ -112,7 +66,7 @@ fn to_record(path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Reco
 
 fn detection_out(output: OutputDetection) -> DetectionOut {
     let Detection { label, t, known, slope, repaired } = output.detection;
-    DetectionOut { label, t, known, slope, said: output.output_us, said_ns: output.output_ns, repaired }
+    DetectionOut { label, t, known, slope, reported: output.reported_us, reported_ns: output.reported_ns, repaired }
 }
 
 thread_local! {
@@ -145,57 +99,22 @@ impl Live {
 
 #[pymethods]
 impl Live {
-    /// Opens the socket, and the file where one is named (path, compression, overwrite).
+    /// Opens the socket, and the file where one is named.
     ///
-    /// `options`, `readout` and `tare` are JSON; `tare_us` takes a fresh tare. `say` is called with each detection in the
-    /// thread that made it, `lines` writes it to the standard output as JSON. With a `feed` no socket is opened.
+    /// `options` are those of Rust's `LiveOptions`, as JSON, but for `record`, as the name of a file may be no text. `say` is
+    /// called with each detection in the thread that made it. With a `feed` no socket is opened.
     #[new]
     fn start(
         py: Python<'_>,
-        host: &str,
-        port: u16,
-        parts: ArrayParts,
         options: &str,
-        record: Option<(PathBuf, String, bool)>,
-        readout: Option<&str>,
-        tare: Option<&str>,
-        tare_us: Option<i64>,
+        record: Option<PathBuf>,
         say: Option<Py<PyAny>>,
-        lines: bool,
         feed: Option<PyRef<'_, Feed>>,
     ) -> PyResult<Self> {
-        let chosen: Chosen = parsed("options", options)?;
-        let record = match record {
-            None => None,
-            Some((path, compression, overwrite)) => Some(to_record(path, &compression, overwrite)?),
-        };
-        let usual = LiveOptions::new(to_array(parts)?);
-        let sources = enter(py, |_| {
-            let sources = chosen.sources.iter();
-            sources
-                .map(|(name, what)| Ok(Source { name: name.clone(), kind: what.parse()? }))
-                .collect::<taxel_live::Result<_>>()
-        })?;
-        let options = LiveOptions {
-            name: chosen.name.clone(),
-            sources,
-            registers: chosen.registers(&usual.array)?,
-            differences: chosen.differences,
-            guard_frames: chosen.guard_frames,
-            gap_frames: chosen.gap_frames,
-            readout_events: chosen.readout_events.unwrap_or(usual.readout_events),
-            capture: capture::ReceiverOptions {
-                kernel_buffer_bytes: chosen.kernel_buffer_bytes.unwrap_or(usual.capture.kernel_buffer_bytes),
-                queue_bytes: chosen.queue_bytes.unwrap_or(usual.capture.queue_bytes),
-                gro: chosen.gro.unwrap_or(usual.capture.gro),
-            },
-            record,
-            record_later: chosen.record_later,
-            send: chosen.send.iter().map(|to| to.parse()).collect::<Result<_, _>>().map_err(live)?,
-            ..usual
-        };
+        let options = LiveOptions { record, ..parsed("options", options)? };
+        options.array.check().map_err(core)?;
         let mut sinks: Vec<Box<dyn Sink>> = vec![];
-        if lines {
+        if options.lines {
             sinks.push(Box::new(Lines(std::io::stdout())));
         }
         if let Some(say) = say {
@@ -209,13 +128,11 @@ impl Live {
                 .map_err(std::io::Error::other)
             }));
         }
-        let readout = readout.map(Detector::from_json).transpose().map_err(core)?;
-        let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
-        let readout = ReadoutSetup::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
+        let readout = ReadoutSetup::of(&options).map_err(core)?;
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
         let pipeline = enter(py, |_| match fed {
             Some(receiver) => Pipeline::start_fed(receiver, options, readout, sinks),
-            None => Pipeline::start(of_host(host, port)?, options, readout, sinks),
+            None => Pipeline::start(of_host(&options.host, options.port)?, options, readout, sinks),
         })?;
         Ok(Self {
             pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline),

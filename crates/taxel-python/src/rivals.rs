@@ -178,7 +178,7 @@ pub fn fit_batch<'py>(
     let batch = Batch::from_json(name, parameters).map_err(core)?;
     let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
     let learnt = enter(py, |stop| batch.fit(&patterns, &targets, stop))?;
-    Ok((column(py, learnt.weights), Plain(Value::Object(learnt.said))))
+    Ok((column(py, learnt.weights), Plain(Value::Object(learnt.results))))
 }
 
 /// Output spikes of such a learner.
@@ -188,11 +188,11 @@ pub fn run_batch<'py>(
     name: &str,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
-    said: &str,
+    results: &str,
     pattern: SpikesIn,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let batch = Batch::from_json(name, parameters).map_err(core)?;
-    let learnt = Learnt { weights: slice("weights", &weights)?.to_vec(), said: parsed(name, said)? };
+    let learnt = Learnt { weights: slice("weights", &weights)?.to_vec(), results: parsed(name, results)? };
     let fired = enter(py, |stop| batch.run(&learnt, &pattern.0, stop))?;
     Ok(array(py, fired))
 }

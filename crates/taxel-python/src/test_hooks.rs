@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use taxel_core::Error;
+use taxel_core::{Error, Hint};
 
 use crate::enter::enter;
 use crate::errors::ProblemError;
@@ -13,10 +13,10 @@ use crate::errors::ProblemError;
 #[pyfunction]
 pub fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
     let error = match what {
-        "format" => Error::Format("file, byte 0: raised by a test hook".to_owned()),
-        "problem" => Error::Problem("argument: raised by a test hook".to_owned()),
-        "device" => Error::Device("register: raised by a test hook".to_owned()),
-        "scene" => Error::Scene("ball: raised by a test hook".to_owned()),
+        "format" => Error::format("file, byte 0: raised by a test hook").helped_by("limit", Hint::Larger),
+        "problem" => Error::argument("tau", ": raised by a test hook"),
+        "device" => Error::device("register: raised by a test hook"),
+        "scene" => Error::scene("ball: raised by a test hook"),
         "interrupted" => Error::Interrupted,
         #[allow(clippy::panic)]
         "panic" => return enter(py, |_| -> Result<(), Error> { panic!("raised by a test hook") }),

@@ -77,7 +77,7 @@ impl WireDecoder {
         let (data, lengths, room) = (slice("data", &data)?, slice("lengths", &lengths)?, to_room(&mut columns)?);
         let columns = self.0.enter(py, |decoder, stop| match decoder {
             Either::One(decoder) => decoder.fill_datagrams(data, lengths, room, stop),
-            Either::Two(..) => Err(problem!("lengths: datagrams of version 2 have theirs before them")),
+            Either::Two(..) => Err(problem!("lengths"; ": datagrams of version 2 have theirs before them")),
         })?;
         Ok(from_filled(py, columns))
     }

@@ -104,15 +104,15 @@ def read_array(path: str | os.PathLike[str], dtype: DTypeLike | None = None) -> 
     """
     with open_file(path) as file:
         try:
-            shape, _, own = _described(file)
-            size, stored = math.prod(shape) * own.itemsize, os.fstat(file.fileno()).st_size - file.tell()
-            if own.hasobject:
+            shape, _, stored_as = _described(file)
+            size, stored = math.prod(shape) * stored_as.itemsize, os.fstat(file.fileno()).st_size - file.tell()
+            if stored_as.hasobject:
                 raise FormatError(f"{path}: holds Python objects; must be a NumPy array of numbers")
-            if dtype is not None and own.kind not in "biuf":
-                raise FormatError(f"{path}: {own} of shape {shape}; must be a NumPy array of numbers")
+            if dtype is not None and stored_as.kind not in "biuf":
+                raise FormatError(f"{path}: {stored_as} of shape {shape}; must be a NumPy array of numbers")
             if size > stored:
-                raise FormatError(f"{path}: says that it holds {size} bytes ({shape}, {own}); there are {stored}")
-            unpacked(str(path), _kept(shape, own, dtype))
+                raise FormatError(f"{path}: says that it holds {size} bytes ({shape}, {stored_as}); there are {stored}")
+            unpacked(str(path), _kept(shape, stored_as, dtype))
             file.seek(0)
             return _read(file, dtype, str(path))
         except (FormatError, MemoryError):

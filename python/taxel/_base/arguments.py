@@ -15,6 +15,7 @@ from typing import Any, SupportsIndex, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taxel._base.errors import refused
 from taxel._base.messages import plain
 from taxel._core import ProblemError
 
@@ -98,7 +99,7 @@ def _lone_surrogate(value: str) -> bool:
 def instance(name: str, value: object, kind: type[T]) -> T:
     """Return a value of the given class; refuse any other."""
     if not isinstance(value, kind):
-        raise ProblemError(f"{name} is {shown(value)}: must be a {public_name(kind)}")
+        raise refused(name, f" is {shown(value)}: must be a {public_name(kind)}")
     return value
 
 
@@ -117,23 +118,23 @@ def several(name: str, values: object) -> list[Any]:
         sized = hasattr(values, "__len__")
         entries = list(values) if sized else list(islice(values, _MOST_ENTRIES + 1))  # type: ignore[call-overload]
     except TypeError:
-        raise ProblemError(f"{name} is {shown(values)}: must be a sequence") from None
+        raise refused(name, f" is {shown(values)}: must be a sequence") from None
     if not sized and len(entries) > _MOST_ENTRIES:
-        raise ProblemError(f"{name} is {shown(values)}: must give at most {_MOST_ENTRIES} entries")
+        raise refused(name, f" is {shown(values)}: must give at most {_MOST_ENTRIES} entries")
     return entries
 
 
 def callback(name: str, value: T) -> T:
     """Return a callable; refuse any other value."""
     if not callable(value):
-        raise ProblemError(f"{name} is {shown(value)}: must be a function")
+        raise refused(name, f" is {shown(value)}: must be a function")
     return value
 
 
 def mapping(name: str, value: object) -> dict[str, Any]:
     """Return a mapping as a dict; refuse any other value."""
     if not isinstance(value, Mapping):
-        raise ProblemError(f"{name} is {shown(value)}: must be values by name")
+        raise refused(name, f" is {shown(value)}: must be values by name")
     return {text(f"a name in {name}", key): entry for key, entry in value.items()}
 
 
@@ -173,14 +174,14 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
         level = list(chain.from_iterable(nested.values()))
         if not level:
             return values
-    raise ProblemError(f"{name} is {shown(values)}: must be nested less than {DEPTH} times")
+    raise refused(name, f" is {shown(values)}: must be nested less than {DEPTH} times")
 
 
 def _refuse_masked(name: str, values: list[Any]) -> None:
     """Refuse masked entries, for which NumPy would return the arbitrary value below the mask."""
     for value in values:
         if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-            raise ProblemError(f"{name} is {shown(value)}: must have no masked entry")
+            raise refused(name, f" is {shown(value)}: must have no masked entry")
 
 
 def _has_unit(kind: type[Any]) -> bool:
@@ -204,7 +205,7 @@ def _converted(name: str, values: Any, unit: str | None) -> Any:
         if not _is_nested(values):
             return values
         if {_has_unit(kind) for kind in map(type, values) if not _may_nest(kind) or _has_unit(kind)} == {True, False}:
-            raise ProblemError(f"{name} is {shown(values)}: mixes quantities and numbers without a unit")
+            raise refused(name, f" is {shown(values)}: mixes quantities and numbers without a unit")
         return [_converted(f"{name}[{k}]", value, unit) for k, value in enumerate(values)]
     try:
         convert = values.rescale if hasattr(values, "rescale") else values.to
@@ -216,7 +217,7 @@ def _converted(name: str, values: Any, unit: str | None) -> Any:
         return np.where(np.abs(plain - rounded) <= 1e-15 * np.abs(plain), rounded, plain)
     except Exception:  # each library has errors of its own for units that do not fit
         right = "a plain number" if unit is None else f"a number of {unit}, or a quantity that converts to it"
-        raise ProblemError(f"{name} is {shown(values)}: must be {right}") from None
+        raise refused(name, f" is {shown(values)}: must be {right}") from None
 
 
 def _one(values: NDArray[np.float64]) -> object:
@@ -228,7 +229,7 @@ def number(name: str, value: object, unit: str | None = None) -> float:
     """Return a float, which may be infinite, for a quantity its value in `unit`; refuse any other value, and NaN."""
     real = _real(name, value, unit)
     if math.isnan(real):
-        raise ProblemError(f"{name} is nan: must be a number")
+        raise refused(name, " is nan: must be a number")
     return real
 
 
@@ -237,11 +238,11 @@ def _real(name: str, value: object, unit: str | None = None) -> float:
     if _has_unit(type(value)):
         value = _one(bare(name, value, unit))
     if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | float | np.integer | np.floating):
-        raise ProblemError(f"{name} is {shown(value)}: must be a number")
+        raise refused(name, f" is {shown(value)}: must be a number")
     try:
         return float(value) + 0.0
     except OverflowError:
-        raise ProblemError(f"{name} is {shown(value)}: must fit a float") from None
+        raise refused(name, f" is {shown(value)}: must fit a float") from None
 
 
 def finite(
@@ -251,8 +252,9 @@ def finite(
     real = _real(name, value, unit)
     if not (math.isfinite(real) and least <= real <= most):
         low, high = math.isfinite(least), math.isfinite(most)
-        right = f"from {least:g} to {most:g}" if low and high else f"{least:g} or more and finite" if low else "finite"
-        raise ProblemError(f"{name} is {shown(value)}: must be {right}")
+        right = f"{least:g} or more and finite" if low else f"at most {most:g} and finite" if high else "finite"
+        right = f"from {least:g} to {most:g}" if low and high else right
+        raise refused(name, f" is {shown(value)}: must be {right}")
     return real
 
 
@@ -264,14 +266,14 @@ def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1
     is_whole = real or (isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64))
     if not is_whole or not least <= value <= most:  # type: ignore[operator]
         low, high = ("-2^63" if least == -(2**63) else least), ("2^63 - 1" if most == 2**63 - 1 else most)
-        raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {low} to {high}")
+        raise refused(name, f" is {shown(value)}: must be a whole number from {low} to {high}")
     return int(value)  # type: ignore[call-overload, no-any-return]
 
 
 def flag(name: str, value: object) -> bool:
     """Return a boolean; refuse any other value."""
     if not isinstance(value, bool | np.bool_):
-        raise ProblemError(f"{name} is {shown(value)}: must be True or False")
+        raise refused(name, f" is {shown(value)}: must be True or False")
     return bool(value)
 
 
@@ -279,9 +281,9 @@ def text(name: str, value: object, among: Collection[str] = ()) -> str:
     """Return a text; if `among` is given, one of its entries."""
     if not isinstance(value, str) or (among and value not in among):
         expected = f"one of {', '.join(map(repr, among))}" if among else "a text"
-        raise ProblemError(f"{name} is {shown(value)}: must be {expected}")
+        raise refused(name, f" is {shown(value)}: must be {expected}")
     if _lone_surrogate(value):
-        raise ProblemError(f"{name} is {shown(value)}: must be a text without lone surrogates")
+        raise refused(name, f" is {shown(value)}: must be a text without lone surrogates")
     return value
 
 
@@ -293,7 +295,7 @@ def path(name: str, value: object) -> str:
     except UnicodeEncodeError:  # half of a surrogate pair, which no file name can contain
         encoded = b""
     if not isinstance(plain, str) or not encoded or b"\0" in encoded:
-        raise ProblemError(f"{name} is {shown(value)}: must be a path")
+        raise refused(name, f" is {shown(value)}: must be a path")
     return plain
 
 
@@ -319,12 +321,12 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
         if received.size == 0 and received.dtype.kind not in "biuf":
             received = received.astype(dtype)
         if received.dtype.kind not in "biufO":
-            raise ProblemError(f"{name}: holds {received.dtype}, must hold numbers")
+            raise refused(name, f": holds {received.dtype}, must hold numbers")
         with np.errstate(invalid="ignore", over="ignore"):
             # A field of a single record is contiguous but may not be aligned.
             array = np.require(received, dtype, ["C", "A"]).reshape(received.shape)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ProblemError(f"{name}: {error}") from None
+        raise refused(name, f": {error}") from None
     refuse_changed(name, received, array, unit)
     return array
 
@@ -342,7 +344,7 @@ def refuse_changed(
         value = shown(found.item() if isinstance(found, np.generic) else found)
         expected = {"b": "True or False", "f": "a number that fits"}.get(array.dtype.kind, "a whole number that fits")
         fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
-        raise ProblemError(f"{name}{where} is {value}: must be {expected}{fits}" + f", in {unit}" * bool(unit))
+        raise refused(f"{name}{where}", f" is {value}: must be {expected}{fits}" + f", in {unit}" * bool(unit))
 
 
 def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ...] | None:
@@ -372,15 +374,15 @@ def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ..
 def _refuse_others(name: str, values: NDArray[Any]) -> None:
     """Refuse entries of an array of objects that NumPy converts although they are no numbers: texts, None, spans."""
     if any(issubclass(kind, _NO_NUMBERS) for kind in set(map(type, values.flat))):
-        place, value = next((at, one) for at, one in np.ndenumerate(values) if isinstance(one, _NO_NUMBERS))
+        place, value = next((at, entry) for at, entry in np.ndenumerate(values) if isinstance(entry, _NO_NUMBERS))
         where = f"[{', '.join(map(str, place))}]" if place else ""
-        raise ProblemError(f"{name}{where} is {shown(value)}: must be a number")
+        raise refused(f"{name}{where}", f" is {shown(value)}: must be a number")
 
 
 def _refuse_repeated(name: str, values: object) -> None:
     """Refuse a broadcast array whose copy would exceed the memory limit."""
     if isinstance(values, np.ndarray) and values.size > _MOST_REPEATED and 0 in values.strides:
-        raise ProblemError(f"{name} holds {values.size} values, repeated: must be at most {_MOST_REPEATED}")
+        raise refused(name, f" holds {values.size} values, repeated: must be at most {_MOST_REPEATED}")
 
 
 def finite_numbers(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.float64]:
@@ -389,7 +391,7 @@ def finite_numbers(name: str, values: ArrayLike, unit: str | None = None) -> NDA
     if not np.isfinite(array).all():
         place = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
         where = f"[{', '.join(map(str, place))}]" if place else ""
-        raise ProblemError(f"{name}{where} is {shown(array[place].item())}: must be finite")
+        raise refused(f"{name}{where}", f" is {shown(array[place].item())}: must be finite")
     return array
 
 
@@ -397,7 +399,7 @@ def column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = No
     """Return a contiguous array of one dimension; refuse values that the conversion would change."""
     array = numbers(name, values, dtype, unit)
     if array.ndim != 1:
-        raise ProblemError(f"{name} has {array.ndim} dimensions: must have one")
+        raise refused(name, f" has {array.ndim} dimensions: must have one")
     return array
 
 
@@ -415,11 +417,11 @@ def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
     if index.size == 0 and index.ndim == 1 and index.dtype.kind in "fi":
         return index.astype(np.int64)
     if index.ndim != 1 or index.dtype.kind not in "biu":
-        raise ProblemError(f"{name}[{shown(chosen)}]: choose by a slice, a mask or whole numbers")
+        raise refused(name, f"[{shown(chosen)}]: choose by a slice, a mask or whole numbers")
     if index.dtype.kind == "b" and len(index) != length:
-        raise ProblemError(f"{name}: the mask has {len(index)} entries, must have {length}")
+        raise refused(name, f": the mask has {len(index)} entries, must have {length}")
     if index.dtype.kind != "b" and not (-length <= index.min() and index.max() < length):
-        raise ProblemError(f"{name}: rows {index.min()} to {index.max()} are asked for, there are 0 to {length - 1}")
+        raise refused(name, f": rows {index.min()} to {index.max()} are asked for, there are 0 to {length - 1}")
     return index
 
 
@@ -443,12 +445,12 @@ def nth(what: str, chosen: SupportsIndex, length: int) -> int:
 def buffer_bytes(data: object) -> NDArray[np.uint8]:
     """Return the bytes of anything with a contiguous buffer, without a copy."""
     if isinstance(data, np.ndarray) and data.dtype != np.uint8:
-        raise ProblemError(f"data is an array of {data.dtype}: must be bytes or uint8")
+        raise refused("data", f" is an array of {data.dtype}: must be bytes or uint8")
     try:
         view = memoryview(data)  # type: ignore[arg-type]
         return np.frombuffer(view.cast("B"), np.uint8) if view.nbytes else np.empty(0, np.uint8)
     except (TypeError, ValueError, BufferError):
-        raise ProblemError(f"data is {shown(data)}: must be bytes, or anything with a contiguous buffer") from None
+        raise refused("data", f" is {shown(data)}: must be bytes, or anything with a contiguous buffer") from None
 
 
 def fields(records: object, required: tuple[str, ...]) -> tuple[str, ...]:
@@ -458,7 +460,7 @@ def fields(records: object, required: tuple[str, ...]) -> tuple[str, ...]:
     names = (dtype.names if isinstance(dtype, np.dtype) else None) or ()
     missing = [name for name in required if name not in names]
     if missing:
-        raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
+        raise refused("records", f" have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
     return tuple(names)
 
 
@@ -472,7 +474,7 @@ def parameters(values: Mapping[str, object]) -> str:
         if isinstance(value, Mapping | list | tuple | np.ndarray):
             left -= value.size if isinstance(value, np.ndarray) else len(value)
             if left < 0:
-                raise ProblemError(f"{name} is {shown(value)}: must have at most {_MOST} entries")
+                raise refused(name, f" is {shown(value)}: must have at most {_MOST} entries")
             if depth == DEPTH:
                 raise ProblemError(f"{name[:_SHOWN]}...: must be nested less than {DEPTH} times")
             if isinstance(value, Mapping):

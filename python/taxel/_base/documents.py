@@ -217,8 +217,8 @@ def _check_depth(place: str, value: Any) -> None:
     level = [value]
     for _ in range(_DEPTH + 1):
         inner: list[Any] = []
-        for one in level:
-            entries = one.values() if isinstance(one, dict) else one if isinstance(one, list) else ()
+        for holder in level:
+            entries = holder.values() if isinstance(holder, dict) else holder if isinstance(holder, list) else ()
             # Most lists are long ones of numbers.
             if not {dict, list}.isdisjoint(map(type, entries)):
                 inner += [entry for entry in entries if isinstance(entry, dict | list)]

@@ -278,7 +278,7 @@ def send_numbers(data: Any) -> None:
 
     for block in blocks(data.shape, data.dtype.itemsize, packed_chunk(data)):
         values = np.ascontiguousarray(data[block])
-        send(values.reshape(-1).view(np.uint8), block=[(one.start, one.stop) for one in block], size=values.nbytes)
+        send(values.reshape(-1).view(np.uint8), block=[(side.start, side.stop) for side in block], size=values.nbytes)
 
 
 def send_texts(data: Any) -> None:
@@ -288,8 +288,8 @@ def send_texts(data: Any) -> None:
     packed_chunk(data)
     for block in blocks(data.shape, PIECE >> 10, (1,) * data.ndim):
         values = data.asstr()[block]
-        texts = [one.encode() for one in ([values] if data.ndim == 0 else values.flat)]
-        send(*texts, lengths=[len(one) for one in texts])
+        texts = [string.encode() for string in ([values] if data.ndim == 0 else values.flat)]
+        send(*texts, lengths=[len(text) for text in texts])
 
 
 if __name__ == "__main__":

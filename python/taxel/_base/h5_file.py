@@ -159,9 +159,10 @@ class H5File:
         ------
         FormatError : more bytes than a file may hold
         """
-        there = {name: one for name in names if (one := self.entries[name]).is_numbers}
+        there = {name: entry for name in names if (entry := self.entries[name]).is_numbers}
         sizes = (
-            math.prod(one.shape) * np.dtype((dtypes or {}).get(name, one.dtype)).itemsize for name, one in there.items()
+            math.prod(entry.shape) * np.dtype((dtypes or {}).get(name, entry.dtype)).itemsize
+            for name, entry in there.items()
         )
         unpacked(str(self.path), sum(sizes))
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from taxel._base.errors import helped
 from taxel._core import FormatError
 
 __all__ = [
@@ -158,9 +159,9 @@ def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
     else:
         bound, why = _most() if room is None else room.most, " (3/4 of the memory that is available)"
     if whole > bound:
+        error = FormatError(f"{place}: claims {whole} bytes, unpacked; at most {bound} are read{why}")
         # What is read outside an opening has no such option.
-        advice = "" if room is None else ": --limit BYTES (limit=) says how many may be"
-        raise FormatError(f"{place}: claims {whole} bytes, unpacked; at most {bound} are read{why}{advice}")
+        raise error if room is None else helped(error, "limit", "larger")
 
 
 def _most() -> int:

@@ -2,8 +2,8 @@
 
 Names in files of strangers may hold control characters, which move a terminal's cursor, or reverse the order of what is
 read. Files and JSON keep such names; what people read shows them escaped. The places where text leaves taxel escape it,
-so that no message has to: `taxel.Error` and `warn` (here), `taxel.cli.say`, the `Console` of `taxel.cli.console`, the
-pages of reports, and the page's `dom.js`. A `__repr__` that shows a text escapes it itself.
+so that no message has to: `taxel.Error` (in `errors`), `warn` (here), `taxel.cli.say`, the `Console` of
+`taxel.cli.console`, the pages of reports, and the page's `dom.js`. A `__repr__` that shows a text escapes it itself.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-
-from taxel._core import Error
 
 __all__ = ["collected", "counted", "escaped", "escaped_lines", "first_line", "installing", "plain", "warn"]
 
@@ -72,16 +70,6 @@ def warn(text: str, category: type[Warning] = UserWarning, *, stacklevel: int = 
         texts += [] if escaped(text) in texts else [escaped(text)]
         return
     warnings.warn(escaped(text), category, stacklevel=stacklevel + 1)  # noqa: TID251  the place where it is allowed
-
-
-def _shown(error: Error) -> str:
-    """Return the text of an error: one line, and below it the lines that it gives to be copied, if there are any."""
-    line, *below = error.args or ("",)
-    return "\n".join([escaped(line), *map(escaped_lines, below)])
-
-
-# The class is of the core; it needs Python 3.12 to have a method of its own there.
-Error.__str__ = _shown  # type: ignore[method-assign, assignment]
 
 
 def counted(count: int, noun: str, plural: str | None = None) -> str:

@@ -16,15 +16,15 @@ _Options = TypeVar("_Options")
 _Result = TypeVar("_Result")
 
 
-def option(default: Any, about: str, *, least: float | None = None, most: float | None = None) -> Any:
-    """Return a field with its default, its description, and the range of its values."""
-    return field(default=default, metadata={"help": about, "min": least, "max": most})
+def option(default: Any, about: str, *, least: float | None = None, most: float | None = None, **typed: str) -> Any:
+    """Return a field with its default, its description, the range of its values, and how it is `typed`."""
+    return field(default=default, metadata={"help": about, "min": least, "max": most, "typed": typed})
 
 
 def about(options: Any, name: str) -> dict[str, Any]:
     """Return the description and the range of an option, for the command line: help, min, max."""
     metadata = {one.name: one.metadata for one in fields(options)}[name]
-    return {key: value for key, value in metadata.items() if value is not None}
+    return {key: value for key, value in metadata.items() if value is not None and key != "typed"}
 
 
 def with_options(options: Callable[_P, _Options]) -> Callable[[Callable[[_Options], _Result]], Callable[_P, _Result]]:

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self
 
 from taxel import _core
 from taxel._base.arguments import bare, flag, instance, parameters, shown
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 
 __all__ = ["Parameters", "Value", "defaults", "described", "ranges"]
@@ -156,7 +157,7 @@ class Parameters:
             held: Any = changes.get(name, getattr(self, name))
             held = self._stands_for(name) if held is None else held
             if not hasattr(held, "set_params") or isinstance(held, type):
-                raise ProblemError(f"{name} is {shown(held)}: has no parameter {next(iter(values))!r}")
+                raise refused(name, f" is {shown(held)}: has no parameter {next(iter(values))!r}")
             changes[name] = copy.copy(held).set_params(**values)
         before = self._values()
         try:

@@ -2,34 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from time import perf_counter
 from typing import TypeAlias
 
 from taxel._base.arguments import callback
 
-__all__ = ["Progress", "Steps", "lines_to"]
+__all__ = ["Progress", "Steps", "reporting"]
 
 #: Called with what is done next, how much of it is done, and all of it (0 if that is not known).
 Progress: TypeAlias = Callable[[str, int, int], object]
 
 
-#: The line of `taxel.detect.judge` before a fold.
-_FOLD = re.compile(r"fold (\d+) of (\d+)")
-
-
-def lines_to(progress: Progress | None) -> Callable[[str], object]:
-    """Return what the steps of `taxel.detect` call with their line; folds are counted."""
-    if progress is None:
-        return lambda _: None
-    show = callback("progress", progress)
-
-    def line(step: str) -> None:
-        fold = _FOLD.fullmatch(step)
-        show(step, int(fold[1]) - 1 if fold else 0, int(fold[2]) if fold else 0)
-
-    return line
+def reporting(progress: Progress | None) -> Progress:
+    """Return a caller's function, which must be one, or for None one that does nothing."""
+    return (lambda *_: None) if progress is None else callback("progress", progress)
 
 
 class Steps:

@@ -83,7 +83,7 @@ def leave(code: int | str | None) -> NoReturn:
     the thread inside compiled code that called Python, which aborts the process. A request of the panel's page may be
     such a thread.
     """
-    known = {one.ident for one in threading.enumerate() if not isinstance(one, threading._DummyThread)}
+    known = {thread.ident for thread in threading.enumerate() if not isinstance(thread, threading._DummyThread)}
     if not isinstance(code, int) or set(sys._current_frames()) <= known:
         sys.exit(code)
     atexit._run_exitfuncs()

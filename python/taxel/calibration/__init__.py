@@ -17,6 +17,7 @@ from taxel._base.arguments import flag, instance, mapping, number, numbers, seve
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.documents import object_of_json
+from taxel._base.errors import refused
 from taxel._base.files import beside, named
 from taxel._base.messages import counted, escaped, first_line
 from taxel._base.saved import Saved
@@ -97,12 +98,12 @@ class Calibration(Saved):
         made.array, made._curve = instance("array", array, Array), curve
         made.unit, made.of = checked_text("unit", unit, UNITS), checked_text("of", of)
         if not of or of in UNITS:
-            raise ProblemError(f"of is {of!r}: must say what is read: ticks, counts")
+            raise refused("of", f" is {of!r}: must say what is read: ticks, counts")
         if isinstance(curve, Table) and curve.x.ndim == 3 and curve.x.shape[1:] != array.shape:
-            raise ProblemError(f"readings are of {curve.x.shape[1:]} taxels: the array has {array.shape}")
+            raise refused("readings", f" are of {curve.x.shape[1:]} taxels: the array has {array.shape}")
         made.gain = _by_taxel("gain", how.get("gain", 1.0), array)
         if not (np.isfinite(made.gain) & (made.gain > 0)).all():
-            raise ProblemError("gain: must be above 0 and finite at every taxel")
+            raise refused("gain", ": must be above 0 and finite at every taxel")
         rest = how.get("rest")
         if isinstance(rest, Tare):
             same(array, rest.array, "the tare")
@@ -110,7 +111,7 @@ class Calibration(Saved):
         made.rest = None if rest is None else _by_taxel("rest", rest, array)
         made.floor = number("floor", how.get("floor", 0.0))
         if not 0 <= made.floor < math.inf:
-            raise ProblemError(f"floor is {made.floor}: must be 0 or more")
+            raise refused("floor", f" is {made.floor}: must be 0 or more")
         made.date = _iso(how.get("date"))
         residual = how.get("residual")
         made.residual = None if residual is None else number("residual", residual)
@@ -275,7 +276,7 @@ class Calibration(Saved):
         checked_text("unit", unit, UNITS)
         measured = [instance("loads", load, Load) for load in several("loads", loads)]
         if not measured:
-            raise ProblemError("loads is empty: lay at least one known load on the array")
+            raise refused("loads", " is empty: lay at least one known load on the array")
         array, of = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
         curve: Curve = Power(1.0)
         if start is not None:
@@ -294,8 +295,8 @@ class Calibration(Saved):
             curve = curve.bent(best_exponent(curve, laid))
         each_gain, gain = gains(array, curve, laid, flag("each", each))
         whole_fit._curve, whole_fit.gain = curve, each_gain
-        made = [one.made(curve, each_gain) for one in laid]
-        missed = np.concatenate([one.errors(curve, each_gain) for one in laid])
+        made = [loading.made(curve, each_gain) for loading in laid]
+        missed = np.concatenate([loading.errors(curve, each_gain) for loading in laid])
         unknown = 1 + (differ and exponent is None and not isinstance(curve, Table))
         unknown += int(np.count_nonzero(each_gain[there(array)] != gain)) if each else 0
         whole_fit.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
@@ -352,7 +353,7 @@ class Calibration(Saved):
             same(self.array, rest.array, "the tare")
             rest = rest.rest
         elif rest is not None and np.isnan(numbers("rest", rest, np.float64)).any():
-            raise ProblemError("rest holds NaN: must be finite; give a Tare where the rest of a taxel is not known")
+            raise refused("rest", " holds NaN: must be finite; give a Tare where the rest of a taxel is not known")
         if rest is not None:
             return _by_taxel("rest", rest, self.array)
         if self.rest is not None:
@@ -411,7 +412,7 @@ class Calibration(Saved):
         FormatError : no calibration (names the entry)
         """
         if not isinstance(text, str):
-            raise ProblemError(f"calibration is {shown(text)}: must be JSON text")
+            raise refused("calibration", f" is {shown(text)}: must be JSON text")
         entry = "the whole"
         try:
             document = object_of_json("calibration", text)
@@ -457,8 +458,8 @@ class Calibration(Saved):
         True
         """
         place = Path(checked_path("recording", recording))
-        own = f"{named(place).stem}.calibration.json"
-        return next((file for name in (own, "calibration.json") if (file := beside(place, name)).is_file()), None)
+        by_name = f"{named(place).stem}.calibration.json"
+        return next((file for name in (by_name, "calibration.json") if (file := beside(place, name)).is_file()), None)
 
     def described(self) -> str:
         """Return what it is in a line: the curve, its day, its residual."""
@@ -485,11 +486,11 @@ def _32_bits(values: Values) -> NDArray[np.float32]:
 def _by_taxel(name: str, value: Any, array: Array) -> Values:
     values = numbers(name, value, np.float64)
     if isinstance(value, bool):
-        raise ProblemError(f"{name} is {value}: must be a number, or {array.shape}")
+        raise refused(name, f" is {value}: must be a number, or {array.shape}")
     if values.shape not in ((), array.shape):
-        raise ProblemError(f"{name} has shape {values.shape}: must be a number, or {array.shape}")
+        raise refused(name, f" has shape {values.shape}: must be a number, or {array.shape}")
     if np.isinf(values).any():
-        raise ProblemError(f"{name}: must be finite")
+        raise refused(name, ": must be finite")
     every = np.broadcast_to(values, array.shape).copy()
     every.setflags(write=False)
     return every
@@ -502,4 +503,4 @@ def _iso(value: object) -> str:
     try:
         return day.fromisoformat(written).isoformat()
     except ValueError:
-        raise ProblemError(f"date is {shown(written)}: must be a day as 2026-11-21") from None
+        raise refused("date", f" is {shown(written)}: must be a day as 2026-11-21") from None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, mapping, number, numbers, parameters, shown
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 
@@ -108,7 +109,7 @@ class Table:
         return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}
 
     def bent(self, exponent: float) -> Table:  # noqa: ARG002  what a curve with an exponent takes
-        raise ProblemError("exponent: a table has none; its gain alone is fitted")
+        raise refused("exponent", ": a table has none; its gain alone is fitted")
 
 
 class Law:
@@ -117,7 +118,7 @@ class Law:
     def __init__(self, ramp: object, unit: str, **sensor: object) -> None:
         self.ramp, self.unit = above_0("ramp", ramp), unit
         if self.ramp > 65_535:
-            raise ProblemError(f"ramp is {self.ramp:g} ticks: must be 65535 or less")
+            raise refused("ramp", f" is {self.ramp:g} ticks: must be 65535 or less")
         try:
             self.sensor: dict[str, float] = _core.check_law(parameters(sensor))
         except _core.SceneError as error:
@@ -130,9 +131,9 @@ class Law:
         return _core.law_rest(self.text, self.ramp)
 
     def _of(self, inputs: Values, rest: Values, back: bool) -> Values:
-        both = np.broadcast_arrays(inputs, rest)
-        values, at_rest = (np.ascontiguousarray(column, np.float64).ravel() for column in both)
-        return _core.law_of(self.text, self.ramp, values, at_rest, back).reshape(both[0].shape)
+        columns = np.broadcast_arrays(inputs, rest)
+        values, at_rest = (np.ascontiguousarray(column, np.float64).ravel() for column in columns)
+        return _core.law_of(self.text, self.ramp, values, at_rest, back).reshape(columns[0].shape)
 
     def values(self, readings: Values, rest: Values) -> Values:
         return self.share * self._of(readings, rest, back=False)
@@ -167,5 +168,5 @@ def curve_of(document: Mapping[str, Any], unit: str) -> Curve:
 def above_0(name: str, value: object) -> float:
     checked = number(name, value)
     if not 0 < checked < math.inf:
-        raise ProblemError(f"{name} is {shown(value)}: must be above 0 and finite")
+        raise refused(name, f" is {shown(value)}: must be above 0 and finite")
     return checked

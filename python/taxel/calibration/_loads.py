@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, whole
 from taxel._base.arguments import text as checked_text
+from taxel._base.errors import refused
 from taxel._base.messages import warn
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -132,11 +133,11 @@ def best_exponent(curve: Curve, laid: Sequence[Laid]) -> float:
     """Return the exponent whose best gain has the least squares of relative error."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415  loads slowly
 
-    loads = [one.load for one in laid]
+    loads = [loading.load for loading in laid]
 
     def missed(log: float) -> float:
         bent = curve.bent(math.exp(log))
-        return _least([one.made(bent) for one in laid], loads)[1]
+        return _least([loading.made(bent) for loading in laid], loads)[1]
 
     # A grid comes first, as the squares may have several minima.
     grid = np.linspace(math.log(_EXPONENTS[0]), math.log(_EXPONENTS[1]), 33)
@@ -144,7 +145,7 @@ def best_exponent(curve: Curve, laid: Sequence[Laid]) -> float:
     valleys = np.flatnonzero((miss[1:-1] <= miss[:-2]) & (miss[1:-1] < miss[2:]))
     around = [(grid[max(0, k - 1)], grid[min(len(grid) - 1, k + 1)]) for k in map(int, valleys)]
     minima = [minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 1e-9}) for bounds in around]
-    best, *others = sorted((float(one.fun), math.exp(float(one.x))) for one in minima)
+    best, *others = sorted((float(minimum.fun), math.exp(float(minimum.x))) for minimum in minima)
     alike = [exponent for squares, exponent in others if squares <= max(4.0 * best[0], _ALIKE**2)]
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
@@ -158,13 +159,13 @@ def best_exponent(curve: Curve, laid: Sequence[Laid]) -> float:
 
 def gains(array: Array, curve: Curve, laid: Sequence[Laid], each: bool) -> tuple[Values, float]:
     """Return the gain of each taxel, and the common one."""
-    common, _ = _least([one.made(curve) for one in laid], [one.load for one in laid])
+    common, _ = _least([loading.made(curve) for loading in laid], [loading.load for loading in laid])
     every = np.full(array.shape, common)
     if not each:
         return every, common
-    if not any(one.alone for one in laid):
-        raise ProblemError("each: no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
-    share = np.array([one.by_taxel(curve) / one.load for one in laid if one.alone])
+    if not any(loading.alone for loading in laid):
+        raise refused("each", ": no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
+    share = np.array([loading.by_taxel(curve) / loading.load for loading in laid if loading.alone])
     squares = (share**2).sum(axis=0)
     np.divide(share.sum(axis=0), squares, out=every, where=squares > 0)
     return every, common
@@ -175,10 +176,10 @@ def there(array: Array) -> NDArray[np.bool_]:
     return np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists)
 
 
-def same(own: Array, other: Array, what: str, unit: str | None = None, expected: str | None = None) -> None:
+def same(calibrated: Array, given: Array, what: str, unit: str | None = None, expected: str | None = None) -> None:
     """Refuse what has other taxels, or another unit; warn of another pitch."""
-    if not own.fits(other):
-        raise ProblemError(f"{what}: of {other!r}; the calibration is of another array, {own!r}")
-    own._warn_apart(other, what, stacklevel=3)
+    if not calibrated.fits(given):
+        raise ProblemError(f"{what}: of {given!r}; the calibration is of another array, {calibrated!r}")
+    calibrated._warn_apart(given, what, stacklevel=3)
     if unit != expected:
         raise ProblemError(f"{what}: in {unit}; the calibration takes {expected}")

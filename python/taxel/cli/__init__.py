@@ -6,17 +6,20 @@ SIGHUP.
 
 from __future__ import annotations
 
+import contextlib
 import os
-import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
 
+from taxel._base.arguments import finite, shown, whole
 from taxel._base.child_process import make_safe
+from taxel._base.number_text import float_of
 from taxel._base.stopping import leave, stop_on_signals
-from taxel._core import DeviceError, Error
+from taxel._core import DeviceError, Error, ProblemError
 from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App
 from taxel.cli._commands import Commands
 from taxel.cli._recordings import SET_HELP, assignments
@@ -31,6 +34,9 @@ app = App(
     no_args_is_help=True,
     epilog="Begin with: taxel demo. Pages by what you have are in docs/ of the repository, from docs/start.md on.",
 )
+
+#: What checks numbers that the parser refuses.
+_CHECKS: dict[Any, Callable[..., object]] = {int: whole, float: finite}
 
 #: typer's error for a command line that cannot be parsed; the class belongs to its own copy of click.
 _UsageError: Any = typer.BadParameter.__base__
@@ -63,7 +69,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         code = app(arguments, prog_name="taxel", standalone_mode=False)
     except _UsageError as error:
         if not str(error.format_message()).startswith("Usage:"):
-            _end(f"{_plain(error)}; see {_typed(error.ctx)} --help", WRONG_INPUT)
+            _end(_plain(error), WRONG_INPUT)
         # Without a command, the help is printed.
         say(*error.format_message().split("\n"), err=True)
         sys.exit(WRONG_INPUT)
@@ -87,34 +93,33 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 
 def _plain(error: Any) -> str:
-    """Return a message of the parser in the form of our own messages, with the value that was typed."""
-    message = re.sub(
-        r"^Invalid value for '?(.+?)'?: ", lambda m: f"{m[1]}{_given(error)}: ", str(error.format_message())
-    )
-    message = re.sub(
-        r"^Missing (?:argument|option|parameter) '(.+?)'.*", lambda m: f"{_upper(m[1])} is missing", message
-    )
-    message = re.sub(r"^Option '(.+?)' requires an argument", r"\1: needs a value", message)
-    message = message.replace("Input should be", "must be").rstrip(".")
-    return re.sub(r"must be a valid (\w+)(, .*)?$", lambda m: f"must be {_NUMBERS.get(m[1], m[1])}", message)
+    """Return what is wrong with a command line: in the words of our own checks where a value is."""
+    parameter = getattr(error, "param", None)
+    if parameter is not None:
+        name = max(parameter.opts, key=len) if parameter.param_type_name == "option" else parameter.name.upper()
+        faults = getattr(error.__cause__, "errors", None)
+        if faults is not None:
+            return _value(name, parameter, faults()[0])
+        line = f"{name} is missing" if hasattr(error, "param_type") else f"{name}: {error.message}"
+    elif hasattr(error, "option_name") and not hasattr(error, "possibilities"):
+        line = f"{error.option_name}: needs a value"
+    else:
+        line = error.format_message()
+    return f"{line.rstrip('.')}; see {_typed(error.ctx)} --help"
 
 
-def _given(error: Any) -> str:
-    """Return the value that was typed, after a blank, where the parser's message leaves it out."""
-    checked = getattr(error.__cause__, "errors", None)
-    if checked is None:
-        return ""
-    value = str(checked()[0]["input"])
-    shown = value if value.isprintable() and value.split() == [value] else repr(value)
-    return "" if f"'{value}'" in error.message else f" {shown[:60]}{' ...' * (len(shown) > 60)}"
-
-
-#: The parser's names of number types, and how our own messages name them.
-_NUMBERS = {"number": "a number", "integer": "a whole number"}
-
-
-def _upper(word: str) -> str:
-    return word if word.startswith("-") else word.upper()
+def _value(name: str, parameter: Any, fault: dict[str, Any]) -> str:
+    """Return why the parser refuses a value: the checks of all arguments say it of numbers."""
+    value, check = fault["input"], _CHECKS.get(parameter.type_descriptor.annotation)
+    if check is not None:
+        with contextlib.suppress(ValueError, TypeError):
+            value = float_of(value)
+        limits = {key: end for key, end in (("least", parameter.min), ("most", parameter.max)) if end is not None}
+        try:
+            check(name, value, **limits)
+        except ProblemError as error:
+            return str(error)
+    return f"{name} is {shown(value)}: {fault['msg'].replace('Input should be', 'must be')}"
 
 
 def _typed(context: Any) -> str:

@@ -18,6 +18,9 @@ from taxel._core import Error, ProblemError
 
 __all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "with_out", "with_typed"]
 
+#: Arguments of Python that are typed as another option.
+_TYPED_AS = {"registers": "preset"}
+
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
 _Typed = TypeVar("_Typed")
 
@@ -48,51 +51,30 @@ class _Command(TyperCommand):
         try:
             return super().invoke(ctx)
         except Error as error:
-            line, *below = error.args or ("",)
-            raise type(error)(self._as_typed(str(line)), *below) from error
+            if error.argument is not None:
+                error.argument = self._typed(error.argument, with_value=error.hint is not None)
+            raise
         except FileExistsError as error:
             if error.filename is None:
                 raise
             replace = "give --overwrite, or name another" if "overwrite" in self._options() else "name another"
             raise FileExistsError(errno.EEXIST, f"exists already; {replace}", error.filename) from error
 
-    def _options(self) -> dict[str, str]:
-        """Return what is typed for each parameter: --readout-events for readout_events, FILE for file."""
-        return {
-            p.name: max(p.opts, key=len) if p.param_type_name == "option" else p.name.upper()
-            for p in self.params
-            if p.name is not None
-        }
+    def _options(self) -> dict[str, Any]:
+        """Return the options and arguments by the name of what they are in Python."""
+        options = {p.name: p for p in self.params if p.name is not None and "--set" not in p.opts}
+        return options | {python: options[name] for python, name in _TYPED_AS.items() if name in options}
 
-    def _as_typed(self, text: str) -> str:
-        """Return an error's text with the option in place of Python's argument."""
-        options = self._options()
-        # The argument `registers` can be typed as a preset only.
-        options |= {"registers": options["preset"]} if "preset" in options else {}
-        first = re.match(r"(\w+)(?=: | is )", text)
-        if first and first[1] in options:
-            text = options[first[1]] + text[first.end() :]
-        if "tare" in options:
-            text = re.sub(r"without a tare: .*", "without the taxels' rest: give --tare SECONDS or --tare FILE", text)
-        if "rate_hz" in options:
-            text = text.replace(", says what it is", f", or {options['rate_hz']} HZ, says what it is")
-        if "--set" in options.values():
-            text = re.sub(r"^(encoder \w+: (\w+) is missing)$", r"\1; give --set \2=...", text)
-            text = re.sub(r"( ([\d.]+) ms after the last: .* period_ms, .*)$", r"\1; give --set period_ms=\2", text)
-        return f"{text}{_laid_out(text)}" if "array" in options else text
-
-
-def _laid_out(text: str) -> str:
-    """Return what an error lacks that refuses a row of channels: the option that lays them out; else ""."""
-    option = "; give --array {}, or rows and columns in a layout file, if they are a grid's taxels row by row"
-    if re.search(r"\d+ x \d+ channels without a pitch$", text):
-        return option.format("ROWSxCOLUMNS")
-    trained = re.search(r"an array of 1 x (\d+) taxels: the readout was trained on (\d+) x (\d+)$", text)
-    if trained and int(trained[1]) == int(trained[2]) * int(trained[3]):
-        if trained[2] == "1":
-            return f"; give --array 1x{trained[3]}xMM, MM the distance of the channels, or pitch_mm in a layout file"
-        return option.format(f"{trained[2]}x{trained[3]}")
-    return ""
+    def _typed(self, argument: str, *, with_value: bool) -> str:
+        """Return what is typed for an argument of Python: --readout-events for readout_events, FILE for file."""
+        found = self._options().get(argument)
+        if found is None:
+            # Parameters of an encoder or a recipe have no options of their own.
+            takes_parameters = any("--set" in p.opts for p in self.params)
+            return f"--set {argument}{'=VALUE' * with_value}" if takes_parameters else argument
+        if found.param_type_name != "option":
+            return argument.upper()
+        return str(max(found.opts, key=len)) + (f" {found.metavar}" if with_value and found.metavar else "")
 
 
 class App(typer.Typer):

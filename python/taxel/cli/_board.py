@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+import functools
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import Field, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,54 +16,31 @@ from rich.table import Table
 from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
-from taxel.array import Array
+from taxel.array import Array, of_size
 from taxel.cli._app import OUTSIDE, WRONG_INPUT
+from taxel.detect import load
 from taxel.live import Remote, Summary, delays
-from taxel.live.options import LiveOptions
+from taxel.live._stated_options import StatedOptions
 from taxel.tare import Tare
 from taxel.wire import Registers
 
 __all__ = [
     "REDRAW_S",
-    "ArrayOption",
     "BitsOption",
-    "CompressionOption",
     "CongestionOption",
-    "DifferencesOption",
-    "FromOption",
-    "GuardFramesOption",
-    "HostOption",
-    "NameOption",
-    "OverwriteOption",
-    "PortOption",
-    "PresetOption",
     "RateOption",
-    "ReadoutOption",
-    "RecordOption",
-    "SendOption",
-    "SourceOption",
-    "TareOption",
     "counters_table",
     "exit_code",
+    "for_live",
     "outside",
     "remote",
-    "rest_of",
-    "stated_registers",
+    "with_live_options",
 ]
 
 #: Interval at which the display is redrawn and the end is checked, s.
 REDRAW_S = 0.1
 
 
-def live_option(name: str, *flags: str, metavar: str | None = None) -> Any:
-    """Return the option of the command line that sets an option of `Live`: its text and range."""
-    return typer.Option(*flags, metavar=metavar, **about(LiveOptions, name))
-
-
-PortOption = Annotated[int, live_option("port")]
-HostOption = Annotated[str, live_option("host")]
-ArrayOption = Annotated[str | None, live_option("array", metavar="ROWSxCOLUMNS[xMM]")]
-PresetOption = Annotated[str | None, live_option("registers")]
 RateOption = Annotated[
     float | None,
     typer.Option(
@@ -72,18 +52,6 @@ RateOption = Annotated[
 BitsOption = Annotated[
     int | None, typer.Option(min=1, max=16, help="With --rate-hz: bits of the sensor's values, as of the Source.")
 ]
-DifferencesOption = Annotated[bool, live_option("differences", "--differences")]
-TareOption = Annotated[str | None, typer.Option(help=about(LiveOptions, "tare")["help"])]
-RecordOption = Annotated[Path | None, live_option("record")]
-CompressionOption = Annotated[str, live_option("compression")]
-NameOption = Annotated[str, live_option("name")]
-SourceOption = Annotated[list[str] | None, live_option("sources", metavar="NAME=WHAT")]
-OverwriteOption = Annotated[bool, live_option("overwrite", "--overwrite")]
-GuardFramesOption = Annotated[float, live_option("guard_frames")]
-SendOption = Annotated[list[str] | None, live_option("send", metavar="WHERE")]
-ReadoutOption = Annotated[Path | None, live_option("readout")]
-FromOption = Annotated[str | None, live_option("remote", "--from", metavar="ADDRESS")]
-
 CongestionOption = Annotated[
     str | None,
     typer.Option(
@@ -93,7 +61,61 @@ CongestionOption = Annotated[
 ]
 
 
-def stated_registers(
+#: Types of options of `Live` that are typed as they are.
+_TYPES = {"int": int, "float": float, "bool": bool, "str": str}
+
+
+def _parameter(one: Field[Any]) -> inspect.Parameter:
+    """Return the option of the command line that sets an option of `Live`."""
+    words, kind, described = one.metadata["typed"], str(one.type), about(StatedOptions, one.name)
+    flag = words.get("flag", "--" + one.name.replace("_", "-"))
+    help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
+    read, default = _TYPES.get(kind, str | None), one.default if kind in _TYPES else None
+    if "PathLike" in kind:
+        read = Path | None
+    elif "Sequence" in kind or "Mapping" in kind:
+        read = list[str] | None
+    option = typer.Option(flag, metavar=words.get("metavar"), help=help_, **described)
+    return inspect.Parameter(
+        one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[read, option]
+    )
+
+
+def with_live_options(command: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that gives a command the options of `Live` that it has, in its argument `options`, by name."""
+    chosen = [one for one in fields(StatedOptions) if command in one.metadata["typed"].get("commands", "live").split()]
+
+    def decorate(work: Callable[..., None]) -> Callable[..., None]:
+        def call(**typed: Any) -> None:
+            options = {one.name: typed.pop(one.name) for one in chosen}
+            work(options=options, **typed)
+
+        functools.update_wrapper(call, work)
+        signature = inspect.signature(work, eval_str=True)
+        parameters: list[inspect.Parameter] = []
+        for parameter in signature.parameters.values():
+            parameters += map(_parameter, chosen) if parameter.name == "options" else [parameter]
+        every = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
+        call.__signature__ = signature.replace(parameters=every)  # type: ignore[attr-defined]
+        call.__annotations__ = {}  # those of `work`, which the signature replaces
+        return call
+
+    return decorate
+
+
+def for_live(options: dict[str, Any], rate_hz: float | None = None, bits: int | None = None) -> dict[str, Any]:
+    """Return typed options as `Live` takes them: files are read; `remote` stays an address."""
+    readout, size = options.get("readout"), options["array"]
+    trained = None if readout is None else load(readout)
+    # The wire's pitch is that of the board; a sensor of one's own has the one that is stated, or none.
+    array = None if size is None else of_size(size, of_wire=rate_hz is None)
+    sensor = trained.array if array is None and trained is not None else array
+    registers = _registers(options["registers"], rate_hz, bits, options.get("remote"), sensor)
+    read = {"readout": trained, "array": array, "registers": registers, "tare": _rest(options.get("tare"))}
+    return options | read | {"send": options.get("send") or ()}
+
+
+def _registers(
     preset: str | None, rate_hz: float | None, bits: int | None, address: str | None, array: Array | None
 ) -> str | Registers | None:
     """Return the registers that the options state, of a sensor of this array; None if they state none."""
@@ -118,7 +140,7 @@ def remote(
     return Remote(address, congestion=congestion or ("block" if lossless else "drop"))
 
 
-def rest_of(value: str | None) -> Tare | float | None:
+def _rest(value: str | None) -> Tare | float | None:
     """Return what --tare names: the tare of a file, or how long to take a fresh one, s."""
     if value is None:
         return None
@@ -169,7 +191,7 @@ def _bridged(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
         return []
     if counts["ended"]:
         state = "ended there; waiting for another"
-    elif counts["heard"]:
+    elif counts["received"]:
         state = "connected"
     else:
         state = "SILENT: the other computer, or the network to it, is gone; waiting"

@@ -61,7 +61,9 @@ class FileOptions:
     ] = None
     rate_hz: Annotated[
         float | None,
-        typer.Option(help="Pictures a second, for recordings without times, whose pictures are numbered."),
+        typer.Option(
+            metavar="HZ", help="Pictures a second, for recordings without times, whose pictures are numbered."
+        ),
     ] = None
     limit: Annotated[
         int | None,

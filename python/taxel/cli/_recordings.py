@@ -9,6 +9,8 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from taxel._base.arguments import short
 from taxel._base.documents import NotTomlError, of_toml
 from taxel._base.files import try_whole
@@ -26,8 +28,13 @@ _REPORT_S = (2.0, 8.0, 20.0, 30.0)
 
 #: What every command that works on recordings reads.
 READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of another maker"
-TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest at the beginning of the recording."
 SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
+
+
+def tare_option(default: str = "") -> Any:
+    """Return the option ``--tare``, with what is taken without it."""
+    about = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest at the beginning of the recording."
+    return typer.Option(metavar="SECONDS|FILE", help=f"{about} {default}".rstrip())
 
 
 def assignments(settings: list[str]) -> dict[str, Any]:

@@ -6,7 +6,6 @@ import contextlib
 import ipaddress
 import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -16,26 +15,18 @@ from rich.text import Text
 
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.array import of_size
 from taxel.cli._app import App, SecondsOption
 from taxel.cli._board import (
     REDRAW_S,
-    ArrayOption,
-    DifferencesOption,
-    HostOption,
-    PortOption,
-    PresetOption,
-    TareOption,
     counters_table,
     exit_code,
-    rest_of,
+    for_live,
+    with_live_options,
 )
 from taxel.cli._say import say
 from taxel.cli.console import Console
-from taxel.detect import load
 from taxel.live import Bridge, Live
 from taxel.live.bridge import PLACE
-from taxel.live.options import LiveOptions
 
 __all__ = ["app", "bridge"]
 
@@ -43,12 +34,9 @@ app = App()
 
 
 @app.command()
+@with_live_options("bridge")
 def bridge(
-    port: PortOption = LiveOptions.port,
-    host: HostOption = LiveOptions.host,
-    array: ArrayOption = None,
-    preset: PresetOption = None,
-    differences: DifferencesOption = LiveOptions.differences,
+    options: dict[str, Any],
     name: Annotated[str, typer.Option(help="The board's name: letters, digits, - _ or .")] = "board",
     listen: Annotated[
         list[str], typer.Option(help="HOST:PORT (TCP) of this computer to listen on; may be repeated.")
@@ -56,11 +44,6 @@ def bridge(
     connect: Annotated[
         list[str] | None, typer.Option(help="HOST:PORT of a Zenoh router to connect to; may be repeated.")
     ] = None,
-    readout: Annotated[
-        Path | None, typer.Option(help="A trained readout or a plain rule (JSON), whose detections are published too.")
-    ] = None,
-    tare: TareOption = None,
-    record: Annotated[Path | None, typer.Option(help="Record here too, in a new file (.mcap or .lsa).")] = None,
     seconds: SecondsOption = None,
     clock_ahead: Annotated[
         float, typer.Option(help="For tests: publish times that are ahead of this computer's clock by this, s.")
@@ -81,21 +64,11 @@ def bridge(
 
     Example: taxel bridge --port 5208 --name left --listen 192.168.1.5:7447
     """
-    if readout is None and tare is not None:
+    if options["readout"] is None and options["tare"] is not None:
         raise ProblemError("--tare belongs to a readout: give --readout FILE")
-    trained = None if readout is None else load(readout)
     console = Console(stderr=True, quiet=as_json)
     with (
-        Live(
-            port,
-            host=host,
-            array=None if array is None else of_size(array),
-            registers=preset,
-            differences=differences,
-            readout=trained,
-            tare=rest_of(tare),
-            record=record,
-        ) as live,
+        Live(**for_live(options)) as live,
         Bridge(
             live,
             name=name,
@@ -165,6 +138,6 @@ def _watch(live: Live, published: Bridge, seconds: float | None, console: Consol
 def _receivers(counts: dict[str, dict[str, Any]]) -> str:
     connected = []
     for what, row in (("recorders", counts["block"]), ("viewers", counts["drop"])):
-        if row["heard"]:
+        if row["subscribed"]:
             connected.append(f"{what} connected; parcels: {row['sent']:,} sent, {row['dropped']:,} dropped")
     return "; ".join(connected) or "no receiver is connected"

@@ -13,7 +13,7 @@ from taxel._base.files import beside, named, try_whole
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, assignments, progress, say_warnings
+from taxel.cli._recordings import assignments, progress, say_warnings, tare_option
 from taxel.cli._say import say
 
 __all__ = ["app", "calibrate"]
@@ -56,7 +56,7 @@ def calibrate(
         bool, typer.Option("--each", help="Fit a gain for each taxel (needs uniform kPa, or loads on single taxels).")
     ] = False,
     exponent: Annotated[float | None, typer.Option(help="The exponent, given instead of fitted.")] = None,
-    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: that of a quiet stretch.")] = None,
+    tare: Annotated[str | None, tare_option("Default: that of a quiet stretch.")] = None,
     date: Annotated[str | None, typer.Option(help="Date of the calibration, as 2026-11-21. Default: today.")] = None,
     note: Annotated[str, typer.Option(help="A note: which sensor, which weights.")] = "",
     out: Annotated[

@@ -78,6 +78,6 @@ def _train(console: Console, place: Path) -> None:
     from taxel.demo.shipped import described, trained  # noqa: PLC0415
 
     with console.status("training") as status:
-        readout = trained(progress=status.update)
+        readout = trained(progress=lambda step, *_: status.update(step))
     readout.save(place)
     console.print(described(readout))

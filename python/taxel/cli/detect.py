@@ -15,7 +15,7 @@ from taxel._base.files import try_whole, write_whole
 from taxel._base.times import begun
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import READ_HELP, TARE_HELP, progress, say_warnings, try_report
+from taxel.cli._recordings import READ_HELP, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
 from taxel.detections import Detections
 from taxel.spikes import to_ms
@@ -40,9 +40,7 @@ def detect(
     recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}, or a folder of them.")],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     files: FileOptions,
-    tare: Annotated[
-        str | None, typer.Option(help=f"{TARE_HELP} Default: 0 of force and pressure, else the first quiet stretch.")
-    ] = None,
+    tare: Annotated[str | None, tare_option("Default: 0 of force and pressure, else the first quiet stretch.")] = None,
     frame_us: Annotated[
         float | None,
         typer.Option(help="Length of the board's frame, us. Default: by the registers or the frames, else 192."),
@@ -53,9 +51,7 @@ def detect(
             help="Score against a CSV label,t_us or recording,label,t_us, or notes: the recordings' own notes."
         ),
     ] = None,
-    window_ms: Annotated[
-        float, typer.Option(min=0.0, help="Largest distance of a detection from its event, ms.")
-    ] = 50.0,
+    window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     csv: Annotated[Path | None, typer.Option(help="Write the detections to this .csv.")] = None,
     report: Annotated[
         Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
@@ -80,7 +76,7 @@ def detect(
     if csv is not None:
         write_whole(csv, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
     if report is not None:
-        taxel.report.write_listening(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
+        taxel.report.write_detections(report, loaded, found.outcomes, title=f"Detections of {readout} in {recording}")
     say_warnings(found.warnings)
     written = {"written": csv, "report": None if report is None else report / "report.html"}
     places = {name: str(path) for name, path in written.items() if path is not None}

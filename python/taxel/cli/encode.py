@@ -13,7 +13,7 @@ from taxel._base.files import try_whole
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import App, with_out
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import SET_HELP, TARE_HELP, assignments, progress, say_warnings
+from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings, tare_option
 from taxel.cli._say import say
 
 __all__ = ["app", "encode"]
@@ -27,10 +27,10 @@ app = App()
 def encode(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
     out: Annotated[Path, typer.Argument(help="The new file, a .npz that SpikeTrains.load reads.")],
-    encoder: Annotated[str, typer.Option(help=f"One of {', '.join(encoder_names())}.")],
+    encoder: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(encoder_names())}.")],
     files: FileOptions,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
+    tare: Annotated[str | None, tare_option()] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

@@ -21,7 +21,7 @@ from taxel.array import Array
 from taxel.cli._app import App
 from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import TARE_HELP, progress, say_warnings
+from taxel.cli._recordings import progress, say_warnings, tare_option
 from taxel.cli._say import say
 from taxel.cli._topics import listed
 from taxel.clock import doubt
@@ -56,7 +56,7 @@ def info(
         Path | None,
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
-    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: that of a quiet stretch.")] = None,
+    tare: Annotated[str | None, tare_option("Default: that of a quiet stretch.")] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
     ] = False,
@@ -262,9 +262,9 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
     for name, places in facts["taxels"].items():
         yield f"{name} taxels", f"{len(places)}{at(places, len(places))}"
-    if untold := facts["taxels_untold"]:
-        where = at(facts["taxels_untold_at"], untold)
-        yield "other taxels", f"{untold} not touched enough to say whether they work{where}"
+    if untested := facts["taxels_untested"]:
+        where = at(facts["taxels_untested_at"], untested)
+        yield "other taxels", f"{untested} not touched enough to say whether they work{where}"
 
 
 def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -36,13 +36,15 @@ def information(
     labels: Annotated[
         str | None,
         typer.Option(
+            metavar="FILE",
             help="A CSV recording,t_us,label[,stop_us][,group] and columns of parameters: a row is a trial; of one "
             "recording the first may be absent. notes: each note of the recordings is a trial from its time on, its "
-            "text the label. Without either each recording is one, and its folder's name the label."
+            "text the label. Without either each recording is one, and its folder's name the label.",
         ),
     ] = None,
     window_ms: Annotated[
-        float | None, typer.Option(help="How long after contact events count, ms; needed if trials have no stop_us.")
+        float | None,
+        typer.Option(metavar="MS", help="How long after contact events count, ms; needed if trials have no stop_us."),
     ] = None,
     windows_ms: Annotated[
         str | None, typer.Option("--windows", help="Further windows: times after contact, ms, as 10,20,50.")

@@ -19,42 +19,31 @@ from taxel._base.files import try_whole
 from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
 from taxel._core import ProblemError
-from taxel.array import Array, of_size
+from taxel.array import Array
 from taxel.cli._app import App, SecondsOption, with_typed
 from taxel.cli._board import (
     REDRAW_S,
     BitsOption,
     CongestionOption,
-    DifferencesOption,
-    FromOption,
-    GuardFramesOption,
-    HostOption,
-    PortOption,
-    PresetOption,
     RateOption,
-    ReadoutOption,
-    RecordOption,
-    SendOption,
-    TareOption,
     counters_table,
     doubted,
     exit_code,
+    for_live,
     outside,
     remote,
-    rest_of,
-    stated_registers,
+    with_live_options,
 )
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
 from taxel.cli._say import say
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.cli.console import Console
-from taxel.detect import PlainRule, Readout, load
+from taxel.detect import PlainRule, Readout
 from taxel.detections import Detection
 from taxel.device import Cable
 from taxel.encode import Encoder
 from taxel.live import Live, Panel, Summary, Viewer, delays
-from taxel.live.options import LiveOptions
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers
@@ -71,23 +60,10 @@ _FIRST_WITHIN_S = 1.0
 class _Typed:
     """Hold the options of the command."""
 
-    readout: ReadoutOption = None
-    port: PortOption = LiveOptions.port
-    host: HostOption = LiveOptions.host
-    array: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ROWSxCOLUMNS[xMM]",
-            help="Rows, columns and pitch of the sensor, as 24x20x5. Default: the readout's.",
-        ),
-    ] = None
-    preset: PresetOption = None
+    options: dict[str, Any]
     rate_hz: RateOption = None
     bits: BitsOption = None
-    differences: DifferencesOption = LiveOptions.differences
-    address: FromOption = None
     congestion: CongestionOption = None
-    tare: TareOption = None
     control: Annotated[
         str | None,
         typer.Option(
@@ -96,10 +72,7 @@ class _Typed:
         ),
     ] = None
     save_tare: Annotated[Path | None, typer.Option(help="Save the fresh tare in a new file (JSON).")] = None
-    record: RecordOption = None
     seconds: SecondsOption = None
-    guard_frames: GuardFramesOption = LiveOptions.guard_frames
-    send: SendOption = None
     report: Annotated[
         Path | None,
         typer.Option(
@@ -116,19 +89,17 @@ class _Typed:
     to: ToOption = None
     encoder: SpikesOption = None
     values: SpikesSetOption = None
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one line of JSON for each detection, and nothing else.")
-    ] = False
 
 
 @app.command()
+@with_live_options("live")
 @with_typed(_Typed)
 def live(typed: _Typed) -> None:
     """Receive a board's events and print what a readout detects, live; with --panel or --to, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
-    JSON, written by the thread that made it: label; t_us, known_us and said_us by the board's clock; slope_mv_per_ms;
-    said_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
+    JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
+    reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
     which are counted. --panel shows the board in a browser, --to in Rerun or Foxglove; a slow viewer loses pictures,
     never data. Exit code 3: nothing was received, or something was lost after it had arrived; 2: the board has more
     taxels than the array.
@@ -141,45 +112,28 @@ def live(typed: _Typed) -> None:
     """
     spikes = spikes_of(typed.to, typed.encoder, typed.values)
     _together(typed)
-    trained = None if typed.readout is None else load(typed.readout)
-    # The wire's pitch is that of the board; a sensor of one's own has the one that is stated, or none.
-    given = None if typed.array is None else of_size(typed.array, of_wire=typed.rate_hz is None)
-    stated = None if trained is None else trained.array
-    stated = stated if given is None else given
-    registers = stated_registers(typed.preset, typed.rate_hz, typed.bits, typed.address, stated)
-    rest = rest_of(typed.tare)
+    options = for_live(typed.options, typed.rate_hz, typed.bits)
+    trained, rest, record, address, lines = (options[name] for name in ("readout", "tare", "record", "remote", "lines"))
     _fresh(typed, rest)
     if typed.report is not None:
-        if typed.record is None or typed.record.suffix != ".mcap":
+        if record is None or record.suffix != ".mcap":
             raise ProblemError("--report is made from the recording: give --record FILE.mcap")
         try_report(typed.report)
-    console = Console(stderr=True, quiet=typed.as_json)
+    console = Console(stderr=True, quiet=lines)
     with contextlib.ExitStack() as connected, contextlib.ExitStack() as at_rest:
         if typed.control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
-        lossless = typed.record is not None or trained is not None
-        board = connected.enter_context(remote(typed.address, typed.congestion, lossless=lossless))
-        if trained is not None and registers is None and board is None:
-            frame_us = Registers(array=Array._of(stated)).frame_us
+        lossless = record is not None or trained is not None
+        board = connected.enter_context(remote(address, typed.congestion, lossless=lossless))
+        if trained is not None and options["registers"] is None and board is None:
+            sensor = trained.array if options["array"] is None else options["array"]
+            frame_us = Registers(array=Array._of(sensor)).frame_us
             console.print(
                 f"the readout assumes frames of {plain(frame_us)} us, as of a board at reset; state others by "
                 "--preset, or by --rate-hz and --bits",
                 soft_wrap=True,
             )
-        with Live(
-            typed.port,
-            host=typed.host,
-            remote=board,
-            array=given,
-            registers=registers,
-            differences=typed.differences,
-            readout=trained,
-            tare=rest,
-            record=typed.record,
-            guard_frames=typed.guard_frames,
-            lines=typed.as_json,
-            send=typed.send or (),
-        ) as pipeline:
+        with Live(**options | {"remote": board}) as pipeline:
             if spikes is not None and isinstance(rest, Tare):
                 spikes = spikes.with_tare(rest)
             last, external = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
@@ -194,15 +148,15 @@ def live(typed: _Typed) -> None:
         _report(typed.report, trained, summary.path, tare if tare is not None else rest)
         console.print(f"report: {typed.report / 'report.html'}", soft_wrap=True)
     _unsent(summary)
-    report_viewers(external, quiet=typed.as_json)
-    if not typed.as_json:
-        _print_summary(summary, typed.guard_frames)
+    report_viewers(external, quiet=lines)
+    if not lines:
+        _print_summary(summary, options["guard_frames"])
     elif summary.verdict.status in ("damaged", "lost", "nothing arrived"):
         say(f"taxel: {summary.verdict}", err=True)
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
-            f"--tare {typed.tare}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
+            f"--tare {typed.options['tare']}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
         )
     raise typer.Exit(exit_code(summary, pipeline.array))
 
@@ -239,12 +193,12 @@ def _report(folder: Path, readout: Readout | PlainRule, path: Path, tare: Tare |
     """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
     from taxel.detect import Example, Outcome  # noqa: PLC0415
-    from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
+    from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
 
     recording = taxel.open(path)
     rest = tare if isinstance(tare, Tare) else None
     outcome = Outcome(str(path), Example(recording, {}, rest), recording.detections)
-    write_listening(folder, readout, [outcome], title=f"Live detections, recorded to {path}")
+    write_detections(folder, readout, [outcome], title=f"Live detections, recorded to {path}")
 
 
 def _print_summary(summary: Summary, guard_frames: float) -> None:
@@ -252,7 +206,7 @@ def _print_summary(summary: Summary, guard_frames: float) -> None:
     detections, events = counted(counters["detections"], "detection"), counted(counters["events"], "event")
     say(f"{detections}, {events} in {counters['seconds']:.1f} s")
     if counters["detections"]:
-        say(f"from known to output: {delays(counters['said_latency'])}")
+        say(f"from known to output: {delays(counters['report_latency'])}")
     if counters["wrong"]:
         wrong = counted(counters["wrong"], "detection")
         say(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
@@ -277,9 +231,10 @@ def _unsent(summary: Summary) -> None:
 
 def _together(typed: _Typed) -> None:
     """Refuse options that would have no effect."""
-    if typed.readout is None and not typed.panel and not typed.to:
+    readout, tare, send = (typed.options[name] for name in ("readout", "tare", "send"))
+    if readout is None and not typed.panel and not typed.to:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel or --to VIEWER to show the board")
-    if typed.readout is None and (typed.tare or typed.report or typed.send):
+    if readout is None and (tare or typed.report or send):
         raise ProblemError("--tare, --report and --send belong to a readout: give --readout FILE")
     if typed.folder is not None and not typed.panel:
         raise ProblemError("--folder belongs to the panel: give --panel")

@@ -16,34 +16,23 @@ from rich.live import Live as Display
 from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.array import of_size
 from taxel.cli._app import OUTSIDE, App, SecondsOption, with_out
 from taxel.cli._board import (
     REDRAW_S,
-    ArrayOption,
     BitsOption,
-    CompressionOption,
-    DifferencesOption,
-    FromOption,
-    HostOption,
-    NameOption,
-    OverwriteOption,
-    PortOption,
-    PresetOption,
     RateOption,
-    SourceOption,
     counters_table,
     doubted,
     exit_code,
+    for_live,
     outside,
     remote,
-    stated_registers,
+    with_live_options,
 )
 from taxel.cli._noting import noting
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.live import Live, Summary
-from taxel.live.options import LiveOptions
 
 __all__ = ["app", "record"]
 
@@ -54,23 +43,15 @@ _EMPTY = 3
 
 
 @app.command()
+@with_live_options("record")
 @with_out("file")
 def record(
     file: Annotated[Path, typer.Argument(help="A new file: .mcap (with times, registers, notes) or .lsa (raw bytes).")],
-    port: PortOption = LiveOptions.port,
-    host: HostOption = LiveOptions.host,
-    array: ArrayOption = None,
-    preset: PresetOption = None,
+    options: dict[str, Any],
     rate_hz: RateOption = None,
     bits: BitsOption = None,
-    address: FromOption = None,
     seconds: SecondsOption = None,
     markers: Annotated[bool, typer.Option("--markers", help="End at the board's stop marker.")] = False,
-    compression: CompressionOption = LiveOptions.compression,
-    name: NameOption = LiveOptions.name,
-    source: SourceOption = None,
-    overwrite: OverwriteOption = LiveOptions.overwrite,
-    differences: DifferencesOption = LiveOptions.differences,
     length: Annotated[
         float | None, typer.Option(min=0.001, help="Automatic mode: record trials of this length, s.")
     ] = None,
@@ -105,19 +86,7 @@ def record(
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
     if length is not None and seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
-    sensor = None if array is None else of_size(array, of_wire=rate_hz is None)
-    live: dict[str, Any] = {
-        "port": port,
-        "host": host,
-        "array": sensor,
-        "registers": stated_registers(preset, rate_hz, bits, address, sensor),
-        "compression": compression,
-        "overwrite": overwrite,
-        "differences": differences,
-        "name": name,
-        "sources": _sources(source or []),
-        "remote": address,
-    }
+    live = for_live(options, rate_hz, bits) | {"sources": _sources(options["sources"] or [])}
     console = Console(stderr=True, quiet=as_json)
     if length is None:
         summary, code = _one(file, live, seconds, markers, console)

@@ -17,7 +17,7 @@ from taxel._base.messages import collected
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions, with_file_options
-from taxel.cli._recordings import READ_HELP, SET_HELP, TARE_HELP, assignments, progress, say_warnings, try_report
+from taxel.cli._recordings import READ_HELP, SET_HELP, assignments, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
@@ -36,7 +36,10 @@ def train(
     recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
     files: FileOptions,
     labels: Annotated[
-        str, typer.Option(help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own notes.")
+        str,
+        typer.Option(
+            metavar="FILE", help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own notes."
+        ),
     ] = "notes",
     recipe: Annotated[
         str | None,
@@ -48,10 +51,10 @@ def train(
         ),
     ] = None,
     encoder: Annotated[
-        str | None, typer.Option(help="The encoder's name; the same as --set encoder.name=NAME.")
+        str | None, typer.Option(metavar="NAME", help="The encoder's name; the same as --set encoder.name=NAME.")
     ] = None,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: the time before the first label.")] = None,
+    tare: Annotated[str | None, tare_option("Default: the time before the first label.")] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
     ),
@@ -67,7 +70,6 @@ def train(
     folds: Annotated[
         int | None,
         typer.Option(
-            min=0,
             help="Score on held-out data, in so many folds: of recordings, or of blocks of time of a single one; 0: on "
             "the training data. Default: at most 5, as many as the recordings and the rarest label allow.",
         ),
@@ -113,7 +115,7 @@ def train(
         training.readout.save(out, overwrite=overwrite)
         rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     if report is not None:
-        taxel.report.write_listening(
+        taxel.report.write_detections(
             report,
             training.readout,
             training.outcomes,

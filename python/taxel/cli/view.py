@@ -59,9 +59,7 @@ def view(
     to: ToOption = None,
     speed: Annotated[
         float | None,
-        typer.Option(
-            min=0.001, max=100.0, help="With --to: playback speed; 0.1 is ten times slower than real time. Default: 1."
-        ),
+        typer.Option(help="With --to: playback speed; 0.1 is ten times slower than real time. Default: 1."),
     ] = None,
     encoder: SpikesOption = None,
     values: SpikesSetOption = None,

@@ -55,8 +55,8 @@ class Evaluation:
 
     def potential(self, label: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a neuron's potential at `times` (ms), mV."""
-        one = self.readout.neurons[label]
-        return one.neuron.potential(one.weights, self.area, times, spikes=self.crossings(label))
+        cell = self.readout.neurons[label]
+        return cell.neuron.potential(cell.weights, self.area, times, spikes=self.crossings(label))
 
     def first_input(self, contact: Contact, label: str) -> float | None:
         """Return the time (us) of the first input spike of a touch, or of the last one at its end; None without any."""

@@ -77,9 +77,9 @@ def close_up(evaluation: Evaluation, contact: Contact, reach_us: float = 5_000.0
         force.set(ylabel="force (N)", title=f"{label}, {contact.kind}, {contact.speed_m_s:.2f} m/s")
         near = evaluation.events.between(begin, end)
         index = near.y.astype(int) * near.array.columns + near.x
-        for on, colour in ((True, "#c44e52"), (False, "#4c72b0")):
-            mine = near.p == on
-            name = f"{'more' if on else 'less'} pressure ({int(mine.sum())})"
+        for rising, colour in ((True, "#c44e52"), (False, "#4c72b0")):
+            mine = near.p == rising
+            name = f"{'more' if rising else 'less'} pressure ({int(mine.sum())})"
             raster.plot(to_ms(near.t[mine] - at), index[mine], ".", color=colour, markersize=2.5, label=name)
         raster.set(ylabel="taxel (row by row)")
         spikes = evaluation.area.between(to_ms(begin), to_ms(end))

@@ -17,8 +17,8 @@ from taxel._core import DeviceError
 from taxel.demo.evaluation import Evaluation, evaluate_events
 from taxel.demo.script import script
 from taxel.detect import Readout, run
-from taxel.detections import Detection
-from taxel.live import Live, heard
+from taxel.detections import Detection, Detections
+from taxel.live import Live
 from taxel.simulate import Contact, truth
 from taxel.wire import FRAME_US
 
@@ -87,9 +87,9 @@ def play_live(
             ended = None
             drawn = 0.0
             while ended is None or time.monotonic() < ended + _LISTEN_ON_S:
-                one = live.next(0.05)
-                if one is not None:
-                    detections.append(one)
+                detection = live.next(0.05)
+                if detection is not None:
+                    detections.append(detection)
                 if ended is None and board.poll() is not None:
                     ended = time.monotonic()
                 if time.monotonic() > drawn + _DRAW_EVERY_S:
@@ -100,12 +100,12 @@ def play_live(
             board.end()
         if board.returncode != 0:
             raise DeviceError(f"the board's process ended with code {board.returncode}: {complaint.strip()[-300:]}")
-        while (one := live.next(0.0)) is not None:
-            detections.append(one)
+        while (detection := live.next(0.0)) is not None:
+            detections.append(detection)
         tare = live.tare
         summary = live.stop()
     emulator = json.loads(printed)
-    reported = heard(detections)
+    reported = Detections.from_list(detections)
     events = taxel.open(recording).events
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
     evaluation = evaluate_events(events, acts, readout, reported)

@@ -108,7 +108,7 @@ def figures(material: Material) -> dict[str, Any]:
             "said": {label: len(material.noise.detections[label]) for label in LABELS},
             "plain_rule_said": {label: len(material.noise.plain[label]) for label in LABELS},
         },
-        "dashpot_ms": {f"{ms:g}": other.judged.to_dict() for ms, other in material.dashpots.items()},
+        "dashpot_ms": {f"{ms:g}": dashpot.judged.to_dict() for ms, dashpot in material.dashpots.items()},
         "footfalls": None
         if material.footfalls is None
         else {"note": material.footfall_note, **material.footfalls.judged.to_dict()},
@@ -207,7 +207,7 @@ def _split(evaluation: Evaluation) -> dict[str, dict[str, float]]:
             begin = np.ceil(stamp / FRAME_US) * FRAME_US
             crossing = mine.t[place] + to_us(delay)
             known = float(mine.known[place])
-            host = float(mine.said[place]) - known if mine.said is not None else 0.0
+            host = float(mine.reported[place]) - known if mine.reported is not None else 0.0
             parts.append([begin - true, crossing - begin, known - crossing, host])
         if parts:
             medians = to_ms(np.median(np.array(parts), axis=0))

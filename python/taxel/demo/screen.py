@@ -58,8 +58,8 @@ class Screen:
             ("events", f"{counters['events']:,}"),
             ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
             ("arrived to decoded", delays(counters["decode_latency"])),
-            ("known to detected", delays(counters["said_latency"])),
-            *((label, str(sum(one.label == label for one in detections))) for label in LABELS),
+            ("known to detected", delays(counters["report_latency"])),
+            *((label, str(sum(detection.label == label for detection in detections))) for label in LABELS),
         ):
             rows.add_row(Text(name, style="dim"), value)
         state = "taring" if counters["taring"] else f"{min(now, self._seconds):5.1f} of {self._seconds:.1f} s"
@@ -82,8 +82,8 @@ class Screen:
     def _newest(self, detections: list[Detection], width: int, rows: int) -> list[Text]:
         """Return the last lines that find room, the newest last; a long one takes more than one row."""
         lines: list[Text] = []
-        for one in reversed(detections):
-            line = self._line(one)
+        for detection in reversed(detections):
+            line = self._line(detection)
             rows -= -(-line.cell_len // width)
             if rows < 0 and lines:
                 break
@@ -97,7 +97,7 @@ class Screen:
         if len(true):
             nearest = int(np.abs(true - detection.t).argmin())
             line.append(f"{self._kinds[nearest]:<7} known {to_ms(detection.known - true[nearest]):+6.2f} ms, ")
-            line.append(f"out {to_ms(detection.said - true[nearest]):+6.2f} ms after the truth", style="dim")
+            line.append(f"out {to_ms(detection.reported - true[nearest]):+6.2f} ms after the truth", style="dim")
         return line
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from importlib.resources import as_file, files
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.progress import Progress, reporting
 from taxel.demo.script import TRAINING_SEED, left_to_rest, script
 from taxel.detect import Example, Readout, Recipe, fit
 from taxel.encode import ContactArea
@@ -31,9 +31,7 @@ def recipe() -> Recipe:
         return Recipe.load(path)
 
 
-def trained(
-    *, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Callable[[str], object] = lambda _: None
-) -> Readout:
+def trained(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progress | None = None) -> Readout:
     """Train contact and lift on `examples`, with the same parameters, by the demo's `recipe`."""
     labelled = examples(boards=boards, scenes=scenes, draw=draw, progress=progress)
     with warnings.catch_warnings():
@@ -42,9 +40,7 @@ def trained(
         return fit(labelled, recipe(), progress=progress)
 
 
-def examples(
-    *, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Callable[[str], object] = lambda _: None
-) -> list[Example]:
+def examples(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progress | None = None) -> list[Example]:
     """Play scenes of balls that bounce and are caught, and as many with the ball left to rest; label their touches.
 
     All fall on a level array, on columns of foam: the demo's slants and its bonded foam are new to the readout.
@@ -57,8 +53,8 @@ def examples(
         On each of them; by default 16 scenes of each kind.
     draw : int
         Another draw of all of them.
-    progress : function of str, optional
-        Called with a line before each board.
+    progress : function of (step, done, all), optional
+        Called before each board.
 
     Returns
     -------
@@ -67,7 +63,7 @@ def examples(
     """
     labelled = []
     for n in range(2 * boards):
-        progress(f"playing training scenes, board {n + 1} of {2 * boards}")
+        reporting(progress)(f"playing training scenes, board {n + 1} of {2 * boards}", 0, 0)
         seed = TRAINING_SEED + 1000 * draw + n
         acts = script(seed, scenes, draw=Scene.draw if n < boards else left_to_rest)
         events = play(acts, seed=seed).events
@@ -102,6 +98,6 @@ def described(readout: Readout) -> str:
     levels = readout.encoder.get_params()["levels"]
     names = [f"rise to {n}" for n in levels] + [f"fall below {n}" for n in levels]
     return "\n".join(
-        f"{label}: " + ", ".join(f"{name} {w:.3f} mV" for name, w in zip(names, one.weights, strict=True) if w > 5e-4)
-        for label, one in readout.neurons.items()
+        f"{label}: " + ", ".join(f"{name} {w:.3f} mV" for name, w in zip(names, cell.weights, strict=True) if w > 5e-4)
+        for label, cell in readout.neurons.items()
     )

@@ -16,8 +16,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
+from taxel._base.errors import refused
 from taxel._base.messages import counted
-from taxel._core import ProblemError
 from taxel.demo.evaluation import Evaluation, evaluate_acts
 from taxel.demo.footfalls import NOTE, footfalls
 from taxel.demo.playing import play_live
@@ -71,7 +71,7 @@ def show(
     DeviceError : the board's process failed
     """
     if noise_s is not None and not 0.5 <= noise_s <= 86_400:
-        raise ProblemError(f"noise is {noise_s} s: must be 0.5 to 86400")
+        raise refused("noise", f" is {noise_s} s: must be 0.5 to 86400")
     used = shipped() if readout is None else Readout.load(readout)
     laid = None if data is None else footfalls(data)
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed

@@ -47,17 +47,18 @@ _CHANCE = 0.05
 
 
 class Advice(NamedTuple):
-    """What may help a label, and how that is known."""
+    """What may help a label, how that is known, and the option of `taxel train` that it is."""
 
     helps: str
     because: str
+    option: str | None = None
 
 
 def advised(
     made: Trained,
     examples: Sequence[Example],
     scored: Score,
-    own: Score,
+    learnt: Score,
     search_s: float | None,
     plain: PlainScore | None = None,
 ) -> dict[str, Advice]:
@@ -81,7 +82,7 @@ def advised(
     made : Trained
     examples : sequence of Example
         The training data.
-    scored, own : Score
+    scored, learnt : Score
         Held out, and on the training data.
     search_s : float, s, optional
         How long a search tries one set of parameters of every label; None after a search.
@@ -90,8 +91,8 @@ def advised(
     """
     many = [
         label
-        for label, one in scored.by_label.items()
-        if label in made.readout.labels and max(one.missed, one.false) > _MANY * one.events
+        for label, score in scored.by_label.items()
+        if label in made.readout.labels and max(score.missed, score.false) > _MANY * score.events
     ]
     if not many:
         return {}
@@ -100,7 +101,9 @@ def advised(
         off_by(sound, many, floor), held_by_tare(sound, floor), loaded_at_rest(examples, made.recipe.encoder)
     )
     better = (
-        {} if plain is None or plain.together is None else {one: plain.together[one] for one in plain.better(scored)}
+        {}
+        if plain is None or plain.together is None
+        else {label: plain.together[label] for label in plain.better(scored)}
     )
     channels, recipe, fall = lacks_neighbours(examples), _other_recipe(made, examples), fallen(examples)
     if fall:
@@ -114,7 +117,7 @@ def advised(
             made,
             label,
             scored,
-            own[label],
+            learnt[label],
             search_s,
             better.get(label),
             _chance(label, scored, plain),
@@ -176,7 +179,11 @@ def _other_recipe(made: Trained, examples: Sequence[Example]) -> Advice | None:
     if used is None or isinstance(source, SpikeTrains):
         return None
     fits, why = recipes.chosen(source, made.readout.labels)
-    return None if fits == used else Advice(f"--recipe {fits}", f"it is made for {why}; this training took {used}")
+    return (
+        None
+        if fits == used
+        else Advice(f"--recipe {fits}", f"it is made for {why}; this training took {used}", "--recipe")
+    )
 
 
 def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advice | None:
@@ -185,9 +192,11 @@ def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advic
     if times.held >= TOUCH:
         late_ms = 0.0 if alignment is None or alignment.train is None else -alignment.median_ms
         why = f", as labels lie {late_ms:.0f} ms after what was felt (median)" * (late_ms > to_ms(_BEFORE_US))
-        return Advice("another tare", f"it holds a touch of {times.held} taxels{why}; give --tare SECONDS or FILE")
+        return Advice(
+            "another tare", f"it holds a touch of {times.held} taxels{why}; give one of seconds, or a file", "--tare"
+        )
     if times.loaded >= TOUCH:
-        return Advice("another tare", f"{times.loaded} taxels read above theirs while nothing touches them")
+        return Advice("another tare", f"{times.loaded} taxels read above theirs while nothing touches them", "--tare")
     if alignment is None:
         return None
     # Where no input follows the labels none was moved.
@@ -212,7 +221,7 @@ def _advice(
     made: Trained,
     label: str,
     together: Score,
-    own: Score,
+    alone: Score,
     search_s: float | None,
     rule: Score | None,
     chance: str,
@@ -220,30 +229,32 @@ def _advice(
     channels: bool,
 ) -> Advice:
     points = len(made.recipe.points_of(label))
-    wrong, learnt = together[label].missed + together[label].false, own.missed + own.false
+    wrong, learnt = together[label].missed + together[label].false, alone.missed + alone.false
     if rule is not None and 2 * rule.rank[0] <= wrong:
         return _by_rule(made, rule.rank[0], wrong)
     if channels and (_for_touch(made) or chance):
         array = made.readout.array
         size = "ROWSxCOLUMNSxMM" if array is None else f"{array.rows}x{array.columns}xMM"
         because = "channels in a row at a known distance, MM mm, have neighbours; then the recipe touch fits"
-        return Advice(f"--array {size}", because)
-    if chance and any(isinstance(one, Moments) for one in made.recipe.encoder._each()):
+        return Advice(f"--array {size}", because, "--array")
+    if chance and any(isinstance(encoder, Moments) for encoder in made.recipe.encoder._each()):
         return Advice(
             "other kinds",
             f"{chance}: the inputs of this recipe are moments of the picture, as area and load, and its centre, which "
             "is tried where these tell too few; where kinds differ otherwise, --recipe gait_plate, whose inputs are "
             "the taxels, may tell them, and taxel information says whether they differ; or labels are few or mixed up",
+            "--recipe",
         )
     if search_s is not None and 2 * learnt > wrong and points > 1:
-        return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
-    return Advice("more labels", f"of those that it learnt {own.missed} are missed, and {own.false} are false")
+        because = f"it tries {points} sets of parameters, in about {points * search_s:.0f} s"
+        return Advice("--search", because, "--search")
+    return Advice("more labels", f"of those that it learnt {alone.missed} are missed, and {alone.false} are false")
 
 
 def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:
     """Return how many of a kind of touch are told, where neuron and rule tell no more than chance would; else ""."""
     by = {"the neuron": scored} | ({} if plain is None or plain.together is None else {"the rule": plain.together})
-    said = [_by_chance(label, who, one) for who, one in by.items()]
+    said = [_by_chance(label, who, score) for who, score in by.items()]
     return ", ".join(said) + ", as by chance" if all(said) else ""
 
 
@@ -252,18 +263,18 @@ def _by_chance(label: str, who: str, together: Score) -> str:
 
     Every false detection counts as one at a touch of another kind.
     """
-    kinds = [one for one in together.by_label.values() if not recipes.knows("touch", one.label)]
-    own = together[label]
-    others = sum(one.events for one in kinds) - own.events
-    if own not in kinds or not others:
+    kinds = [score for score in together.by_label.values() if not recipes.knows("touch", score.label)]
+    kind = together[label]
+    others = sum(kind.events for kind in kinds) - kind.events
+    if kind not in kinds or not others:
         return ""
-    told, taken = own.found, min(own.false, others)
+    told, taken = kind.found, min(kind.false, others)
     ways = sum(
-        comb(own.events, k) * comb(others, told + taken - k) for k in range(told, own.events + 1) if k <= told + taken
+        comb(kind.events, k) * comb(others, told + taken - k) for k in range(told, kind.events + 1) if k <= told + taken
     )
-    if ways <= _CHANCE * comb(own.events + others, told + taken):
+    if ways <= _CHANCE * comb(kind.events + others, told + taken):
         return ""
-    return f"{who} tells {told} of {own.events} and takes {taken} of {others} others for {label}"
+    return f"{who} tells {told} of {kind.events} and takes {taken} of {others} others for {label}"
 
 
 def _for_touch(made: Trained) -> bool:
@@ -274,17 +285,19 @@ def _for_touch(made: Trained) -> bool:
 def _by_rule(made: Trained, left: int, wrong: int) -> Advice:
     """Return the recipe that has the inputs of plain rules, if this one has not; else the rule itself."""
     because = f"leaves {left} missed and false on the same labels, the neuron {wrong}"
-    if _for_touch(made) and not any(isinstance(one, ContactArea) for one in made.recipe.encoder._each()):
-        return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}")
-    return Advice("the plain rule", f"it {because}; taxel train --rule FILE writes it, and taxel detect runs it")
+    if _for_touch(made) and not any(isinstance(encoder, ContactArea) for encoder in made.recipe.encoder._each()):
+        return Advice("--recipe touch", f"the plain rule, which has its inputs, {because}", "--recipe")
+    return Advice(
+        "the plain rule", f"it {because}; taxel train --rule FILE writes it, and taxel detect runs it", "--rule"
+    )
 
 
 def fallen(examples: Sequence[Example]) -> str:
     """Return that the values of an example fall from their rest, and what turns them; "" where none do."""
-    for one in examples:
-        source = recorded(one.source, hold=False)
+    for example in examples:
+        source = recorded(example.source, hold=False)
         if isinstance(source, Frames) and (rest := of_pictures(source)).falls:
-            return f"{one.name}: " * bool(one.name) + rest.fall(getattr(one.source, "path", None))
+            return f"{example.name}: " * bool(example.name) + rest.fall(getattr(example.source, "path", None))
     return ""
 
 
@@ -295,11 +308,11 @@ def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:
     moments at least a touch is yet to begin, and noise is elsewhere each time. So it is a tare that does not fit from
     the beginning, or one that the readings drifted away from. Of several examples it is the largest number.
     """
-    return max((_loaded(one, encoder) for one in examples), default=0)
+    return max((_loaded(example, encoder) for example in examples), default=0)
 
 
 def _loaded(example: Example, encoder: Encoder) -> int:
-    floors = [one.noise_floor for one in encoder._each() if hasattr(one, "noise_floor")]
+    floors = [part.noise_floor for part in encoder._each() if hasattr(part, "noise_floor")]
     source = recorded(example.source)
     times = np.sort(np.concatenate([*example.labels.values(), np.empty(0, np.int64)])).astype(np.int64) - _BEFORE_US
     if example.tare is None or not floors or isinstance(source, SpikeTrains) or not len(times):

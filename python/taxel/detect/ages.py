@@ -81,7 +81,7 @@ def later_us(pattern: SpikeTrains, ages: Ages, felt_ms: NDArray[np.float64], age
         One of the ages.
     """
     after = np.append(onsets(pattern, ages), np.inf)
-    place = [round(to_us(one)) for one in ages.begin_ms].index(round(to_us(age_ms)))
+    place = [round(to_us(begin)) for begin in ages.begin_ms].index(round(to_us(age_ms)))
     fired = np.append(pattern[ages.trains[place]], np.inf)
     first = fired[np.searchsorted(fired, felt_ms + age_ms - _SAME_MS)]
     same = first < after[np.searchsorted(after, felt_ms + _SAME_MS)]
@@ -129,9 +129,9 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
     """
     if not recipe.neurons:
         return recipe
-    own = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()]
-    delays = [_delay_ms(one) for one in own if _aged(recipe, one)]
-    pictures_ms = max(picture_ms(one) for one in examples)
+    parameters = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()]
+    delays = [_delay_ms(point) for point in parameters if _aged(recipe, point)]
+    pictures_ms = max(picture_ms(example) for example in examples)
     period_ms = pictures_ms or max(to_ms(frame_us or 0.0) for frame_us, _ in clocks)
     if not delays or not period_ms or (not pictures_ms and period_ms <= min(delays)):
         return recipe
@@ -164,8 +164,8 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         for key in LISTS:
             seen: dict[int, float] = {}
             made |= point(first, recipe.learner, seen) or {}
-            tried = [point(one, under, seen) for one in values.get(key, ())]
-            made |= {key: [one for one in tried if one is not None]} if key in values else {}
+            tried = [point(listed, under, seen) for listed in values.get(key, ())]
+            made |= {key: [point for point in tried if point is not None]} if key in values else {}
         return made
 
     def encoder(part: Encoder) -> Encoder:

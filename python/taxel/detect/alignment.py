@@ -182,17 +182,17 @@ def aligned_to(followed: Followed | None, label: str, given: Sequence[NDArray[np
 def _best(scores: Mapping[int, Score], labels: int) -> int | None:
     """Return the train that tells best when the events were felt; None where that one has no spike near any label."""
 
-    def off(one: Score) -> float:
-        return float(np.median(np.abs(one.errors_ms))) if one.found else np.inf
+    def off(score: Score) -> float:
+        return float(np.median(np.abs(score.errors_ms))) if score.found else np.inf
 
     left = dict(scores)
     criteria: list[tuple[Callable[[Score], float], float]] = [
-        (lambda one: one.missed + one.false, max(_ALIKE, _ALIKE_SHARE * labels)),
-        (lambda one: -one.found, 0),
+        (lambda score: score.missed + score.false, max(_ALIKE, _ALIKE_SHARE * labels)),
+        (lambda score: -score.found, 0),
         (off, _ALIKE_MS),
     ]
     for worth, more in criteria:
         least = min(map(worth, left.values()), default=0.0) + more
-        left = {train: one for train, one in left.items() if worth(one) <= least}
+        left = {train: score for train, score in left.items() if worth(score) <= least}
     best = min(left, default=None)
     return None if best is None or not scores[best].found else best

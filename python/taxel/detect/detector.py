@@ -9,6 +9,7 @@ from typing import Any, Self
 from taxel import _core
 from taxel._base.arguments import instance, number, parameters, shown, whole
 from taxel._base.arguments import text as checked_text
+from taxel._base.errors import refused
 from taxel._base.saved import Saved
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -70,9 +71,9 @@ class _Detector(Saved):
 
     @classmethod
     def _from_text(cls, text: str) -> Self:
-        one = cls.__new__(cls)
-        one._hold(cls._check(text))
-        return one
+        detector = cls.__new__(cls)
+        detector._hold(cls._check(text))
+        return detector
 
     def _hold(self, text: str) -> None:
         """Hold the text of its file, which was checked."""
@@ -96,7 +97,7 @@ class _Detector(Saved):
         FormatError : another kind of file, another version, or parts that are invalid
         """
         if not isinstance(text, str):
-            raise ProblemError(f"text is {shown(text)}: must be the text of a {cls._WHAT}")
+            raise refused("text", f" is {shown(text)}: must be the text of a {cls._WHAT}")
         return cls._from_text(checked_text("text", text))
 
     def stream(
@@ -209,7 +210,7 @@ class ReadoutStream:
             return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
         if isinstance(x, Frames):
             return Detections._from_parts(self._begin(x.array).push_frames(x._parts()))
-        raise ProblemError(f"x is {shown(x)}: a readout listens to taxel.Events or taxel.Frames")
+        raise refused("x", f" is {shown(x)}: a readout listens to taxel.Events or taxel.Frames")
 
     def advance(self, t_us: int) -> Detections:
         """Promise that nothing will come any more before a time; an earlier time changes nothing.
@@ -255,7 +256,7 @@ class ReadoutStream:
 def detector(name: str, value: object) -> _Detector:
     """Return a readout or a plain rule; refuse any other value."""
     if not isinstance(value, _Detector):
-        raise ProblemError(f"{name} is {shown(value)}: must be a taxel.Readout or taxel.detect.PlainRule")
+        raise refused(name, f" is {shown(value)}: must be a taxel.Readout or taxel.detect.PlainRule")
     return value
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taxel._base.arguments import column, instance, shown, text
+from taxel._base.errors import refused
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -112,7 +113,7 @@ def checked(examples: Sequence[Example]) -> list[Example]:
     ProblemError : no example at all, or one that is invalid (names its place)
     """
     if not isinstance(examples, Sequence) or not len(examples):
-        raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
+        raise refused("examples", f" is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
         whole = isinstance(example, tuple) and len(example) in (2, 3, 4, 5)
@@ -142,7 +143,7 @@ def array_of(examples: Sequence[Example]) -> Array | None:
     ------
     ProblemError : examples of different arrays (names their places)
     """
-    arrays = [None if isinstance(one.source, SpikeTrains) else one.source.array for one in examples]  # type: ignore[union-attr]
+    arrays = [None if isinstance(example.source, SpikeTrains) else example.source.array for example in examples]  # type: ignore[union-attr]
     first = arrays[0]
     for k, array in enumerate(arrays):
         if (array is None) != (first is None) or (array is not None and first is not None and not first.fits(array)):
@@ -161,7 +162,7 @@ def unit_of(examples: Sequence[Example]) -> str | None:
     ------
     ProblemError : examples in different units (names two of them)
     """
-    units = [None if isinstance(one.source, SpikeTrains) else recorded_unit(one.source) for one in examples]  # type: ignore[arg-type]
+    units = [None if isinstance(example.source, SpikeTrains) else recorded_unit(example.source) for example in examples]  # type: ignore[arg-type]
     for k, unit in enumerate(units):
         if unit != units[0]:
             of = f"{called(k, examples[k])} is in {unit}, {called(0, examples[0])} in {units[0]}"

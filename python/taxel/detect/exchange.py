@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, number, shown
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5
 from taxel._core import FormatError, ProblemError
@@ -99,7 +100,7 @@ def _check_ungraded(encoder: Encoder) -> None:
 
 def lost(readout: Parts) -> list[str]:
     """Return what NIR's nodes cannot hold of a readout, one line each."""
-    neurons = [one.neuron for one in readout.neurons.values()]
+    neurons = [cell.neuron for cell in readout.neurons.values()]
     lines = [
         "the encoder: the graph's inputs are its spike trains",
         "labels and trained delays: outputs come in the order of the labels",
@@ -151,12 +152,12 @@ def read_nir(
     try:
         if held is not None and not isinstance(held, str):
             raise FormatError(f"{READOUT} in the metadata: must be a text")
-        own = None if held is None else parts_of(held)
+        stored = None if held is None else parts_of(held)
         if spike_ms is None and SPIKE in graph.metadata:
             spike_ms = _spike(1000.0 * number(SPIKE, graph.metadata[SPIKE]) or None)
-        if own is not None and encoder is None and neuron is None and _same(graph, _graph(own, spike_ms)):
-            return build(own)
-        return build(_parts(graph, own, encoder, neuron, spike_ms))
+        if stored is not None and encoder is None and neuron is None and _same(graph, _graph(stored, spike_ms)):
+            return build(stored)
+        return build(_parts(graph, stored, encoder, neuron, spike_ms))
     except (FormatError, ProblemError) as error:
         raise type(error)(f"{place}: {error}") from None
 
@@ -204,7 +205,7 @@ def _spike(spike_ms: object) -> float | None:
         return None
     length = number("spike_ms", spike_ms)
     if not 1e-6 <= length <= 1000.0:
-        raise ProblemError(f"spike_ms is {length:g}: must lie between 0.000001 and 1000")
+        raise refused("spike_ms", f" is {length:g}: must be from 1e-6 to 1000")
     return length
 
 
@@ -242,18 +243,18 @@ def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
     _check_ungraded(readout.encoder)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
     neurons = list(readout.neurons.values())
-    for label, one in readout.neurons.items():
-        if one.neuron.rearm is not None:
-            raise ProblemError(f"NIR: rearm of {label!r} is {one.neuron.rearm}: no NIR neuron has that, must be None")
-    nodes = [_gains(one.neuron, spike_s) for one in neurons]
+    for label, cell in readout.neurons.items():
+        if cell.neuron.rearm is not None:
+            raise ProblemError(f"NIR: rearm of {label!r} is {cell.neuron.rearm}: no NIR neuron has that, must be None")
+    nodes = [_gains(cell.neuron, spike_s) for cell in neurons]
     kinds = sorted({kind for kind, _, _ in nodes})
     if len(kinds) > 1:
         raise ProblemError("NIR: exponential kernels and others need different nodes; export them as readouts apart")
     columns = {name: np.array([node[1][name] for node in nodes]) for name in nodes[0][1]}
-    threshold = np.array([one.neuron.theta_0 * readout.run_threshold / 1000.0 for one in neurons])
+    threshold = np.array([cell.neuron.theta_0 * readout.run_threshold / 1000.0 for cell in neurons])
     zero = np.zeros(len(neurons))
     cells = getattr(nir, kinds[0])(v_leak=zero, v_threshold=threshold, v_reset=zero, **columns)
-    weights = np.array([one.weights / 1000.0 * node[2] for one, node in zip(neurons, nodes, strict=True)])
+    weights = np.array([cell.weights / 1000.0 * node[2] for cell, node in zip(neurons, nodes, strict=True)])
     delays = readout.delays_ms
     inputs = weights.shape[1] // len(delays)
     parts: dict[str, Any] = {"input": nir.Input({"input": np.array([inputs])})}
@@ -293,13 +294,13 @@ def _same(a: NIRGraph, b: NIRGraph) -> bool:
 
 def _parts(
     graph: NIRGraph,
-    own: Parts | None,
+    stored: Parts | None,
     encoder: Encoder | None,
     neuron: Neuron | None,
     spike_ms: float | None,
 ) -> Parts:
     """Return a readout's parts from nodes; the rest comes from the caller, the metadata, or by default."""
-    encoder = encoder or (own.encoder if own is not None else None)
+    encoder = encoder or (stored.encoder if stored is not None else None)
     if encoder is None:
         raise ProblemError("NIR holds no encoder: say which with encoder=")
     _check_ungraded(encoder)
@@ -307,20 +308,20 @@ def _parts(
     spike_s = None if spike_ms is None else spike_ms / 1000.0
     templates: list[TrainedNeuron | None] = [None] * len(weights)
     labels = [f"output {k}" for k in range(len(weights))]
-    if own is not None and len(own.neurons) == len(weights):
-        labels, templates = list(own.neurons), list(own.neurons.values())
+    if stored is not None and len(stored.neurons) == len(weights):
+        labels, templates = list(stored.neurons), list(stored.neurons.values())
     trained = {}
     for k, (label, template, row) in enumerate(zip(labels, templates, weights, strict=True)):
         rest = neuron or (template.neuron if template is not None else Neuron())
         constants, factor = _kernel(cells, k, spike_s)
         constants["theta_0"] = _threshold(cells, k)
-        if own is not None and neuron is None:
+        if stored is not None and neuron is None:
             # The nodes' threshold holds the factor already.
-            constants["theta_plus"] = rest.theta_plus * own.run_threshold
-        one = Neuron(**{**rest.get_params(), **constants})
+            constants["theta_plus"] = rest.theta_plus * stored.run_threshold
+        rebuilt = Neuron(**{**rest.get_params(), **constants})
         delay_ms, inputs = (0.0, ()) if template is None else (template.delay_ms, template.inputs)
-        trained[label] = TrainedNeuron(one, 1000.0 * row * factor, delay_ms, inputs)
-    array, unit = (None, None) if own is None else (own.array, own.unit)
+        trained[label] = TrainedNeuron(rebuilt, 1000.0 * row * factor, delay_ms, inputs)
+    array, unit = (None, None) if stored is None else (stored.array, stored.unit)
     return Parts(encoder, trained, array, delays_ms, unit)
 
 

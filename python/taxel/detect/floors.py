@@ -29,14 +29,14 @@ def measured_floor(examples: Sequence[Example]) -> float | None:
         Those without a tare say nothing.
     """
     floors = []
-    for one in examples:
-        source = recorded(one.source)
+    for example in examples:
+        source = recorded(example.source)
         if not isinstance(source, Frames) or source.unit == "ticks":
             return None
-        if one.tare is None or np.isnan(one.tare.noise).all() or not len(source):
+        if example.tare is None or np.isnan(example.tare.noise).all() or not len(source):
             continue
-        above = np.fmax.reduce(source.values, axis=0, initial=-np.inf) - one.tare.rest
-        known = np.isfinite(above) & np.isfinite(one.tare.noise)
-        noise, reach = (float(np.quantile(of[known], SHARE)) for of in (one.tare.noise, above))
+        above = np.fmax.reduce(source.values, axis=0, initial=-np.inf) - example.tare.rest
+        known = np.isfinite(above) & np.isfinite(example.tare.noise)
+        noise, reach = (float(np.quantile(of[known], SHARE)) for of in (example.tare.noise, above))
         floors.append(max(TIMES_NOISE * noise, _SHARE_OF_RANGE * reach))
     return float(f"{max(floors):.3g}") if max(floors, default=0.0) > 0.0 else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import pairwise
@@ -14,8 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, finite, flag, instance, several, shown, whole, window
+from taxel._base.arguments import finite, flag, instance, several, shown, whole, window
+from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
+from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect.ages import in_pictures
 from taxel.detect.examples import Example, array_of, checked, unit_of
@@ -118,7 +120,7 @@ def judge(
     search: bool = False,
     window_ms: float = 50.0,
     frame_us: float | None = None,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> Judged:
     """Train once a fold, and score the detections in the data that the fold tests; and those of plain rules likewise.
 
@@ -135,8 +137,8 @@ def judge(
         Of the scores.
     frame_us : float, us, optional
         As in `taxel.detect.run`.
-    progress : function of str, optional
-        Called with a line before each step.
+    progress : function of (step, done, all), optional
+        Called before each step; of folds with how many are done, else with 0 of 0.
 
     Returns
     -------
@@ -156,7 +158,7 @@ def judge(
     1
     """
     examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
-    report = _reporting(progress)
+    report = reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
     whole = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
@@ -166,7 +168,7 @@ def judge(
     detections: dict[int, list[Detections]] = {}
     trained = []
     for n, fold in enumerate(ways):
-        report(f"fold {n + 1} of {len(ways)}")
+        report(f"fold {n + 1} of {len(ways)}", n, len(ways))
         plan = recipe
         if search:
             inner = fold.inner or INNER
@@ -182,7 +184,7 @@ def judge(
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
     labels = recipe._labels(examples)
     truths = _truths(examples, ways, labels)
-    scores = tuple(score(*both, window) for both in zip(joined, truths, strict=True))
+    scores = tuple(score(*compared, window) for compared in zip(joined, truths, strict=True))
     parts = [(fold.train, fold.test) for fold in ways]
     plain = plain_score(examples, labels, clocks, floor_of(recipe.encoder), parts, truths, window, report)
     return Judged(scores, score_together(joined, truths, window), how, tuple(trained), plain)
@@ -194,7 +196,7 @@ def _sound_examples(
     """Return checked examples, the window of scores (ms), and the clock of each example."""
     if frame_us is not None:
         finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
-    clocks = [clock_of(one, frame_us) for one in examples] if isinstance(examples, Sequence) else []
+    clocks = [clock_of(example, frame_us) for example in examples] if isinstance(examples, Sequence) else []
     return checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6), clocks
 
 
@@ -205,7 +207,7 @@ def choose(
     k: int | Sequence[Fold] = INNER,
     window_ms: float = 50.0,
     frame_us: float | None = None,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> Recipe:
     """Return the recipe with, for each neuron, the point of those that it lists which is best on held-out data.
 
@@ -249,7 +251,7 @@ def choose(
     examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
     unit_of(examples)
     recipe = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
-    report = _reporting(progress)
+    report = reporting(progress)
     parts = [Part(n) for n in range(len(examples))]
     ways = whole("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
@@ -265,7 +267,7 @@ def _chosen(
     parts: Sequence[Part],
     window: float,
     clocks: Sequence[Clock],
-    report: Callable[[str], object],
+    report: Progress,
 ) -> Recipe:
     """Return the recipe with the best point of each neuron; `patterns` are the examples as spike trains.
 
@@ -300,7 +302,7 @@ def _marks(
     folds: Sequence[Fold],
     window: float,
     clocks: Sequence[Clock],
-    report: Callable[[str], object],
+    report: Progress,
 ) -> list[tuple[int, float]]:
     """Return the `Score.rank` over all folds of each of several recipes for one label.
 
@@ -317,12 +319,12 @@ def _marks(
         known: Known = {}
         for m in in_turn:
             plan = plans[m]
-            report(f"trying parameters {m + 1} of {len(plans)} for {label}, on part {n + 1} of {len(folds)}")
+            report(f"trying parameters {m + 1} of {len(plans)} for {label}, on part {n + 1} of {len(folds)}", 0, 0)
             if m in refused:
                 continue
             if rows is None or not rows.fits(plan):
                 try:
-                    rows = Fitting(training, plan, label, array, lambda _: None, known=known)
+                    rows = Fitting(training, plan, label, array, reporting(None), known=known)
                 except ProblemError:  # as where two labels lie within a longer refractory time
                     if m == 0:
                         raise
@@ -350,9 +352,9 @@ def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Rea
     trains = patterns[part.example].source
     assert isinstance(trains, SpikeTrains)
     neurons = readout.neurons.values()
-    steps = [trains.start / one.neuron.step_ms for one in neurons]
+    steps = [trains.start / neuron.neuron.step_ms for neuron in neurons]
     on_grid = all(abs(step - round(step)) < 1e-9 for step in steps)
-    return patterns if on_grid and all(len(one.weights) == len(trains) for one in neurons) else examples
+    return patterns if on_grid and all(len(neuron.weights) == len(trains) for neuron in neurons) else examples
 
 
 def _quiet() -> Any:
@@ -361,8 +363,8 @@ def _quiet() -> Any:
 
 
 def _detected(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
-    one, (frame_us, version) = examples[part.example], clocks[part.example]
-    detections = run(readout, one.source, tare=one.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
+    example, (frame_us, version) = examples[part.example], clocks[part.example]
+    detections = run(readout, example.source, tare=example.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
     return detections[(detections.t >= part.start) & (detections.t < part.stop)]
 
 
@@ -405,7 +407,10 @@ def _truths(
 
 
 def _only(examples: Sequence[Example], label: str) -> list[Example]:
-    return [one._replace(labels={name: t for name, t in one.labels.items() if name == label}) for one in examples]
+    return [
+        example._replace(labels={name: t for name, t in example.labels.items() if name == label})
+        for example in examples
+    ]
 
 
 def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
@@ -435,13 +440,9 @@ def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
 def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[str]) -> str | None:
     """Return a label of which no event is in any of these parts, if there is one."""
     for label in labels:
-        if not any(label in (of := examples[one.example].labels) and len(_inside(of[label], one)) for one in parts):
+        if not any(label in (of := examples[part.example].labels) and len(_inside(of[label], part)) for part in parts):
             return label
     return None
-
-
-def _reporting(progress: Callable[[str], object] | None) -> Callable[[str], object]:
-    return (lambda _: None) if progress is None else callback("progress", progress)
 
 
 def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequence[Fold], str]:
@@ -452,7 +453,7 @@ def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequen
     parts = [Part(n) for n in range(len(examples))]
     recordings = len(_grouped(examples, parts))
     if recordings > 1 and count > recordings:
-        raise ProblemError(f"folds is {count}: must be 2 to {recordings}, the number of recordings")
+        raise refused("folds", f" is {count}: must be 2 to {recordings}, the number of recordings")
     how = f"{count} blocks of time" if recordings == 1 else f"whole recordings, {count} folds"
     return _split(examples, parts, count), how
 
@@ -468,7 +469,7 @@ def _grouped(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Pa
 def _sound(folds: Sequence[Fold], examples: int) -> list[Fold]:
     """Return folds with the places of examples as whole numbers; refuse those that make no sense."""
     if not len(folds):
-        raise ProblemError("folds is empty: must be one Fold or more")
+        raise refused("folds", " is empty: must be one Fold or more")
     tested: dict[int, list[Part]] = {}
     sound = []
     for n, fold in enumerate(folds):
@@ -479,7 +480,7 @@ def _sound(folds: Sequence[Fold], examples: int) -> list[Fold]:
             raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold with parts to train on and parts to test")
         train, test = ([_sound_part(f"fold {n}", part, examples) for part in parts] for parts in (train, test))
         for part in test:
-            if any(part.start < other.stop and other.start < part.stop for other in tested.get(part.example, ())):
+            if any(part.start < trained.stop and trained.start < part.stop for trained in tested.get(part.example, ())):
                 raise ProblemError(f"fold {n}: {shown(part)} is tested twice")
             tested.setdefault(part.example, []).append(part)
         sound.append(Fold(train, test, _sound(inner, examples) if inner else inner))
@@ -507,7 +508,7 @@ def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> li
         events = np.sort(np.concatenate([_only_inside(examples[part.example], part) for part in group]))
         edges = (-np.inf, *_between_events(events, count), np.inf)
         stretches = [[_within(part, *of) for part in group] for of in pairwise(edges)]
-        groups = [own for each in stretches if (own := [part for part in each if part.start < part.stop])]
+        groups = [filled for each in stretches if (filled := [part for part in each if part.start < part.stop])]
     return _dealt(groups, count)
 
 
@@ -525,9 +526,9 @@ def _folds_for(label: str, examples: Sequence[Example], parts: Sequence[Part], c
         folds = _split(examples, parts, count)
         if not any(_lacks(examples, fold.train, [label]) for fold in folds):
             return folds
-    own = _only(examples, label)
+    of_label = _only(examples, label)
     groups = _grouped(examples, parts)
-    events = [sum(len(_only_inside(own[part.example], part)) for part in group) for group in groups]
+    events = [sum(len(_only_inside(of_label[part.example], part)) for part in group) for group in groups]
     having = [group for group, count_of in zip(groups, events, strict=True) if count_of]
     others = [group for group, count_of in zip(groups, events, strict=True) if not count_of]
     if len(having) > 1:
@@ -535,7 +536,7 @@ def _folds_for(label: str, examples: Sequence[Example], parts: Sequence[Part], c
     if sum(events) < 4:
         return []
     silent = [part for group in others for part in group]
-    folds = _split(own, having[0], min(count, sum(events) // 2))
+    folds = _split(of_label, having[0], min(count, sum(events) // 2))
     return [Fold([*fold.train, *silent], fold.test) for fold in folds]
 
 
@@ -544,8 +545,8 @@ def _dealt(groups: Sequence[Sequence[Part]], count: int) -> list[Fold]:
     count = min(count, len(groups))
     return [
         Fold(
-            [one for k, group in enumerate(groups) if k % count != n for one in group],
-            [one for group in groups[n::count] for one in group],
+            [part for k, group in enumerate(groups) if k % count != n for part in group],
+            [part for group in groups[n::count] for part in group],
         )
         for n in range(count)
     ]
@@ -560,9 +561,10 @@ def _between_events(times: NDArray[np.int64], count: int) -> Iterator[float]:
     """Yield where a part is cut: in the longest pause near each share of its events, us."""
     reach = max(1, len(times) // (2 * count))
     if len(times) < 2 * count:
-        raise ProblemError(
-            f"folds is {count}: one recording with {counted(len(times), 'event')} has room for {len(times) // 2}, as "
-            "each holds two events or more"
+        raise refused(
+            "folds",
+            f" is {count}: one recording with {counted(len(times), 'event')} has room for {len(times) // 2}, as "
+            "each holds two events or more",
         )
     for n in range(1, count):
         near = np.arange(max(1, n * len(times) // count - reach + 1), min(len(times), n * len(times) // count + reach))

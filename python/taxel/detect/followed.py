@@ -72,19 +72,19 @@ def follow(
     quantities : sequence of int
         The trains that are compared.
     """
-    truth = np.concatenate([_shifted(t, k, one) for k, (t, one) in enumerate(zip(given, patterns, strict=True))])
+    truth = np.concatenate([_shifted(t, k, of) for k, (t, of) in enumerate(zip(given, patterns, strict=True))])
     best: dict[int, tuple[tuple[int, float], Followed]] = {}
     for train, edges in _every(patterns, quantities):
-        if sum(len(one.onsets) for one in edges) > _MOST_A_LABEL * len(truth):
+        if sum(len(edge.onsets) for edge in edges) > _MOST_A_LABEL * len(truth):
             continue
-        each = [np.rint(to_us(one.onsets - latency_ms)).astype(np.int64) for one in edges]
-        fired = np.concatenate([_shifted(t, k, one) for k, (t, one) in enumerate(zip(each, patterns, strict=True))])
+        each = [np.rint(to_us(edge.onsets - latency_ms)).astype(np.int64) for edge in edges]
+        fired = np.concatenate([_shifted(t, k, of) for k, (t, of) in enumerate(zip(each, patterns, strict=True))])
         scored = score(Detections([label] * len(fired), fired, fired), {label: truth}, FOLLOWED_MS)
         off = float(np.median(np.abs(scored.errors_ms))) if scored.found else np.inf
         rank = scored.missed + scored.false, off
         if scored.found and (train not in best or rank < best[train][0]):
             best[train] = rank, Followed(train, edges, scored)
-    return [one for _, one in sorted(best.values(), key=lambda ranked: ranked[0])]
+    return [follower for _, follower in sorted(best.values(), key=lambda ranked: ranked[0])]
 
 
 def _shifted(t: NDArray[np.int64], k: int, pattern: SpikeTrains) -> NDArray[np.int64]:
@@ -95,7 +95,7 @@ def _shifted(t: NDArray[np.int64], k: int, pattern: SpikeTrains) -> NDArray[np.i
 def _every(patterns: Sequence[SpikeTrains], quantities: Sequence[int]) -> Iterator[tuple[int, tuple[_Edges, ...]]]:
     """Yield all onsets and ends of each quantity, by threshold and number of samples."""
     for train in quantities:
-        sampled = [_samples(one, train) for one in patterns]
+        sampled = [_samples(pattern, train) for pattern in patterns]
         for threshold in _THRESHOLDS:
             for count in _SAMPLES:
                 yield train, tuple(_edges(clock, values >= np.log1p(threshold), count) for clock, values in sampled)
@@ -116,7 +116,7 @@ def _edges(clock: NDArray[np.float64], above: NDArray[np.bool_], count: int) -> 
     """Return when a quantity came to stay at its threshold for some samples, and when below it; below at first."""
     starts = [_runs(above, count), _runs(~above, count)]
     place = np.concatenate(starts)
-    up = np.repeat([True, False], [len(one) for one in starts])
+    up = np.repeat([True, False], [len(start) for start in starts])
     order = np.argsort(place, kind="stable")
     place, up = place[order], up[order]
     changed = up != np.concatenate([[False], up[:-1]])
@@ -169,7 +169,7 @@ def silence(
         edge = np.sort(np.concatenate([edges.onsets, edges.ends, [-np.inf, np.inf]]))
         place = np.searchsorted(edge, clock)
         near = np.minimum(clock - edge[np.maximum(place - 1, 0)], edge[place] - clock) < _NEAR_MS
-        chosen = np.sort(np.concatenate([_spaced(np.flatnonzero(free & one), most // 2) for one in (near, ~near)]))
+        chosen = np.sort(np.concatenate([_spaced(np.flatnonzero(free & zone), most // 2) for zone in (near, ~near)]))
         # A window of a step holds one point of the grid, whatever the offset between grid and samples.
         windows.append(np.column_stack([clock[chosen], clock[chosen] + 0.99 * step_ms]))
     return windows
@@ -198,6 +198,6 @@ def distinct(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:
     Weights that equal trains share require all of these to spike at once, as levels do that every touch of the training
     reached in one picture. Of levels the first is the lowest, which weaker touches reach as well.
     """
-    spikes = [tuple(one[train].tobytes() for one in patterns) for train in range(len(patterns[0]))]
-    first = {own: train for train, own in reversed(list(enumerate(spikes)))}
-    return [only(one, sorted(first.values())) for one in patterns]
+    spikes = [tuple(pattern[train].tobytes() for pattern in patterns) for train in range(len(patterns[0]))]
+    first = {key: train for train, key in reversed(list(enumerate(spikes)))}
+    return [only(pattern, sorted(first.values())) for pattern in patterns]

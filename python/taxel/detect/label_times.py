@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.progress import reporting
 from taxel._core import ProblemError
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.examples import Example
@@ -58,19 +59,21 @@ def off_by(examples: Sequence[Example], labels: Sequence[str], noise_floor: floa
     noise_floor : float, in the sensor's unit
         Of a board; that of other sensors is measured.
     """
-    sources = [one for one in examples if one.tare is not None and not isinstance(one.source, SpikeTrains)]
+    sources = [
+        example for example in examples if example.tare is not None and not isinstance(example.source, SpikeTrains)
+    ]
     if len(sources) < len(examples) or lacks_neighbours(examples):
         return {}
-    early = [one if (tare := _early(one)) is None else one._replace(tare=tare) for one in examples]
+    early = [example if (tare := _early(example)) is None else example._replace(tare=tare) for example in examples]
     floor = measured_floor(early) or noise_floor
-    loads = Loads(early, [clock_of(one) for one in early], floor, lambda _: None, ("area",))
+    loads = Loads(early, [clock_of(example) for example in early], floor, reporting(None), ("area",))
     felt = [edge.t for edge in loads.edges("area", TOUCH, 1.0, 1)]
     found = {}
     for label in labels:
         times = loads.truth(label, loads.every)
-        steady = [one for edge in felt for one in _steady(times, edge)]
-        if steady and all(abs(one.ms) > WINDOW_MS for one, _ in steady):
-            found[label], _ = min(steady, key=lambda one: (-one[0].alike, one[1]))
+        steady = [felt_edge for edge in felt for felt_edge in _steady(times, edge)]
+        if steady and all(abs(shift.ms) > WINDOW_MS for shift, _ in steady):
+            found[label], _ = min(steady, key=lambda found_edge: (-found_edge[0].alike, found_edge[1]))
     return found
 
 
@@ -82,7 +85,7 @@ def _steady(times: NDArray[np.int64], felt: NDArray[np.int64]) -> Iterator[tuple
     far = round(to_us(_FARTHEST_MS))
     reach = np.searchsorted(felt, [times - far, times + far])
     which = np.repeat(np.arange(len(times)), reach[1] - reach[0])
-    beside = np.concatenate([np.arange(*one) for one in reach.T])
+    beside = np.concatenate([np.arange(*span) for span in reach.T])
     apart = to_ms(times[which] - felt[beside])
     order = np.argsort(apart, kind="stable")
     apart, which = apart[order], which[order]
@@ -102,12 +105,12 @@ def unlabelled(examples: Sequence[Example], label: str) -> tuple[int, int]:
     label : str
     """
     outside = whole = 0
-    for one in examples:
-        times = np.sort(one.labels.get(label, np.empty(0, np.int64)))
-        if isinstance(one.source, SpikeTrains):
-            first, last = (round(to_us(edge)) for edge in (one.source.start, one.source.stop))
+    for example in examples:
+        times = np.sort(example.labels.get(label, np.empty(0, np.int64)))
+        if isinstance(example.source, SpikeTrains):
+            first, last = (round(to_us(edge)) for edge in (example.source.start, example.source.stop))
         else:
-            t = one.source.t  # type: ignore[union-attr]
+            t = example.source.t  # type: ignore[union-attr]
             first, last = (int(t[0]), int(t[-1])) if len(t) else (0, 0)
         if len(times):
             apart = int(np.diff(times).max(initial=0))
@@ -127,7 +130,7 @@ def held_by_tare(examples: Sequence[Example], noise_floor: float) -> int:
     noise_floor : float, in the sensor's unit
         As of `off_by`.
     """
-    return max((_held(one, noise_floor) for one in examples), default=0)
+    return max((_held(example, noise_floor) for example in examples), default=0)
 
 
 def _held(example: Example, noise_floor: float) -> int:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.progress import Progress
 from taxel.detect.detector import tare_text
 from taxel.detect.examples import Example, unit_of
 from taxel.detect.scoring import APART_US
@@ -17,7 +18,7 @@ from taxel.recording import Recording
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.wire import FRAME_US
 
-__all__ = ["Clock", "Found", "Loads", "Stretch", "clock_of", "picture_ms"]
+__all__ = ["Clock", "FoundTimes", "Loads", "Stretch", "clock_of", "picture_ms"]
 
 #: How long a frame lasts (us; None: as the source says), and the wire's version.
 Clock: TypeAlias = tuple[float | None, int]
@@ -25,7 +26,7 @@ Clock: TypeAlias = tuple[float | None, int]
 Stretch: TypeAlias = tuple[int, float, float]
 
 
-class Found(NamedTuple):
+class FoundTimes(NamedTuple):
     """What a rule found: times and when they were known (us, on one clock, ascending), and the quantity then."""
 
     t: NDArray[np.int64]
@@ -58,23 +59,23 @@ class Loads:
         examples: Sequence[Example],
         clocks: Sequence[Clock],
         noise_floor: float,
-        report: Callable[[str], object],
+        report: Progress,
         quantities: Sequence[str] = ("area", "total", "local_load"),
     ) -> None:
         self.noise_floor, self.unit = noise_floor, unit_of(examples)
-        self.names = sorted({name for one in examples for name in one.labels})
-        self._labels = [{name: np.sort(times) for name, times in one.labels.items()} for one in examples]
+        self.names = sorted({name for example in examples for name in example.labels})
+        self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
         self.every: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
-        self._shift = [k * APART_US - _first(one) for k, one in enumerate(examples)]
+        self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
         self._picture_ms = max(map(picture_ms, examples))
         self._curves: dict[str, list[_core.LoadCurve]] = {}
         self._changes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
-        self._edges: dict[tuple[str, float, float, int], tuple[Found, Found]] = {}
-        self._ages: dict[float, Found] = {}
+        self._edges: dict[tuple[str, float, float, int], tuple[FoundTimes, FoundTimes]] = {}
+        self._ages: dict[float, FoundTimes] = {}
         for quantity in quantities:
-            report(f"measuring the {quantity.replace('_', ' ')} for plain rules")
+            report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
             self._curves[quantity] = [
-                _curve(quantity, noise_floor, one, *clock) for one, clock in zip(examples, clocks, strict=True)
+                _curve(quantity, noise_floor, example, *clock) for example, clock in zip(examples, clocks, strict=True)
             ]
 
     @property
@@ -82,11 +83,11 @@ class Loads:
         """The names of the quantities."""
         return tuple(self._curves)
 
-    def edges(self, quantity: str, threshold: float, release: float, frames: int) -> tuple[Found, Found]:
+    def edges(self, quantity: str, threshold: float, release: float, frames: int) -> tuple[FoundTimes, FoundTimes]:
         """Return the begins and the ends of loads."""
         point = quantity, threshold, release, frames
         if point not in self._edges:
-            sides = zip(*(one.edges(threshold, release, frames) for one in self._curves[quantity]), strict=True)
+            sides = zip(*(curve.edges(threshold, release, frames) for curve in self._curves[quantity]), strict=True)
             begins, ends = map(self._together, sides)
             self._edges[point] = begins, ends
         return self._edges[point]
@@ -103,10 +104,10 @@ class Loads:
         holds = sorted({int(age / self._picture_ms + 1e-6) for age in ages_ms})
         return [to_ms(round(to_us((k + 0.5) * self._picture_ms))) if k else 0.0 for k in holds]
 
-    def at_age(self, age_ms: float) -> Found:
+    def at_age(self, age_ms: float) -> FoundTimes:
         """Return the area at an age of every touch."""
         if age_ms not in self._ages:
-            self._ages[age_ms] = self._together([one.at_age(age_ms) for one in self._curves["area"]])
+            self._ages[age_ms] = self._together([curve.at_age(age_ms) for curve in self._curves["area"]])
         return self._ages[age_ms]
 
     def values(self, quantity: str, parts: Iterable[Stretch]) -> NDArray[np.float64]:
@@ -123,7 +124,7 @@ class Loads:
         """Return the labels of a name in parts of the examples, us on the one clock."""
         every = [self._labels[k].get(name, np.empty(0, np.int64)) + shift for k, shift in enumerate(self._shift)]
         times = np.concatenate(every)
-        return Found(times, times, np.zeros(len(times))).between(self.windows(parts)).t
+        return FoundTimes(times, times, np.zeros(len(times))).between(self.windows(parts)).t
 
     def windows(self, parts: Iterable[Stretch]) -> list[tuple[int, int]]:
         """Return from when to when parts of the examples last on the one clock, us, ascending."""
@@ -134,22 +135,25 @@ class Loads:
 
         return sorted((edge(k, start), edge(k, stop)) for k, start, stop in parts)
 
-    def off(self, found: Found, k: int) -> Found:
+    def off(self, found: FoundTimes, k: int) -> FoundTimes:
         """Return what was found by the clock of example k."""
         return found._replace(t=found.t - self._shift[k], known=found.known - self._shift[k])
 
-    def _together(self, found: Iterable[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]) -> Found:
+    def _together(
+        self, found: Iterable[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]
+    ) -> FoundTimes:
         t, known, values = zip(*found, strict=True)
 
         def shifted(times: Iterable[NDArray[np.int64]]) -> NDArray[np.int64]:
-            return np.concatenate([one + by for one, by in zip(times, self._shift, strict=True)])
+            return np.concatenate([t + by for t, by in zip(times, self._shift, strict=True)])
 
-        return Found(shifted(t), shifted(known), np.concatenate(values))
+        return FoundTimes(shifted(t), shifted(known), np.concatenate(values))
 
 
 def lacks_neighbours(examples: Sequence[Example]) -> bool:
     """Whether an example is of channels: their taxels have no known neighbours, and rules count those beside one."""
-    return any(not one.source.array._has_neighbours for one in examples if not isinstance(one.source, SpikeTrains))  # type: ignore[union-attr]
+    sensed = [example.source for example in examples if not isinstance(example.source, SpikeTrains)]
+    return any(not source.array._has_neighbours for source in sensed)  # type: ignore[union-attr]
 
 
 def picture_ms(example: Example) -> float:

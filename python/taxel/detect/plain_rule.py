@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from taxel import _core
 from taxel._base.arguments import instance, number, parameters, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.detector import _Detector
 from taxel.tare import Tare
@@ -191,9 +191,9 @@ def _labels(labels: object, age: float | None) -> list[str | None]:
     """Return the two labels, of which either may be None."""
     if labels is None:
         if age is not None:
-            raise ProblemError("labels are left out: with age_ms give the kinds below the threshold and above it")
+            raise refused("labels", " are left out: with age_ms give the kinds below the threshold and above it")
         return list(_USUAL)
     pair = several("labels", labels) if not isinstance(labels, str) else []
     if len(pair) != 2:
-        raise ProblemError(f"labels is {shown(labels)}: must be two names, of which one may be None")
+        raise refused("labels", f" is {shown(labels)}: must be two names, of which one may be None")
     return [None if label is None else text("labels", label) for label in pair]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
+from taxel._base.progress import Progress
 from taxel.detect.examples import Example, called
 from taxel.detect.loads import Clock, Loads, Stretch, lacks_neighbours
 from taxel.detect.plain_rule import PlainRule
@@ -146,7 +147,7 @@ def plain_score(
     ways: Sequence[tuple[Sequence[Stretch], Sequence[Stretch]]],
     truths: Sequence[Mapping[str, NDArray[np.int64]]],
     window_ms: float,
-    report: Callable[[str], object],
+    report: Progress,
 ) -> PlainScore:
     """Tune rules on the training parts of each of `ways`, and score them on its tested parts.
 
@@ -162,21 +163,23 @@ def plain_score(
     truths : sequence of mapping of str to int64, us
         The labels of each example that is tested, in order.
     window_ms : float
-    report : function of str
+    report : function of (step, done, all)
     """
-    lacking = [k for k, one in enumerate(examples) if one.tare is None or isinstance(one.source, SpikeTrains)]
+    lacking = [
+        k for k, example in enumerate(examples) if example.tare is None or isinstance(example.source, SpikeTrains)
+    ]
     if lacking:
         why = f"{called(lacking[0], examples[lacking[0]])} has no tare" if len(examples) > 1 else "there is no tare"
         return PlainScore(dict.fromkeys(labels), None, f"{why} to measure a load from")
     if lacks_neighbours(examples):
         return PlainScore(dict.fromkeys(labels), None, "plain rules need neighbours on a grid, and these are channels")
     loads = Loads(examples, clocks, noise_floor, report)
-    report("tuning plain rules")
+    report("tuning plain rules", 0, 0)
     rules = best_rules(loads, labels, loads.every, window_ms)
     detections: dict[int, list[Detections]] = {}
     for n, (train, test) in enumerate(ways or [(loads.every, loads.every)]):
         if ways:
-            report(f"tuning plain rules, fold {n + 1} of {len(ways)}")
+            report(f"tuning plain rules, fold {n + 1} of {len(ways)}", 0, 0)
         mine = best_rules(loads, labels, train, window_ms) if ways else rules
         for part in test:
             detections.setdefault(part[0], []).append(_detected(loads, mine, part))

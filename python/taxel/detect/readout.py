@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._base.saved import read
 from taxel._core import NotFittedError, ProblemError
@@ -109,13 +110,13 @@ class Readout(_Detector):
     ) -> None:
         instance("encoder", encoder, Encoder)
         if not isinstance(neurons, Mapping) or not neurons:
-            raise ProblemError(f"neurons is {shown(neurons)}: must be trained neurons by label, one or more")
+            raise refused("neurons", f" is {shown(neurons)}: must be trained neurons by label, one or more")
         named = {} if inputs is None else mapping("inputs", inputs)
         for label in named:
             if label not in neurons:
-                raise ProblemError(f"inputs: no neuron {shown(label)}: there are {', '.join(map(str, neurons))}")
+                raise refused("inputs", f": no neuron {shown(label)}: there are {', '.join(map(str, neurons))}")
         trained = {
-            text("label", label): _trained(label, one, delay_ms, named.get(label)) for label, one in neurons.items()
+            text("label", label): _trained(label, cell, delay_ms, named.get(label)) for label, cell in neurons.items()
         }
         if not isinstance(delay_ms, Mapping):
             # Also where each neuron comes with its own.
@@ -133,12 +134,12 @@ class Readout(_Detector):
                     "delays_ms": floats("delays_ms", delays_ms, "ms"),
                     "neurons": {
                         label: {
-                            "neuron": json.loads(one.neuron._json()),
-                            "delay_ms": one.delay_ms,
-                            "inputs": list(one.inputs),
-                            "weights": one.weights,
+                            "neuron": json.loads(cell.neuron._json()),
+                            "delay_ms": cell.delay_ms,
+                            "inputs": list(cell.inputs),
+                            "weights": cell.weights,
                         }
-                        for label, one in trained.items()
+                        for label, cell in trained.items()
                     },
                 }
             )
@@ -165,12 +166,12 @@ class Readout(_Detector):
         """The trained neurons by label."""
         return {
             label: TrainedNeuron(
-                Neuron(**one["neuron"]),
-                np.array(one["weights"], np.float64),
-                one["delay_ms"],
-                tuple(one.get("inputs", ())),
+                Neuron(**cell["neuron"]),
+                np.array(cell["weights"], np.float64),
+                cell["delay_ms"],
+                tuple(cell.get("inputs", ())),
             )
-            for label, one in self._parts["neurons"].items()
+            for label, cell in self._parts["neurons"].items()
         }
 
     def encoder_of(self, label: str) -> Encoder:
@@ -280,21 +281,21 @@ class Readout(_Detector):
 
     def _exchanged(self) -> Parts:
         """Return the parts that the exchange format is made of; weights of trains that a neuron lacks are 0."""
-        neurons = {label: one._replace(weights=self._spread(one)) for label, one in self.neurons.items()}
+        neurons = {label: cell._replace(weights=self._spread(cell)) for label, cell in self.neurons.items()}
         return Parts(
             self.encoder, neurons, self.array, self.delays_ms, self.unit, self.run_threshold, self.time,
             self.after_spike, self.to_json(),
         )  # fmt: skip
 
-    def _spread(self, one: TrainedNeuron) -> NDArray[np.float64]:
+    def _spread(self, cell: TrainedNeuron) -> NDArray[np.float64]:
         """Return one weight a train of the whole encoder, at each delay."""
-        received = _received(self.encoder, one, self.array, len(self.delays_ms))
+        received = _received(self.encoder, cell, self.array, len(self.delays_ms))
         if received is None:
-            return one.weights
-        if np.count_nonzero(received) != len(one.weights):
+            return cell.weights
+        if np.count_nonzero(received) != len(cell.weights):
             raise ProblemError("NIR: a readout of encoders whose trains depend on the array must state its array")
         spread = np.zeros(len(received))
-        spread[received] = one.weights
+        spread[received] = cell.weights
         return spread
 
     @classmethod
@@ -337,7 +338,7 @@ class Readout(_Detector):
         def build(parts: Parts) -> Readout:
             if parts.text:
                 return cls.from_json(parts.text)
-            neurons = {label: _gathered(parts, one) for label, one in parts.neurons.items()}
+            neurons = {label: _gathered(parts, cell) for label, cell in parts.neurons.items()}
             return cls(parts.encoder, neurons, array=parts.array, unit=parts.unit, delays_ms=parts.delays_ms)
 
         return read_nir(
@@ -430,76 +431,76 @@ def run_counting(
         if source.registers is not None:
             period = source.registers.frame_us if period is None else period
             version = source.registers.wire_version if version is None else version
-        zeroings = [(one.t, one.x, one.y, one.rest) for one in source.zeroings] if source.has_events else []
+        zeroings = [(z.t, z.x, z.y, z.rest) for z in source.zeroings] if source.has_events else []
         source = recorded(source)
     if isinstance(source, SpikeTrains):
         if not isinstance(readout, Readout):
-            raise ProblemError(f"source is {shown(source)}: a plain rule reads a recording, events or frames")
+            raise refused("source", f" is {shown(source)}: a plain rule reads a recording, events or frames")
         return _run_spikes(readout, source), None
     if isinstance(source, Events | Frames):
         readout._check_unit(unit_of(source))
-        for own in (readout.array, None if tare is None else tare.array):
-            if own is not None:
-                own._warn_apart(source.array, "the recording")
+        for array in (readout.array, None if tare is None else tare.array):
+            if array is not None:
+                array._warn_apart(source.array, "the recording")
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
         columns, outside = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings, begin_us)
         return Detections._from_parts(columns), outside
     if not isinstance(source, Frames):
-        raise ProblemError(
-            f"source is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
+        raise refused(
+            "source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
     columns, outside = _core.readout_run_frames(text, source._parts(), period, rest, begin_us)
     return Detections._from_parts(columns), outside
 
 
-def _received(encoder: Encoder, one: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:
+def _received(encoder: Encoder, cell: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:
     """Return which of the encoder's trains, at each delay, a neuron receives; None where it receives all."""
-    if not one.inputs or not isinstance(encoder, Composite):
+    if not cell.inputs or not isinstance(encoder, Composite):
         return None
-    return np.tile(encoder.places(one.inputs, array or Array(1, 1)), delays)
+    return np.tile(encoder.places(cell.inputs, array or Array(1, 1)), delays)
 
 
-def _gathered(parts: Parts, one: TrainedNeuron) -> TrainedNeuron:
+def _gathered(parts: Parts, cell: TrainedNeuron) -> TrainedNeuron:
     """Return a neuron with weights of its inputs alone; with all trains as inputs where others have weights too."""
-    received = _received(parts.encoder, one, parts.array, len(parts.delays_ms))
+    received = _received(parts.encoder, cell, parts.array, len(parts.delays_ms))
     if received is None:
-        return one
-    own = len(received) == len(one.weights) and not one.weights[~received].any()
-    return one._replace(weights=one.weights[received]) if own else one._replace(inputs=())
+        return cell
+    is_gathered = len(received) == len(cell.weights) and not cell.weights[~received].any()
+    return cell._replace(weights=cell.weights[received]) if is_gathered else cell._replace(inputs=())
 
 
 def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     """Return what the neurons of a readout detect in the spikes that its encoder made."""
     detections = Detections([], [], [])
-    for label, one in readout.neurons.items():
+    for label, cell in readout.neurons.items():
         inputs = readout.trains_of(label, trains)
-        spikes, slopes = one.neuron._run(one.weights, inputs.lasting(inputs.stop + SILENCE_MS), readout.run_threshold)
-        offset_ms = readout.encoder_of(label).latency_ms + one.delay_ms
+        spikes, slopes = cell.neuron._run(cell.weights, inputs.lasting(inputs.stop + SILENCE_MS), readout.run_threshold)
+        offset_ms = readout.encoder_of(label).latency_ms + cell.delay_ms
         t, known = (np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - offset_ms, spikes))
         detections += Detections([label] * len(spikes), t, known, slopes)
     return detections[np.argsort(detections.known, kind="stable")]
 
 
 def _trained(
-    label: str, one: Any, delay_ms: float | Mapping[str, float], inputs: Sequence[str] | None
+    label: str, cell: Any, delay_ms: float | Mapping[str, float], inputs: Sequence[str] | None
 ) -> TrainedNeuron:
     """Return a neuron with weights, delay and inputs, given a learner or a tuple."""
     if isinstance(delay_ms, Mapping):
         if label not in delay_ms:
-            raise ProblemError(f"delay_ms: there is none for {label!r}")
+            raise refused("delay_ms", f": there is none for {label!r}")
         delay_ms = delay_ms[label]
     delay, named = delay_ms, () if inputs is None else inputs
-    if isinstance(one, tuple) and len(one) in (2, 3, 4):
-        neuron, weights, *others = one
+    if isinstance(cell, tuple) and len(cell) in (2, 3, 4):
+        neuron, weights, *others = cell
         delay = others[0] if others else delay
         named = others[1] if len(others) > 1 and inputs is None else named
-    elif hasattr(one, "weights_") and hasattr(one, "neuron_"):
-        neuron, weights = one.neuron_, one.weights_
+    elif hasattr(cell, "weights_") and hasattr(cell, "neuron_"):
+        neuron, weights = cell.neuron_, cell.weights_
     else:
-        if hasattr(one, "fit"):
-            raise NotFittedError(f"{label}: {shown(one)} is not fitted")
-        raise ProblemError(f"{label}: {shown(one)} must be a fitted learner, or (Neuron, weights)")
+        if hasattr(cell, "fit"):
+            raise NotFittedError(f"{label}: {shown(cell)} is not fitted")
+        raise ProblemError(f"{label}: {shown(cell)} must be a fitted learner, or (Neuron, weights)")
     instance(f"{label}: neuron", neuron, Neuron)
     return TrainedNeuron(
         neuron,

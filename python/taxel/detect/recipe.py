@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from taxel._base.arguments import finite, flag, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.errors import helped, refused
 from taxel._core import ProblemError
 from taxel.detect import recipes
 from taxel.detect.examples import Example
@@ -80,12 +81,12 @@ class Recipe:
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
         if not finite("run_threshold", self.run_threshold) > 0:
-            raise ProblemError(f"run_threshold is {shown(self.run_threshold)}: must be above 0 and finite")
+            raise refused("run_threshold", f" is {shown(self.run_threshold)}: must be above 0 and finite")
         text("about", self.about)
         text("source", self.source)
         flag("align", self.align)
         if not isinstance(self.neurons, Mapping):
-            raise ProblemError(f"neurons is {shown(self.neurons)}: must be parameters by label")
+            raise refused("neurons", f" is {shown(self.neurons)}: must be parameters by label")
         learner_from("learner", self.learner)
         for label in self.neurons:
             self.learner_of(text("label", label))
@@ -116,9 +117,9 @@ class Recipe:
         >>> Recipe(LevelCrossing([1.0]), {"delay_ms": 1.0}, {"contact": {"ub": 2.0}}).learner_of("contact")[1]
         1.0
         """
-        own = self.neurons.get(text("label", label), {})
-        if not isinstance(own, Mapping):
-            raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
+        listed = self.neurons.get(text("label", label), {})
+        if not isinstance(listed, Mapping):
+            raise ProblemError(f"neurons.{label} is {shown(listed)}: must be parameters by name")
         return self._checked(f"neurons.{label}", self._of(label))
 
     def _checked(self, place: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
@@ -138,7 +139,7 @@ class Recipe:
         if inputs is None:
             return self.encoder
         if not isinstance(self.encoder, Composite):
-            raise ProblemError(f"inputs is {shown(inputs)}: there is one encoder, so leave it out")
+            raise refused("inputs", f" is {shown(inputs)}: there is one encoder, so leave it out")
         return self.encoder.only(several("inputs", inputs))
 
     def inputs_of(self, label: str) -> tuple[str, ...]:
@@ -172,11 +173,11 @@ class Recipe:
         """
         if not isinstance(self.encoder, Composite):
             return self
-        own = [
+        tried = [
             self.points_of(label)[: None if search else 1] + self._choices_of(label)[: None if choices else 1]
             for label in labels
         ]
-        points = [{**self.learner, **point} for each in own for point in each]
+        points = [{**self.learner, **point} for each in tried for point in each]
         received = {name for point in points for name in point.get("inputs", self.encoder.parts)}
         parts = {name: part for name, part in self.encoder.parts.items() if name in received}
         narrowed = copy(self)
@@ -221,9 +222,9 @@ class Recipe:
     def _points(self, label: str, key: str) -> list[dict[str, Any]]:
         """Return the parameters of a label's neuron, and behind them the others that it lists under a key."""
         whole = self.neurons.get(text("label", label), {})
-        own = {name: value for name, value in whole.items() if name not in LISTS}
+        plain = {name: value for name, value in whole.items() if name not in LISTS}
         listed = several(f"neurons.{label}.{key}", whole.get(key, ()))
-        return [own, *({**own, **mapping(f"neurons.{label}.{key}", point)} for point in listed)]
+        return [plain, *({**plain, **mapping(f"neurons.{label}.{key}", point)} for point in listed)]
 
     def _with_point(self, label: str, point: Mapping[str, Any]) -> Recipe:
         """Return the recipe for one label, with these parameters and without others to try."""
@@ -237,20 +238,22 @@ class Recipe:
 
         def listed(label: str, point: Mapping[str, Any]) -> dict[str, Any]:
             before, first = self.neurons.get(label, {}), self.points_of(label)[0]
-            other = {name: value for name, value in first.items() if point.get(name) != value}
-            return {key: [{**other, **one} for one in before[key]] for key in LISTS if key in before}
+            more = {name: value for name, value in first.items() if point.get(name) != value}
+            return {key: [{**more, **was} for was in before[key]] for key in LISTS if key in before}
 
         return replace(self, neurons={label: {**point, **listed(label, point)} for label, point in points.items()})
 
     def _without_choices(self, part: str) -> Recipe:
         """Return the recipe without the points to choose from whose neuron receives an encoder of this name."""
 
-        def left(label: str, own: Mapping[str, Any]) -> dict[str, Any]:
+        def left(label: str, neuron: Mapping[str, Any]) -> dict[str, Any]:
             points = [self._received({**self.learner, **point}) for point in self._choices_of(label)[1:]]
-            kept = [one for one, got in zip(own.get("choose", ()), points, strict=True) if got.name != part]
-            return {**own, "choose": kept} if kept else {key: value for key, value in own.items() if key != "choose"}
+            kept = [choice for choice, got in zip(neuron.get("choose", ()), points, strict=True) if got.name != part]
+            return (
+                {**neuron, "choose": kept} if kept else {key: value for key, value in neuron.items() if key != "choose"}
+            )
 
-        return replace(self, neurons={label: left(label, own) for label, own in self.neurons.items()})
+        return replace(self, neurons={label: left(label, neuron) for label, neuron in self.neurons.items()})
 
     def _labels(self, examples: Sequence[Example]) -> tuple[str, ...]:
         """Return the labels that are learnt: the recipe's, or where it has none those of the examples."""
@@ -287,8 +290,8 @@ class Recipe:
         for key in values:
             if key not in (*known, "encoders", *_OF_THE_FILE):
                 raise ProblemError(f"a recipe has no key {shown(key)}: there are {', '.join(known)}, encoders")
-        own = {key: value for key, value in values.items() if key in known}
-        return cls(**{**own, "encoder": _encoder_of(values)})
+        arguments = {key: value for key, value in values.items() if key in known}
+        return cls(**{**arguments, "encoder": _encoder_of(values)})
 
     @classmethod
     def load(
@@ -345,18 +348,17 @@ class Recipe:
 
 def _encoder_of(values: Mapping[str, Any]) -> Encoder:
     """Return the encoder of a recipe's plain values, or several as a composite."""
-    one, each = values.get("encoder"), values.get("encoders")
-    if isinstance(one, Mapping) == isinstance(each, Mapping):
-        wrong = "both encoder and encoders: name one of the two" if one is not None and each is not None else ""
-        raise ProblemError(
-            f"recipe: says {wrong or 'no encoder: name one, as --encoder contact_area or [encoder] in the recipe'}"
-        )
+    single, each = values.get("encoder"), values.get("encoders")
+    if isinstance(single, Mapping) == isinstance(each, Mapping):
+        if single is not None and each is not None:
+            raise refused("recipe", ": says both encoder and encoders: name one of the two")
+        raise helped(ProblemError("the recipe says no encoder, as [encoder] does"), "encoder", "give")
 
     def stated(encoder: Mapping[str, Any]) -> Encoder:
         return Encoder.from_json(parameters({n: None if v == "none" else v for n, v in encoder.items()}))
 
-    if isinstance(one, Mapping):
-        return stated(one)
+    if isinstance(single, Mapping):
+        return stated(single)
     assert each is not None
     parts = {}
     for name, table in each.items():
@@ -373,11 +375,11 @@ def with_floor(values: Mapping[str, Any], noise_floor: float) -> dict[str, Any]:
     The least noise of a taxel belongs to the floor: it is a tenth of it, as .3 is of the board's 3 ticks.
     """
     floor = finite("noise_floor", noise_floor)
-    own = {"noise_floor": floor, "least_noise": floor / 10.0}
+    floors = {"noise_floor": floor, "least_noise": floor / 10.0}
 
     def stated(table: Mapping[str, Any]) -> dict[str, Any]:
         known = inspect.signature(Encoder._by_name.get(str(table.get("name")), Encoder)).parameters
-        return {**{name: value for name, value in own.items() if name in known}, **table}
+        return {**{name: value for name, value in floors.items() if name in known}, **table}
 
     encoders = {name: stated(table) for name, table in values.get("encoders", {}).items()}
     return {
@@ -390,12 +392,12 @@ def with_floor(values: Mapping[str, Any], noise_floor: float) -> dict[str, Any]:
 def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return values changed at dotted keys; a change for all neurons takes precedence over a neuron's own value."""
     if not isinstance(changes, Mapping):
-        raise ProblemError(f"changes is {shown(changes)}: must be values by dotted key")
+        raise refused("changes", f" is {shown(changes)}: must be values by dotted key")
     values = json.loads(json.dumps(values))
     for key in changes:
         table, _, name = text("key", key).partition(".")
-        own = values.get("neurons")
-        for neuron in own.values() if table == "learner" and isinstance(own, dict) else ():
+        neurons = values.get("neurons")
+        for neuron in neurons.values() if table == "learner" and isinstance(neurons, dict) else ():
             if isinstance(neuron, dict):
                 neuron.pop(name, None)
     for key, value in changes.items():
@@ -423,17 +425,17 @@ def _check_age(place: str, delay_ms: float, encoder: Encoder) -> None:
 def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     """Return the learner that plain values describe, and the delay it is trained with (ms); `name` is for errors."""
     if not isinstance(values, Mapping):
-        raise ProblemError(f"{name} is {shown(values)}: must be parameters by name")
+        raise refused(name, f" is {shown(values)}: must be parameters by name")
     values = {key: value for key, value in values.items() if key != "inputs"}
     delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0), "ms")
     # In a recipe a neuron's parameters stand among the learner's, which is trained on a grid whatever its clock.
     cone = ConeR()
-    own = [key for key in cone.get_params(deep=False) if key != "neuron"]
+    learner = [key for key in cone.get_params(deep=False) if key != "neuron"]
     neuron = [key for key in Neuron().get_params() if key != "time"]
     for key in values:
-        if key not in own + neuron:
-            raise ProblemError(
-                f"{name}: no parameter {shown(key)}: there are {', '.join(neuron + own)}, delay_ms and inputs"
+        if key not in learner + neuron:
+            raise refused(
+                name, f": no parameter {shown(key)}: there are {', '.join(neuron + learner)}, delay_ms and inputs"
             )
     nested = {f"neuron__{key}" if key in neuron else key: value for key, value in values.items()} | {
         "neuron__time": "grid"

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, finite_numbers, instance, numbers, shown
+from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, plain
 from taxel._core import ProblemError
 from taxel.detections import Detections
@@ -64,7 +65,7 @@ class Spread(NamedTuple):
         """
         given = finite_numbers("values", values)
         if given.ndim != 1:
-            raise ProblemError(f"values has {given.ndim} dimensions: must have one")
+            raise refused("values", f" has {given.ndim} dimensions: must have one")
         spread = cls(**_core.spread(given))
         # The mean of equal values is rounded, so that they seem to vary by some 1e-17.
         return spread._replace(mean=float(given[0]), sd=0.0) if len(given) > 1 and np.ptp(given) == 0.0 else spread
@@ -156,21 +157,21 @@ class Score:
 
     def to_dict(self) -> dict[str, Any]:
         """Return counts and spreads (ms) as plain values, label by label; what is not known is None."""
-        one: dict[str, Any] = {
+        plain: dict[str, Any] = {
             name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near")
         }
         for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay)):
-            one[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
+            plain[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
         if self.by_label:
-            one["by_label"] = {label: part.to_dict() for label, part in self.by_label.items()}
-        return one
+            plain["by_label"] = {label: part.to_dict() for label, part in self.by_label.items()}
+        return plain
 
     def __repr__(self) -> str:
         rows = [*self.by_label.values()] if len(self.by_label) > 1 else []
         every = [*rows, self]
-        counts = [(one.events, one.found, one.missed, one.false, one.false_near) for one in every]
+        counts = [(score.events, score.found, score.missed, score.false, score.false_near) for score in every]
         table: list[tuple[str, ...]] = [("", "events", "found", "missed", "false", "near")]
-        table += [(escaped(one.label), *map(str, row)) for one, row in zip(every, counts, strict=True)]
+        table += [(escaped(score.label), *map(str, row)) for score, row in zip(every, counts, strict=True)]
         widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
         lines = [
             "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
@@ -178,7 +179,7 @@ class Score:
         ]
         # Spreads are long: each on a line of its own, within the 80 columns of a terminal.
         for what, of in (("t - event (ms)", "error"), ("known - event (ms)", "delay")):
-            lines += [what, *(f"{escaped(one.label).ljust(widths[0])}  {getattr(one, of)!r}" for one in every)]
+            lines += [what, *(f"{escaped(score.label).ljust(widths[0])}  {getattr(score, of)!r}" for score in every)]
         return "\n".join(lines)
 
 
@@ -227,17 +228,23 @@ def score(
     labels, times = _truth(found, truth)
     tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
     scores = {}
-    for one in tallies:
-        pairs, missed, false = np.column_stack([one.detected, one.events]), one.missed_events, one.false_detections
-        scores[one.label] = Score(one.label, pairs, missed, false, one.false_near, one.errors_ms, one.delays_ms)
+    for tally in tallies:
+        pairs, missed, false = (
+            np.column_stack([tally.detected, tally.events]),
+            tally.missed_events,
+            tally.false_detections,
+        )
+        scores[tally.label] = Score(
+            tally.label, pairs, missed, false, tally.false_near, tally.errors_ms, tally.delays_ms
+        )
     return Score(
         "all" if len(scores) != 1 else next(iter(scores)),
-        np.concatenate([one.pairs for one in scores.values()] or [np.empty((0, 2), np.int64)]),
-        np.concatenate([one.missed_events for one in scores.values()] or [np.empty(0, np.int64)]),
-        np.concatenate([one.false_detections for one in scores.values()] or [np.empty(0, np.int64)]),
-        sum(one.false_near for one in scores.values()),
-        np.concatenate([one.errors_ms for one in scores.values()] or [np.empty(0)]),
-        np.concatenate([one.delays_ms for one in scores.values()] or [np.empty(0)]),
+        np.concatenate([score.pairs for score in scores.values()] or [np.empty((0, 2), np.int64)]),
+        np.concatenate([score.missed_events for score in scores.values()] or [np.empty(0, np.int64)]),
+        np.concatenate([score.false_detections for score in scores.values()] or [np.empty(0, np.int64)]),
+        sum(score.false_near for score in scores.values()),
+        np.concatenate([score.errors_ms for score in scores.values()] or [np.empty(0)]),
+        np.concatenate([score.delays_ms for score in scores.values()] or [np.empty(0)]),
         scores,
     )
 
@@ -264,13 +271,13 @@ def _truth(detections: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -
     if isinstance(truth, Mapping):
         wrong = [label for label in truth if not isinstance(label, str)]
         if wrong:
-            raise ProblemError(f"truth: {shown(wrong[0])} is not a label, which must be a text")
+            raise refused("truth", f": {shown(wrong[0])} is not a label, which must be a text")
         columns = {label: column(f"truth[{label!r}]", times, np.int64, "us") for label, times in truth.items()}
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
     times = column("truth", truth, np.int64, "us")
     if len(detections.labels) > 1:
-        raise ProblemError(f"truth has no labels, found has {', '.join(detections.labels)}: give times by label")
+        raise refused("truth", f" has no labels, found has {', '.join(detections.labels)}: give times by label")
     return [(detections.labels or ("event",))[0]] * len(times), times
 
 
@@ -280,19 +287,20 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
     if isinstance(window_ms, Mapping):
         for label in dict.fromkeys(labels):
             if label not in window_ms:
-                raise ProblemError(f"window_ms: there is none for {label!r}")
-            mine = np.array([other == label for other in labels])
+                raise refused("window_ms", f": there is none for {label!r}")
+            mine = np.array([name == label for name in labels])
             windows[mine] = _windows([label] * int(mine.sum()), window_ms[label])
         return windows
     widths = numbers("window_ms", window_ms, np.float64, "ms")
     if widths.ndim > 1 or (widths.ndim == 1 and len(widths) != len(labels)):
-        raise ProblemError(
-            f"window_ms has shape {widths.shape}: must be one number, or one each of {counted(len(labels), 'event')}"
+        raise refused(
+            "window_ms",
+            f" has shape {widths.shape}: must be one number, or one each of {counted(len(labels), 'event')}",
         )
     wrong = ~((widths >= 0) & (widths <= 3_600_000))
     if wrong.any():
-        raise ProblemError(
-            f"window_ms is {plain(np.atleast_1d(widths)[np.atleast_1d(wrong)][0])}: must lie between 0 and 3600000"
+        raise refused(
+            "window_ms", f" is {plain(np.atleast_1d(widths)[np.atleast_1d(wrong)][0])}: must be from 0 to 3600000"
         )
     windows[:] = np.rint(to_us(widths))
     return windows

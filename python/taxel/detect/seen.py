@@ -27,11 +27,11 @@ def seen(patterns: Sequence[SpikeTrains], memory_ms: float, *, graded: bool) -> 
         Whether the encoder that the neuron receives is graded; a part of a composite need not be what the whole is.
     """
     if graded:
-        extremes = [_extremes(one) for one in patterns]
+        extremes = [_extremes(pattern) for pattern in patterns]
         least = np.minimum.reduce([low for low, _ in extremes])
         most = np.maximum.reduce([high for _, high in extremes])
         return {"most": most.tolist()} | ({"least": least.tolist()} if least.any() else {})
-    return {"most": np.maximum.reduce([_counts(one, memory_ms) for one in patterns]).tolist()}
+    return {"most": np.maximum.reduce([_counts(pattern, memory_ms) for pattern in patterns]).tolist()}
 
 
 def _extremes(trains: SpikeTrains) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, instance, parameters, shown
+from taxel._base.arguments import instance, parameters, shown
+from taxel._base.errors import helped
 from taxel._base.messages import collected, counted, warn
+from taxel._base.progress import Progress, reporting
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -49,12 +51,6 @@ _FEWER = 3
 _FEWER_SHARE = 0.05
 #: Of fewer labels no two folds can be made.
 TWO_FOLDS = 4
-#: What may be the cause where nothing was felt.
-UNFELT = (
-    "; either the tare holds a touch, as it ends before the first label, which may be late (give --tare SECONDS), or "
-    "readings fall with pressure (falls = true in a layout file), or another source felt it (a column source in the "
-    "labels); taxel info shows what was touched"
-)
 #: With so many of the quantities that follow the labels best a point is tried.
 _FOLLOWED = 2
 
@@ -87,7 +83,7 @@ def fit(
     examples: Sequence[Example],
     recipe: Recipe,
     *,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> Readout:
     """Train a readout on labelled recordings.
 
@@ -96,8 +92,8 @@ def fit(
     examples : sequence of Example
         All of the same array. A label that an example lacks is not in it: that teaches silence.
     recipe : Recipe
-    progress : function of str, optional
-        Called with a line before each step.
+    progress : function of (step, done, all), optional
+        Called before each step; of folds with how many are done, else with 0 of 0.
 
     Returns
     -------
@@ -128,10 +124,10 @@ def fit(
     return trained(examples, recipe, progress).readout
 
 
-def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str], object] | None) -> Trained:
+def trained(examples: Sequence[Example], recipe: Recipe, progress: Progress | None) -> Trained:
     """Train a readout as `fit` does, and return how its labels were aligned as well."""
-    sound, clocks = checked(examples), [clock_of(one) for one in examples]
-    report = (lambda _: None) if progress is None else callback("progress", progress)
+    sound, clocks = checked(examples), [clock_of(example) for example in examples]
+    report = reporting(progress)
     recipe = in_pictures(instance("recipe", recipe, Recipe), sound, clocks)
     possibly = possible(recipe, sound)
     unit = unit_of(sound)
@@ -144,7 +140,7 @@ def possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
 
     The local load requires a tare.
     """
-    return recipe._without_choices(LocalLoad.name) if any(one.tare is None for one in examples) else recipe
+    return recipe._without_choices(LocalLoad.name) if any(example.tare is None for example in examples) else recipe
 
 
 class Encoded:
@@ -156,11 +152,9 @@ class Encoded:
         Whether the points of a search are needed too; then all is encoded at once.
     """
 
-    def __init__(
-        self, examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object], *, search: bool = False
-    ) -> None:
+    def __init__(self, examples: Sequence[Example], recipe: Recipe, report: Progress, *, search: bool = False) -> None:
         labels = recipe._labels(examples)
-        given = search or any(isinstance(one.source, SpikeTrains) for one in examples)
+        given = search or any(isinstance(example.source, SpikeTrains) for example in examples)
         #: The recipe with the parts of `patterns`.
         self.plan = recipe._narrowed(labels, search=search, choices=given)
         #: The examples as the trains that the first points receive.
@@ -171,14 +165,14 @@ class Encoded:
     def receiving(self, plan: Recipe) -> tuple[Recipe, Sequence[Example]]:
         """Return a recipe for one point of one label with the parts that the trains are of, and these trains."""
         (label,) = plan.neurons
-        own = plan._narrowed([label])
-        have, need = (one.encoder._each() for one in (self.plan, own))
+        narrowed = plan._narrowed([label])
+        have, need = (recipe.encoder._each() for recipe in (self.plan, narrowed))
         if all(part in have for part in need):
             return replace(plan, encoder=self.plan.encoder), self.patterns
-        key = own.encoder.to_json()
+        key = narrowed.encoder.to_json()
         if key not in self._others:
-            self._others[key] = self._encode(own)
-        return own, self._others[key]
+            self._others[key] = self._encode(narrowed)
+        return narrowed, self._others[key]
 
     def part(self, of: Callable[[Sequence[Example]], list[Example]]) -> Encoded:
         """Return a part of all examples, which shares their trains."""
@@ -189,14 +183,14 @@ class Encoded:
         return mine
 
 
-def encoded(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> list[Example]:
+def encoded(examples: Sequence[Example], recipe: Recipe, report: Progress) -> list[Example]:
     """Return (checked) examples with the spike trains of the recipe's encoder as their sources."""
     array_of(examples)
     results = []
     for k, example in enumerate(examples):
         trains = example.source
         if not isinstance(trains, SpikeTrains):
-            report(f"encoding {k + 1} of {len(examples)}")
+            report(f"encoding {k + 1} of {len(examples)}", 0, 0)
             encoder = recipe.encoder if example.tare is None else recipe.encoder.with_tare(example.tare)
             trains = encoder.encode(trains)
         results.append(example._replace(source=trains.split_by_sign() if trains.signed else trains))
@@ -218,7 +212,7 @@ def readout_of(
     return Readout(encoder, learners, array=array, delay_ms=delays_ms, run_threshold=threshold, inputs=inputs)
 
 
-def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
+def learn(examples: Encoded, recipe: Recipe, array: Array | None, report: Progress) -> Trained:
     """Fit the learner of each of a recipe's labels on encoded examples; see `fit`."""
     learners, delays, alignments, ranges = {}, {}, {}, {}
     points = dict(recipe.neurons)
@@ -242,7 +236,7 @@ class _Fit(NamedTuple):
     caught: list[str]
 
 
-def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, report: Callable[[str], object]) -> _Fit:
+def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, report: Progress) -> _Fit:
     """Return the first of the points to choose from, or a later one that leaves fewer events missed or false.
 
     They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
@@ -258,12 +252,12 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
         plan, patterns = examples.receiving(recipe._with_point(label, point))
         return _fitted(patterns, plan, label, array, report, point, place, known, count=len(points) > 1)
 
-    count = sum(len(one.labels.get(label, ())) for one in examples.patterns)
+    count = sum(len(pattern.labels.get(label, ())) for pattern in examples.patterns)
     best, refused = None, None
     try:
         best = fitted(points[0], 0)
     except ProblemError as error:
-        if not str(error).endswith(UNFELT):
+        if error.hint != "unfelt":
             raise
         refused = error
     usual = max(_FEWER, _FEWER_SHARE * count)
@@ -277,14 +271,14 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
         for place in range(_FOLLOWED if followed else 1):
             with contextlib.suppress(ProblemError):
                 others.append(fitted(point, place))
-        other = min(others, key=lambda one: one.wrong, default=None)
-        if other is not None and other.wrong <= wrong - fewer:
-            best = other
+        second = min(others, key=lambda fit: fit.wrong, default=None)
+        if second is not None and second.wrong <= wrong - fewer:
+            best = second
     if best is None:
         assert refused is not None
         raise refused
-    for one in best.caught:
-        warn(one, stacklevel=5)
+    for caught in best.caught:
+        warn(caught, stacklevel=5)
     return best
 
 
@@ -293,7 +287,7 @@ def _fitted(
     plan: Recipe,
     label: str,
     array: Array | None,
-    report: Callable[[str], object],
+    report: Progress,
     point: Mapping[str, Any],
     place: int,
     known: Known,
@@ -336,7 +330,7 @@ class Fitting:
         recipe: Recipe,
         label: str,
         array: Array | None,
-        report: Callable[[str], object],
+        report: Progress,
         place: int = 0,
         known: Known | None = None,
     ) -> None:
@@ -348,11 +342,11 @@ class Fitting:
         #: How much later than the event the neuron is trained to fire, ms, the encoder's latency apart. Where an age of
         #: the touch begins then it is later: a spike at that age acts after its time.
         self.delay_ms = delay_ms + (0.0 if ages is None else _acts_after_ms(learner._on_grid()))
-        given = self._given = [_times(k, one, label) for k, one in enumerate(examples)]
+        given = self._given = [_times(k, example, label) for k, example in enumerate(examples)]
         count = sum(map(len, given))
         if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
-        sources = [_inputs(k, one, recipe, label, array) for k, one in enumerate(examples)]
+        sources = [_inputs(k, example, recipe, label, array) for k, example in enumerate(examples)]
         self._graded = received.kind == "graded"
         quantities = received._quantities() if recipe.align else {}
         followed = None
@@ -369,14 +363,14 @@ class Fitting:
             self.alignment = aligned_to(followed, label, given)
         elif recipe.align:
             self.alignment = align(sources, label, given, received.latency_ms, ages)
-        self._names = [called(k, one) for k, one in enumerate(examples)]
-        self._sources = sources if followed is None else [only(one, quantities[followed.train]) for one in sources]
+        self._names = [called(k, example) for k, example in enumerate(examples)]
+        self._sources = sources if followed is None else [only(of, quantities[followed.train]) for of in sources]
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
         for name, times in zip(self._names, felt, strict=True):
             self._check_apart(name, times, learner._on_grid().refractory)
         later = [np.zeros(len(times), np.int64) for times in felt]
         if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
-            later = [later_us(one, ages, to_ms(t), delay_ms) for one, t in zip(sources, felt, strict=True)]
+            later = [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
         shift_ms = received.latency_ms + self.delay_ms
         self._targets = [to_ms(times + more) + shift_ms for times, more in zip(felt, later, strict=True)]
         self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
@@ -387,7 +381,7 @@ class Fitting:
         self._check_felt(trains)
         silent = self._silent(followed, sources, whole, ages, learner._on_grid())
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
-        report(self._what)
+        report(self._what, 0, 0)
         try:
             self._rows = learner.prepare(trains, self._targets, silence=silent)
         except ProblemError as error:
@@ -407,7 +401,7 @@ class Fitting:
     ) -> list[NDArray[np.float64]] | None:
         """Return the windows in which the neuron must be silent; None where it must at any time but at targets."""
         if ages is not None and neuron.kernel == "exponential":
-            return [silent_windows(one, ages, t, neuron) for one, t in zip(trains, self._targets, strict=True)]
+            return [silent_windows(train, ages, t, neuron) for train, t in zip(trains, self._targets, strict=True)]
         if followed is not None:
             return silence(followed, sources, self._targets, self._unpaired(), self._shift_ms, neuron.step_ms)
         return None
@@ -427,10 +421,9 @@ class Fitting:
         for name, train, times in zip(self._names, trains, self._targets, strict=True):
             if len(times) and not len(train.times):
                 where = name if len(trains) > 1 else "the recording"
-                raise ProblemError(
-                    f"{self._label}: nothing was felt in {where} up to the last of its "
-                    f"{counted(len(times), 'event')}{UNFELT}"
-                )
+                events = counted(len(times), "event")
+                error = ProblemError(f"{self._label}: nothing was felt in {where} up to the last of its {events}")
+                raise helped(error, "tare", "unfelt")
 
     def fits(self, recipe: Recipe) -> bool:
         """Whether the learner that a recipe describes needs these rows."""
@@ -465,7 +458,7 @@ class Fitting:
                 cone,
                 start=self._before,
                 progress=lambda n, _rows, _objective, gap: self._report(
-                    f"{self._what}, round {n}: weights at most {gap:.2%} from the best"
+                    f"{self._what}, round {n}: weights at most {gap:.2%} from the best", 0, 0
                 ),
             )
         begins = [_begin_ms(source) for source in self._sources]

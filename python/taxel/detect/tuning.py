@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, number, several, text
-from taxel._core import ProblemError
+from taxel._base.arguments import number, several, text
+from taxel._base.errors import refused
+from taxel._base.progress import Progress, reporting
 from taxel.detect.examples import Example, checked
-from taxel.detect.loads import Found, Loads, Stretch, clock_of
+from taxel.detect.loads import FoundTimes, Loads, Stretch, clock_of
 from taxel.detect.plain_rule import PlainRule
 from taxel.spikes import SpikeTrains, to_us
 
@@ -54,7 +55,7 @@ def tune(
     *,
     window_ms: float = 50.0,
     noise_floor: float = 3.0,
-    progress: Callable[[str], object] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, PlainRule | None]:
     """Return for each label the plain rule with the fewest missed and false detections, and of these the nearest one.
 
@@ -77,8 +78,8 @@ def tune(
         How far a detection may lie from its label.
     noise_floor : float, 0 or more, in the sensor's unit (ticks)
         The board's.
-    progress : function of str, optional
-        Called with a line before each step.
+    progress : function of (step, done, all), optional
+        Called before each step; of folds with how many are done, else with 0 of 0.
 
     Returns
     -------
@@ -106,14 +107,16 @@ def tune(
     """
     clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
     sound = checked(examples)
-    report = (lambda _: None) if progress is None else callback("progress", progress)
-    names = sorted({name for one in sound for name in one.labels}) if labels is None else several("labels", labels)
+    report = reporting(progress)
+    names = (
+        sorted({name for example in sound for name in example.labels}) if labels is None else several("labels", labels)
+    )
     names = [text("labels", name) for name in names]
     width_ms = number("window_ms", window_ms, "ms")
     if not 0.0 <= width_ms <= 3_600_000.0:
-        raise ProblemError(f"window_ms is {width_ms:g}: must lie between 0 and 3600000")
+        raise refused("window_ms", f" is {width_ms:g}: must be from 0 to 3600000")
     floor = number("noise_floor", noise_floor)
-    if any(isinstance(one.source, SpikeTrains) for one in sound):
+    if any(isinstance(example.source, SpikeTrains) for example in sound):
         return dict.fromkeys(names)
     loads = Loads(sound, clocks, floor, report)
     return best_rules(loads, names, loads.every, width_ms)
@@ -128,14 +131,14 @@ def best_rules(
     truth = {name: loads.truth(name, parts) for name in names}
     best = _at_edges(loads, parts, truth, width_us)
     onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
-    single = {name: min(pair, key=lambda one: one.fit[:2]) for name, pair in best.items()}
+    single = {name: min(pair, key=lambda tuned: tuned.fit[:2]) for name, pair in best.items()}
     kinds = onsets if len(onsets) == 2 else list(names) if len(names) == 2 else []
     if kinds:
         touches = {age: loads.at_age(age).between(windows) for age in loads.ages_ms(AGES_MS)}
         found = _for_kinds(touches, kinds, truth, width_us, loads.noise_floor, loads.unit)
         if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
             single |= dict(zip(kinds, found, strict=True))
-    return {name: one.rule if one.fit.wrong < len(truth[name]) else None for name, one in single.items()}
+    return {name: tuned.rule if tuned.fit.wrong < len(truth[name]) else None for name, tuned in single.items()}
 
 
 def _points(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, float, float, int]]:
@@ -176,7 +179,7 @@ def _at_edges(
     return {name: (rule(name, 0), rule(name, 1)) for name in truth}
 
 
-def _fit(found: Found, true: NDArray[np.int64], width_us: int, most: int = 2**62) -> _Fit | None:
+def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int, most: int = 2**62) -> _Fit | None:
     """Return how detections fit labels; None where more are wrong than `most`, which their number alone may show."""
     t, known, _ = found
     if abs(len(t) - len(true)) > most:
@@ -194,7 +197,7 @@ def _fit(found: Found, true: NDArray[np.int64], width_us: int, most: int = 2**62
 
 
 def _for_kinds(
-    touches: Mapping[float, Found],
+    touches: Mapping[float, FoundTimes],
     kinds: Sequence[str],
     truth: Mapping[str, NDArray[np.int64]],
     width_us: int,
@@ -217,10 +220,10 @@ def _for_kinds(
         below, above = reversed(kinds) if flipped else kinds
         fits = {}
         for name, mine in ((below, areas < threshold), (above, areas >= threshold)):
-            fits[name] = _fit(Found(t[mine], known[mine], areas[mine]), truth[name], width_us)
+            fits[name] = _fit(FoundTimes(t[mine], known[mine], areas[mine]), truth[name], width_us)
         rule = PlainRule("area", threshold, age_ms=age, labels=(below, above), noise_floor=floor, unit=unit)
         best = [_Best(fit, rule) for name in kinds if (fit := fits[name]) is not None]
-        rank = (sum(one.fit.wrong for one in best), max(one.fit.delay_ms for one in best))
+        rank = (sum(tuned.fit.wrong for tuned in best), max(tuned.fit.delay_ms for tuned in best))
         if chosen is None or rank < chosen[0]:
             chosen = (rank, best)
     return None if chosen is None else chosen[1]
@@ -234,7 +237,7 @@ def _between(areas: NDArray[np.float64], second: NDArray[np.bool_]) -> tuple[flo
     order = np.argsort(areas, kind="stable")
     logs, ones = np.log(np.maximum(areas[order], 0.5)), second[order]
     # By how many values lie below: how many of the first kind are wrong above, and of the second below.
-    below_first, below_second = (np.concatenate([[0], np.cumsum(one)]) for one in (~ones, ones))
+    below_first, below_second = (np.concatenate([[0], np.cumsum(mask)]) for mask in (~ones, ones))
     wrong = below_second + below_first[-1] - below_first
     flipped = len(ones) - wrong
     gaps = np.diff(logs)

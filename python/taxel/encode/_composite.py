@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, text
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.array import Array
 from taxel.encode._encoder import Encoder
 from taxel.encode._tared import Tared
@@ -55,7 +55,7 @@ class Composite(Encoder):
 
     def _json(self) -> str:
         if not isinstance(self.parts, Mapping):
-            raise ProblemError(f"parts is {shown(self.parts)}: must be encoders by name")
+            raise refused("parts", f" is {shown(self.parts)}: must be encoders by name")
         # The parts write themselves, as a tare is inserted as text.
         each = [
             f"{json.dumps(text('a name in parts', name))}: {instance(f'parts[{name!r}]', part, Encoder)._json()}"
@@ -137,9 +137,9 @@ class Composite(Encoder):
         given = [text("inputs", name) for name in several("inputs", names)]
         for n, name in enumerate(given):
             if name not in self.parts:
-                raise ProblemError(f"inputs: no encoder {name!r}: there are {', '.join(sorted(self.parts))}")
+                raise refused("inputs", f": no encoder {name!r}: there are {', '.join(sorted(self.parts))}")
             if name in given[:n]:
-                raise ProblemError(f"inputs: {name!r} comes twice")
+                raise refused("inputs", f": {name!r} comes twice")
         if not given:
-            raise ProblemError("inputs is empty: must be names of encoders, one or more")
+            raise refused("inputs", " is empty: must be names of encoders, one or more")
         return tuple(sorted(given))

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 from taxel import _core
 from taxel._base.arguments import instance, several, shown, whole
 from taxel._base.arguments import text as checked_text
+from taxel._base.errors import refused
 from taxel._base.parameters import Value
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -89,7 +90,7 @@ class Encoder(Value):
         2
         """
         if not isinstance(text, str):
-            raise ProblemError(f"encoder is {shown(text)}: must be JSON text")
+            raise refused("encoder", f" is {shown(text)}: must be JSON text")
         return Encoder._of(json.loads(_core.check_encoder(checked_text("encoder", text))))
 
     @staticmethod
@@ -242,7 +243,7 @@ class Encoder(Value):
         >>> LevelCrossing([10.0]).transform([Frames([[[0.0]], [[12.0]]], [0, 1000])])
         [SpikeTrains(2 trains, 1 spike, 0 to 1 ms)]
         """
-        encoded = [self.encode(one) for one in several("recordings", recordings)]
+        encoded = [self.encode(recording) for recording in several("recordings", recordings)]
         return [trains.split_by_sign() if trains.signed else trains for trains in encoded]
 
     def stream(self, array: Array | None = None) -> EncoderStream:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 from taxel._base.arguments import finite, parameters, shown, whole
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.encode._encoder import Encoder
 from taxel.events import Events
@@ -44,7 +45,7 @@ class Tared(Encoder):
         try:
             finite("tare", self.tare, "s")
         except ProblemError:
-            raise ProblemError(f"tare is {shown(self.tare)}: must be a taxel.Tare, or seconds") from None
+            raise refused("tare", f" is {shown(self.tare)}: must be a taxel.Tare, or seconds") from None
         return False
 
     def _plain(self) -> dict[str, Any]:
@@ -71,7 +72,7 @@ class Tared(Encoder):
         rest_us = whole("tare, us", round(1e6 * finite("tare", self.tare, "s")), 1, 2**53)
         if 2 * rest_us > last - first:
             lasts = f"the recording lasts {(last - first) / 1e6:g} s"
-            raise ProblemError(f"tare is {self.tare} s: more than half of it would be rest, {lasts}")
+            raise refused("tare", f" is {self.tare} s: more than half of it would be rest, {lasts}")
         return self.with_tare(Tare.take(held, stop_us=first + rest_us)), held
 
     def __eq__(self, other: object) -> bool:

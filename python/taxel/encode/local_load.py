@@ -128,9 +128,9 @@ class LocalLoad(Tared):
             return {}
         names = self.quantities
         return {
-            k: (*(n for n, name in enumerate(names) if name == own or name.startswith(f"{own}, mean")), len(names) - 1)
-            for k, own in enumerate(names)
-            if own.startswith("largest") and ", mean" not in own
+            k: (*(n for n, name in enumerate(names) if name == top or name.startswith(f"{top}, mean")), len(names) - 1)
+            for k, top in enumerate(names)
+            if top.startswith("largest") and ", mean" not in top
         }
 
     def values(self, x: Events | Frames | Recorded) -> NDArray[np.float64]:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, shown
+from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.encode._tared import Tared
 from taxel.tare import Tare
@@ -69,7 +69,7 @@ class Afferents:
         array([210, 211, 212, 213, 214, 215])
         """
         if not isinstance(kind, str) or kind not in KINDS:
-            raise ProblemError(f"kind is {shown(kind)}: must be one of {', '.join(KINDS)}")
+            raise refused("kind", f" is {shown(kind)}: must be one of {', '.join(KINDS)}")
         return np.flatnonzero(self.kind == kind)
 
 

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from taxel._base import arguments
 from taxel._base.columns import Growing
+from taxel._base.errors import refused
 from taxel._base.files import open_file
 from taxel._base.limits import unpacked
-from taxel._core import FormatError, ProblemError
+from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.checks import ascending, files_at, whole_us
@@ -110,7 +111,7 @@ def format_212(data: bytes, name: str = "data") -> NDArray[np.int16]:
     array([   1, -1793], dtype=int16)
     """
     if not isinstance(data, bytes | bytearray | memoryview):
-        raise ProblemError(f"data is {arguments.shown(data)}: must be bytes")
+        raise refused("data", f" is {arguments.shown(data)}: must be bytes")
     if len(data) % 3:
         raise FormatError(f"{name}: {len(data)} bytes; format 212 has two samples in three bytes, so a multiple of 3")
     b = np.frombuffer(data, np.uint8).reshape(-1, 3).astype(np.int16)

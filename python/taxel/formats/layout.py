@@ -16,6 +16,7 @@ from typing import Any
 
 from taxel._base.arguments import finite, flag, mapping, several, shown, text, whole
 from taxel._base.documents import read_toml
+from taxel._base.errors import refused
 from taxel._base.files import beside, named
 from taxel._base.limits import VALUE
 from taxel._base.messages import first_line
@@ -63,12 +64,12 @@ class Table:
 
     def __post_init__(self) -> None:
         if len(text("separator", self.separator)) != 1:
-            raise ProblemError(f"separator is {shown(self.separator)}: must be one character")
+            raise refused("separator", f" is {shown(self.separator)}: must be one character")
         whole("skip_lines", self.skip_lines, 0)
         if self.time_column is not None:
             _column("time_column", self.time_column)
         if isinstance(self.leave_out, str):
-            raise ProblemError(f"leave_out is {shown(self.leave_out)}: must be a list of columns")
+            raise refused("leave_out", f" is {shown(self.leave_out)}: must be a list of columns")
         for column in several("leave_out", self.leave_out):
             _column("leave_out", column)
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
@@ -172,7 +173,7 @@ class Layout:
             # Pictures have 32 bits.
             object.__setattr__(self, "falls", finite("falls", self.falls, least=-VALUE, most=VALUE))
         if self.unit is not None and not text("unit", self.unit):
-            raise ProblemError("unit is '': must say what the readings are in")
+            raise refused("unit", " is '': must say what the readings are in")
         if self.rate_hz is not None:
             finite("rate_hz", self.rate_hz, "Hz", least=1e-9, most=1e6)
         # Refuses a pitch beside places, and places of another number than rows x columns.
@@ -226,14 +227,14 @@ class Layout:
         """Return a sensor of its rows and columns; None if it does not say them."""
         return None if self.rows is None or self.columns is None else Array(self.rows, self.columns)
 
-    def array(self, taxels: int, own: Array | None = None, side: str = "") -> Array:
+    def array(self, taxels: int, stated: Array | None = None, side: str = "") -> Array:
         """Return the sensor that it describes.
 
         Parameters
         ----------
         taxels : int
             How many taxels the recording holds.
-        own : Array, optional
+        stated : Array, optional
             The sensor that the recording states, whose name and taxels, with their names, are kept.
         side : {"left", "right", ""}
             The foot of the recording, if it is known.
@@ -242,32 +243,32 @@ class Layout:
         ------
         ProblemError : another number of taxels than the recording holds
         """
-        shape = (self.rows, self.columns) if self.rows is not None else (1, taxels) if own is None else own.shape
+        shape = (self.rows, self.columns) if self.rows is not None else (1, taxels) if stated is None else stated.shape
         rows, columns = (whole(name, n, 1, 65_535) for name, n in zip(("rows", "columns"), shape, strict=True))
-        if own is not None and rows * columns != own.rows * own.columns:
-            raise ProblemError(f"says {rows} x {columns} taxels; the recording holds {own.rows} x {own.columns}")
-        places, other = self.places, bool(self.side and side and self.side != side)
-        if places is not None and other:
+        if stated is not None and rows * columns != stated.rows * stated.columns:
+            raise ProblemError(f"says {rows} x {columns} taxels; the recording holds {stated.rows} x {stated.columns}")
+        places, is_mirrored = self.places, bool(self.side and side and self.side != side)
+        if places is not None and is_mirrored:
             places = Places(-places.x, places.y, places.area, places.unit)
-        exists = None if own is None or own.exists is None else own.exists.reshape(rows, columns)
-        name = f"{rows}x{columns}" if own is None else own.name
-        return Array(rows, columns, self.pitch_mm, exists, name, places, None if own is None else own.names)
+        exists = None if stated is None or stated.exists is None else stated.exists.reshape(rows, columns)
+        name = f"{rows}x{columns}" if stated is None else stated.name
+        return Array(rows, columns, self.pitch_mm, exists, name, places, None if stated is None else stated.names)
 
 
 def advice(path: Path, says: str) -> str:
-    """Return the end of an error: which layout file beside a recording, or by ``--layout``, says what is lacking.
+    """Return the end of an error: which layout file beside a recording, or given as `layout`, says what is lacking.
 
     Examples
     --------
     >>> advice(Path("data/walk.csv.gz"), "describes a table")
-    'a layout file beside it, walk.layout.toml, or one given by --layout, describes a table (docs/files.md)'
+    'a layout file beside it, walk.layout.toml, or one given as layout, describes a table (docs/files.md)'
     """
     return f"a layout file {or_given(path)}, {says} (docs/files.md)"
 
 
 def or_given(path: Path) -> str:
     """Return which layout file is read with a recording, as part of a sentence."""
-    return f"beside it, {_name(path)}, or one given by --layout"
+    return f"beside it, {_name(path)}, or one given as layout"
 
 
 def _name(path: Path) -> str:
@@ -277,7 +278,7 @@ def _name(path: Path) -> str:
 
 def _values(document: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a file by the names of the fields of `Layout`."""
-    _known("", document, [one.name for one in fields(Layout) if one.name != "place"])
+    _known("", document, [field.name for field in fields(Layout) if field.name != "place"])
     values: dict[str, Any] = {}
     for name, value in document.items():
         if name in _TABLES:
@@ -300,13 +301,13 @@ _TABLES: dict[str, type[Any]] = {"places": Places, "table": Table, "data": Data,
 
 def _keys(table: type[Any]) -> list[str]:
     """Return the keys of a table; the mapping is that of a ROS bag."""
-    return ["topic", "field", "types", "ros"] if table is dict else [one.name for one in fields(table)]
+    return ["topic", "field", "types", "ros"] if table is dict else [field.name for field in fields(table)]
 
 
 def _known(before: str, values: Mapping[str, Any], names: list[str]) -> None:
     unknown = next((name for name in values if name not in names), None)
     if unknown is not None:
-        inner = next((f" in [{one}]" for one, of in _TABLES.items() if not before and unknown in _keys(of)), "")
+        inner = next((f" in [{table}]" for table, of in _TABLES.items() if not before and unknown in _keys(of)), "")
         of_size = as_size(values[unknown])
         hint = f"; a size is said by {of_size}" if of_size else f"; it stands{inner}" if inner else ""
         raise ProblemError(f"unknown key {before}{unknown}{hint}; there are {', '.join(names)}")

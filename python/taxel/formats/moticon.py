@@ -98,7 +98,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             read[foot].add(t=times[there], values=values[:, :-1], total=values[:, -1])
     ascending(file.name, t.column("t"), first)
     for foot, columns in chosen.items():
-        own = read[foot]
+        readings = read[foot]
         truth = {
             event: ascending_us(f"steps.csv, {file.stem}", np.array(steps[foot, event]))
             if steps
@@ -109,8 +109,8 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             name=f"{file.stem} {foot}",
             person=about.get("Sensor insoles", "moticon"),
             recorded=Frames(
-                own.column("values").reshape(len(own), 1, -1),
-                own.column("t"),
+                readings.column("values").reshape(len(readings), 1, -1),
+                readings.column("t"),
                 unit="N/cm2",
                 array=Array(1, len(columns) - 1, name="Moticon insole"),
             ),
@@ -118,7 +118,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             source=_SOURCE,
             foot=foot,
             scored=scored_around(truth),
-            series={"total": own.column("total")},
+            series={"total": readings.column("total")},
             about=about,
             unread=tuple(name for k, name in enumerate(names) if k not in columns and name.startswith(f"{foot} ")),
         )

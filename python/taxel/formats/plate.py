@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from taxel._base import arguments
 from taxel._base.columns import frozen
+from taxel._base.errors import refused
 from taxel._base.h5_file import H5File
-from taxel._core import FormatError, ProblemError
+from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.checks import files_at
@@ -209,7 +210,7 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
 def _loaded(image: NDArray[np.int32]) -> NDArray[np.int32]:
     counts: NDArray[np.int32] = arguments.numbers("image", image, np.int32)
     if counts.ndim != 3 or not counts.any() or counts.min() < 0:
-        raise ProblemError(f"image has shape {counts.shape}: must be rows x columns x frames of counts, loaded once")
+        raise refused("image", f" has shape {counts.shape}: must be rows x columns x frames of counts, loaded once")
     return counts
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from taxel._base import limits
 from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing
+from taxel._base.errors import helped
 from taxel._base.files import open_file
 from taxel._base.header_table import HeaderTable
 from taxel._base.limits import LINE, TEXT, VALUE, unpacked
@@ -113,10 +114,8 @@ def _up_to(path: Path, most: int) -> Iterator[bytes]:
         while piece := file.read(_PIECE):
             total += len(piece)
             if total > most:
-                raise FormatError(
-                    f"{path.name}: {total} bytes of text or more; at most {most} are read: --limit BYTES (limit=) says "
-                    "how many may be"
-                )
+                error = FormatError(f"{path.name}: {total} bytes of text or more; at most {most} are read")
+                raise helped(error, "limit", "larger")
             yield piece
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._core import ProblemError
 from taxel.events import Events
@@ -81,7 +82,7 @@ class Trial:
 
     def __post_init__(self) -> None:
         if not isinstance(self.recorded, Frames | Events):
-            raise ProblemError(f"recorded is {arguments.shown(self.recorded)}: must be taxel.Frames or taxel.Events")
+            raise refused("recorded", f" is {arguments.shown(self.recorded)}: must be taxel.Frames or taxel.Events")
         for name in ("name", "person", "source", "foot", "group"):
             arguments.text(name, getattr(self, name))
         arguments.flag("timed", self.timed)
@@ -104,10 +105,10 @@ class Trial:
         else:
             ends = arguments.several("scored", self.scored)
             if len(ends) != 2:
-                raise ProblemError(f"scored is {arguments.shown(self.scored)}: must be two times, us")
+                raise refused("scored", f" is {arguments.shown(self.scored)}: must be two times, us")
             first, last = (arguments.whole("scored", end, unit="us") for end in ends)
             if first > last:
-                raise ProblemError(f"scored is {first} to {last} us: must not end before it begins")
+                raise refused("scored", f" is {first} to {last} us: must not end before it begins")
             object.__setattr__(self, "scored", (first, last))
 
     @property

@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taxel._base.errors import refused
 from taxel._base.parameters import Parameters
-from taxel._core import NotFittedError, ProblemError
+from taxel._core import NotFittedError
 from taxel.information._labels import words
 
 __all__ = ["Classifier", "labelled"]
@@ -58,8 +59,8 @@ def labelled(y: ArrayLike, trials: int) -> tuple[NDArray[np.generic], NDArray[np
     """
     labels = words("y", y)
     if len(labels) != trials:
-        raise ProblemError(f"y has {len(labels)} entries: must be {trials}, one a trial")
+        raise refused("y", f" has {len(labels)} entries: must be {trials}, one a trial")
     classes, row = np.unique(labels, return_inverse=True)
     if len(classes) < 2:
-        raise ProblemError(f"y names {len(classes)} class: must be two at least")
+        raise refused("y", f" names {len(classes)} class: must be two at least")
     return classes, row

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import shown
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 
 #: Labels that one call of NumPy sorts or looks up (30 ms for texts): Ctrl-C is answered between calls.
 _AT_ONCE = 1 << 17
@@ -23,7 +23,7 @@ def words(name: str, values: ArrayLike) -> NDArray[np.generic]:
     if column.ndim == 1 and column.size == 0:
         return np.empty(0, np.int64)
     if column.ndim != 1 or column.dtype.kind not in "biuU":
-        raise ProblemError(f"{name} is {shown(values)}: must be texts or whole numbers, one a trial")
+        raise refused(name, f" is {shown(values)}: must be texts or whole numbers, one a trial")
     return column
 
 
@@ -46,7 +46,7 @@ def belonging(groups: ArrayLike, trials: int) -> NDArray[np.int64]:
     """Return the number of each trial's group."""
     names = words("groups", groups)
     if len(names) != trials:
-        raise ProblemError(f"groups has {len(names)} entries: must be {trials}, one a trial")
+        raise refused("groups", f" has {len(names)} entries: must be {trials}, one a trial")
     return numbered(distinct(names), names)
 
 

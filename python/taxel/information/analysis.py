@@ -99,13 +99,13 @@ def answer(
     ProblemError : as `taxel.information.folds`; a period finer than the recordings; trials of several arrays; no event
         in any trial
     """
-    listed = [instance(f"trials[{k}]", one, LabelledTrial) for k, one in enumerate(several("trials", trials))]
+    listed = [instance(f"trials[{k}]", trial, LabelledTrial) for k, trial in enumerate(several("trials", trials))]
     for name, function in (("progress", progress), ("watch", watch)):
         if function is not None:
             callback(name, function)
     for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
         whole(name, value, least)
-    also = [text("classifiers", one, CLASSIFIERS) for one in several("classifiers", classifiers)]
+    also = [text("classifiers", classifier, CLASSIFIERS) for classifier in several("classifiers", classifiers)]
     answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed))
     answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms)
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.
@@ -162,11 +162,11 @@ class _Answering(Question):
             estimates[key] = self.estimate(responses)
         everything = len(self.active)
         points = []
-        for (period, window), one in estimates.items():
+        for (period, window), bits in estimates.items():
             verdict = None
             if period != self.periods[0]:
-                verdict = keeps(one, estimates[self.periods[0], window], groups=self.groups)
-            points.append(_point(period, window, everything, "all", one, about[period, window], verdict))
+                verdict = keeps(bits, estimates[self.periods[0], window], groups=self.groups)
+            points.append(_point(period, window, everything, "all", bits, about[period, window], verdict))
         full = next(p for p in points if p.verdict is None and p.window_ms == to_ms(self.windows[-1]))
         spikes, matrices, first = reference
         zero = zero_test(
@@ -240,9 +240,9 @@ class _Answering(Question):
                 about[kind, size].append(_about(spikes, window, values))
         points = []
         for kind, size in settings:
-            one, mine = self.estimate(responses[kind, size]), (kind, size)
-            verdict = keeps(one, full.found, groups=self.groups)
-            points.append(_point(period, window, taxels[mine], kind, one, about[mine], verdict))
+            bits, mine = self.estimate(responses[kind, size]), (kind, size)
+            verdict = keeps(bits, full.found, groups=self.groups)
+            points.append(_point(period, window, taxels[mine], kind, bits, about[mine], verdict))
         return tuple(points)
 
     def _training(self, matrices: Matrices, first: Nested) -> tuple[tuple[int, float], ...]:
@@ -252,7 +252,7 @@ class _Answering(Question):
         steps = sorted({max(2, most // k) for k in (12, 6, 3, 2)} - {most})
         steps = [n for n in steps if n < most]
         responses = training_curve(matrices.squares, matrices.features, self.labels, first, steps, seed=self.seed)
-        curve = [(n, estimate(self.labels, one, redraws=2).bits) for n, one in zip(steps, responses, strict=True)]
+        curve = [(n, estimate(self.labels, counts, redraws=2).bits) for n, counts in zip(steps, responses, strict=True)]
         return (*curve, (most, estimate(self.labels, first.responses, redraws=2).bits))
 
     def _classified(self, name: str, spikes: Spikes, matrices: Matrices) -> Estimate:
@@ -267,9 +267,9 @@ class _Answering(Question):
         by_name: dict[str, list[Point]] = {}
         for (name, period), responses in by_column.items():
             self.pace.begin(f"intervals, {name}", self.work.estimate())
-            one = self.estimate(responses, self.columns[name])
+            bits = self.estimate(responses, self.columns[name])
             by_name.setdefault(name, []).append(
-                _point(period, self.windows[-1], everything, "all", one, about[period, self.windows[-1]], None)
+                _point(period, self.windows[-1], everything, "all", bits, about[period, self.windows[-1]], None)
             )
         return {name: tuple(points) for name, points in by_name.items()}
 
@@ -281,7 +281,7 @@ class _Answering(Question):
             )
         runs = 1 + int(np.count_nonzero(self.labels[1:] != self.labels[:-1]))
         # Recordings of a trial each may stand in any order.
-        ordered = len({id(one.source) for one in self.trials}) < len(self.trials)
+        ordered = len({id(trial.source) for trial in self.trials}) < len(self.trials)
         if ordered and runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
             self.notes.append("each label's trials lie together: a drift of the sensor would count as the label's")
         if not self.ended:

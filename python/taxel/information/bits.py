@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import numbers, shown, whole
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.information._labels import words
 
@@ -60,19 +61,19 @@ def confusion_matrix(
     """
     truth, answered = words("labels", labels), words("responses", responses)
     if len(truth) != len(answered):
-        raise ProblemError(f"responses has {len(answered)} entries: must be {len(truth)}, one a label")
+        raise refused("responses", f" has {len(answered)} entries: must be {len(truth)}, one a label")
     if not len(truth):
-        raise ProblemError("labels is []: must hold a trial at least")
+        raise refused("labels", " is []: must hold a trial at least")
     try:
         every = np.unique(np.concatenate([truth, answered]))
         order = every if classes is None else words("classes", classes)
     except TypeError:
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers") from None
     if len(np.unique(order)) != len(order):
-        raise ProblemError("classes names one twice")
+        raise refused("classes", " names one twice")
     missing = np.setdiff1d(every, order)
     if len(missing):
-        raise ProblemError(f"classes does not name {shown(missing[0].item())}")
+        raise refused("classes", f" does not name {shown(missing[0].item())}")
     place = np.argsort(order)
     row, column = (place[np.searchsorted(order[place], x)] for x in (truth, answered))
     counts = np.zeros((len(order), len(order)), np.int64)
@@ -277,11 +278,11 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
     """
     table = _table(counts)
     if table.ndim != 2:
-        raise ProblemError(f"counts has shape {table.shape}: must be (labels, responses)")
+        raise refused("counts", f" has shape {table.shape}: must be (labels, responses)")
     rounds, random = whole("repetitions", repetitions, 1), np.random.default_rng(whole("seed", seed, 0))
     trials = int(table.sum())
     if trials < 4:
-        raise ProblemError(f"counts holds {trials} trials: must be 4 at least, to be dealt out in four parts")
+        raise refused("counts", f" holds {trials} trials: must be 4 at least, to be dealt out in four parts")
     cells = np.repeat(np.arange(table.size), table.ravel())
     means = [float(plug_in(table))]
     for parts in (2, 4):
@@ -353,16 +354,16 @@ def _blocks(rows: int, columns: int) -> list[slice]:
 def _counts(counts: ArrayLike) -> NDArray[np.int64]:
     table: NDArray[np.int64] = numbers("counts", counts, np.int64)
     if table.ndim < 1 or 0 in table.shape:
-        raise ProblemError(f"counts has shape {table.shape}: must hold a response at least")
+        raise refused("counts", f" has shape {table.shape}: must hold a response at least")
     if table.min() < 0 or table.max() > 2**40:
-        raise ProblemError(f"counts reaches from {table.min()} to {table.max()}: must lie in 0 to 2^40")
+        raise refused("counts", f" reaches from {table.min()} to {table.max()}: must be from 0 to 2^40")
     return table
 
 
 def _table(counts: ArrayLike) -> NDArray[np.int64]:
     table = _counts(counts)
     if table.ndim < 2:
-        raise ProblemError(f"counts has shape {table.shape}: must be (labels, responses)")
+        raise refused("counts", f" has shape {table.shape}: must be (labels, responses)")
     if (table.sum((-1, -2)) == 0).any():
-        raise ProblemError("counts holds no trial")
+        raise refused("counts", " holds no trial")
     return table

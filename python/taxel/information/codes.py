@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import finite_numbers, floats, instance, mapping, number, several, shown
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.information.estimate import Estimate, estimate
 from taxel.information.nested import nested_predictions
@@ -40,9 +41,9 @@ class Code(ABC):
 
     def __post_init__(self) -> None:
         if not 0 < number("window_ms", self.window_ms, "ms") < math.inf:
-            raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be above 0 and finite")
+            raise refused("window_ms", f" is {shown(self.window_ms)}: must be above 0 and finite")
         if not 0 <= number("resolution_ms", self.resolution_ms, "ms") < math.inf:
-            raise ProblemError(f"resolution_ms is {shown(self.resolution_ms)}: must be 0 or more")
+            raise refused("resolution_ms", f" is {shown(self.resolution_ms)}: must be 0 or more")
 
     def encode(self, values: ArrayLike, onset_ms: float = 0.0) -> SpikeTrains:
         """Write values as spikes.
@@ -65,9 +66,9 @@ class Code(ABC):
         """
         checked, onset = floats("values", values), number("onset_ms", onset_ms, "ms")
         if checked.ndim != 1 or not ((checked >= 0) & (checked <= 1)).all():
-            raise ProblemError(f"values are {shown(values)}: must be numbers of 0 to 1, one a train")
+            raise refused("values", f" are {shown(values)}: must be numbers of 0 to 1, one a train")
         if not math.isfinite(onset):
-            raise ProblemError(f"onset_ms is {onset}: must be finite")
+            raise refused("onset_ms", f" is {onset}: must be finite")
         lists = [onset + np.asarray(times) for times in self._times(checked)]
         return SpikeTrains.from_lists(lists, start=onset, stop=onset + self.window_ms)
 
@@ -149,9 +150,9 @@ class RateCode(Code):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 < number("most_hz", self.most_hz, "Hz") < math.inf:
-            raise ProblemError(f"most_hz is {shown(self.most_hz)}: must be above 0 and finite")
+            raise refused("most_hz", f" is {shown(self.most_hz)}: must be above 0 and finite")
         if self.most_hz * self.window_ms > 1e9:
-            raise ProblemError(f"most_hz is {self.most_hz}: at most 1e6 spikes fit a window")
+            raise refused("most_hz", f" is {self.most_hz}: at most 1e6 spikes fit a window")
 
     def _times(self, values: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         counts = np.rint(values * self.most_hz * 1e-3 * self.window_ms).astype(np.int64)
@@ -307,22 +308,22 @@ def compare_codes(
     >>> round(compare_codes(trials, ["soft", "hard"] * 4, {"first": code}, folds=2)["first"].right, 2)
     1.0
     """
-    patterns = [instance("trials", one, SpikeTrains) for one in several("trials", trials)]
+    patterns = [instance("trials", trial, SpikeTrains) for trial in several("trials", trials)]
     by_name: dict[str, Code] = mapping("codes", codes)
     for name, code in by_name.items():
         if not isinstance(code, Code):
-            raise ProblemError(f"codes[{name}] is {shown(code)}: must be a taxel.information.Code")
+            raise refused("codes", f"[{name}] is {shown(code)}: must be a taxel.information.Code")
     if not by_name:
-        raise ProblemError("codes is empty: name at least one")
-    if not patterns or len({len(one) for one in patterns}) > 1:
+        raise refused("codes", " is empty: name at least one")
+    if not patterns or len({len(pattern) for pattern in patterns}) > 1:
         raise ProblemError("trials must be one or more, with equally many trains each")
-    given = [one.start for one in patterns] if onsets_ms is None else onsets_ms
+    given = [pattern.start for pattern in patterns] if onsets_ms is None else onsets_ms
     onsets = finite_numbers("onsets_ms", given, "ms").ravel().tolist()
     if len(onsets) != len(patterns):
-        raise ProblemError(f"onsets_ms has {len(onsets)} entries: must be {len(patterns)}, one a trial")
+        raise refused("onsets_ms", f" has {len(onsets)} entries: must be {len(patterns)}, one a trial")
     estimates = {}
     for name, code in by_name.items():
-        read = np.array([code.decode(one, onset) for one, onset in zip(patterns, onsets, strict=True)])
+        read = np.array([code.decode(pattern, onset) for pattern, onset in zip(patterns, onsets, strict=True)])
         vary = max(1, int(np.count_nonzero(np.ptp(read, axis=0) > 0)))
         nested = nested_predictions([read @ read.T], [vary], labels, groups=groups, count=folds, seed=seed)
         estimates[name] = estimate(labels, nested.responses, groups=groups, seed=seed)

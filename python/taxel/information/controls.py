@@ -35,7 +35,7 @@ def controls(question: Question) -> tuple[Control, ...]:
     else:
         results.append(Control("length", _scalar(question, last), "from contact to the last event in the window"))
     results.append(Control("event count", _scalar(question, count), "events to the whole window"))
-    if all(isinstance(one.source, Frames) for one in question.trials):
+    if all(isinstance(trial.source, Frames) for trial in question.trials):
         start = [
             held.at(np.array([t.start_us - finest]))[0] for held, t in zip(question.held, question.trials, strict=True)
         ]
@@ -60,14 +60,14 @@ def _scalar(question: Question, value: NDArray[np.float64]) -> Estimate | None:
 def _before(question: Question) -> Control:
     """Return the bits of the stretch before the contact, which the touch cannot have caused."""
     assert question.encoder is not None  # the question has set the default
-    begin = np.array([float(one.source.t.min()) for one in question.trials])
-    for source in {id(one.source) for one in question.trials}:
-        mine = [k for k, one in enumerate(question.trials) if id(one.source) == source]
+    begin = np.array([float(trial.source.t.min()) for trial in question.trials])
+    for source in {id(trial.source) for trial in question.trials}:
+        mine = [k for k, trial in enumerate(question.trials) if id(trial.source) == source]
         mine.sort(key=lambda k: question.trials[k].start_us)
         for before, k in pairwise(mine):
-            one = question.trials[before]
-            end = question.contact[before] + question.window_us if one.stop_us is None else one.stop_us
-            begin[k] = max(begin[k], np.nan_to_num(end, nan=one.start_us))
+            trial = question.trials[before]
+            end = question.contact[before] + question.window_us if trial.stop_us is None else trial.stop_us
+            begin[k] = max(begin[k], np.nan_to_num(end, nan=trial.start_us))
     room = np.nan_to_num(question.contact - begin, nan=0.0)
     length = min(question.window_us, float(np.quantile(room, 0.1)))
     if length < 5 * question.finest or (question.contact - begin >= length).sum() < len(question.trials) * 0.5:
@@ -76,10 +76,12 @@ def _before(question: Question) -> Control:
         )
         return Control("before contact", None, "none recorded")
     moved = [
-        replace(one, start_us=int(c - length) if r >= length else one.start_us, stop_us=int(c) if r >= length else None)
+        replace(
+            trial, start_us=int(c - length) if r >= length else trial.start_us, stop_us=int(c) if r >= length else None
+        )
         if not np.isnan(c)
-        else one
-        for one, c, r in zip(question.trials, question.contact, room, strict=True)
+        else trial
+        for trial, c, r in zip(question.trials, question.contact, room, strict=True)
     ]
     at = np.where(room >= length, question.contact - length, np.nan)
     period = max(question.periods[0], question.finest)

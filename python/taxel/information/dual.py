@@ -7,7 +7,7 @@ import scipy  # its modules load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import finite_numbers
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 
 __all__ = ["LARGEST_RIDGE", "Regressions", "gram_matrix", "residual", "solved_without_ridge"]
 
@@ -45,12 +45,13 @@ def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     trials, centred = len(square), _centred(square)
     least = trials * np.finfo(float).eps * float(np.abs(centred).max())
     if level < least:
-        raise ProblemError(
-            f"ridge: {level:.3g} in the unit of inner products is lost in their rounding; must be {least:.3g} at least"
+        raise refused(
+            "ridge",
+            f": {level:.3g} in the unit of inner products is lost in their rounding; must be {least:.3g} at least",
         )
     factor, fault = scipy.linalg.lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
     if fault:
-        raise ProblemError("grams: a matrix has a direction of negative length, so it is of no inner product")
+        raise refused("grams", ": a matrix has a direction of negative length, so it is of no inner product")
     inverse = scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
     return np.asarray(inverse + np.tril(inverse, -1).T - 1 / trials)
 
@@ -151,7 +152,7 @@ def solved_without_ridge(
     values, vectors = np.linalg.eigh((within + within.T) / 2)
     varying = values > _CUT * max(values[-1], np.finfo(float).tiny)
     if not varying.any():
-        raise ProblemError("gram: nothing varies within classes")
+        raise refused("gram", ": nothing varies within classes")
     vectors = vectors[:, varying]
     across = square @ (mean - 1 / trials)
     across -= mean @ (which.T @ across)
@@ -206,11 +207,11 @@ def gram_matrix(gram: ArrayLike) -> NDArray[np.float64]:
     """
     square = finite_numbers("gram", gram)
     if square.ndim != 2 or square.shape[0] != square.shape[1] or not len(square):
-        raise ProblemError(f"gram has shape {square.shape}: must be (trials, trials)")
+        raise refused("gram", f" has shape {square.shape}: must be (trials, trials)")
     if (largest := float(np.abs(square).max())) > _LARGEST:
-        raise ProblemError(f"gram reaches {largest:.3g}: must be at most {_LARGEST:g}")
+        raise refused("gram", f" reaches {largest:.3g}: must be at most {_LARGEST:g}")
     if np.abs(square - square.T).max() > 1e-6 * max(largest, 1e-300):
-        raise ProblemError("gram is not symmetric: entry i, j is the inner product of trials i and j")
+        raise refused("gram", " is not symmetric: entry i, j is the inner product of trials i and j")
     return square
 
 

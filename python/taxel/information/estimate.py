@@ -11,6 +11,7 @@ import scipy  # its modules load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import callback, finite, number, shown, whole
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.information._labels import belonging, distinct, numbered, one_label_a_group, words
 from taxel.information.bits import (
@@ -173,19 +174,17 @@ def estimate(
         array = np.empty(0, object)
     answered = np.stack([words("responses", row) for row in np.atleast_2d(array)]) if array.size else array
     if answered.ndim != 2 or answered.shape[1] != len(truth) or not len(truth):
-        raise ProblemError(f"responses has shape {array.shape}: must be ({len(truth)},), one a label, or draws of it")
+        raise refused("responses", f" has shape {array.shape}: must be ({len(truth)},), one a label, or draws of it")
     share = number("confidence", confidence)
     if not 0 < share < 1:
-        raise ProblemError(f"confidence is {shown(confidence)}: must lie between 0 and 1")
+        raise refused("confidence", f" is {shown(confidence)}: must lie between 0 and 1")
     rounds, random = whole("redraws", redraws, 2), np.random.default_rng(whole("seed", seed, 0))
     if (truth.dtype.kind == "U") != (answered.dtype.kind == "U"):
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers")
     classes = np.unique(np.concatenate([distinct(truth), distinct(answered.ravel())]))
     row, column = numbered(classes, truth), numbered(classes, answered)
     if len(np.unique(row)) < 2:
-        raise ProblemError(
-            f"labels are all {shown(truth[0].item())}: must be two at least, or there is nothing to tell"
-        )
+        raise refused("labels", f" are all {shown(truth[0].item())}: must be two at least, or there is nothing to tell")
     belongs = None if groups is None else belonging(groups, len(truth))
     cells = row * len(classes) + column
     counts = _tables(cells, np.ones((1, len(truth)), np.int64), len(classes))[0]
@@ -271,14 +270,14 @@ def zero_test(
     belongs = None if groups is None else belonging(groups, len(truth))
     there = finite("found", found)
     if not len(truth):
-        raise ProblemError("labels is []: must hold a trial at least")
+        raise refused("labels", " is []: must hold a trial at least")
     classes, row = np.unique(truth, return_inverse=True)
     bits = []
     for _ in range(whole("shuffles", shuffles, 1)):
         mixed = _shuffled(row, belongs, random)
         answered = np.searchsorted(classes, words("responses", answer(classes[mixed])))
         if answered.shape != row.shape or answered.max() >= len(classes):
-            raise ProblemError("answer does not return one of the labels a trial")
+            raise refused("answer", " does not return one of the labels a trial")
         bits.append(
             float(panzeri_treves(_tables(mixed * len(classes) + answered, np.ones((1, len(row))), len(classes))[0]))
         )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import callback, instance, numbers, text, whole
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.information._estimator import labelled
 from taxel.information._labels import words
 from taxel.information._threads import threads
@@ -76,21 +76,21 @@ class FoldSums:
         self.classes, self._row = labelled(y, len(self._table))
         self.folds = numbers("folds", folds, np.int64)
         if self.folds.shape != (len(self._table),):
-            raise ProblemError(f"folds has shape {self.folds.shape}: must be ({len(self._table)},), one a trial")
+            raise refused("folds", f" has shape {self.folds.shape}: must be ({len(self._table)},), one a trial")
         self._names = np.unique(self.folds)
         if len(self._names) < 2:
-            raise ProblemError(f"folds names {len(self._names)}: must be two at least")
+            raise refused("folds", f" names {len(self._names)}: must be two at least")
         self._dtype = np.float32 if is_exact(self._table) else np.float64
         self._shift = None if self._dtype == np.float32 else self._table.mean(0, dtype=np.float64)
         self._sums: dict[int, ClassMoments] = {}
         total: ClassMoments | None = None
         with threads(several=self._table.shape[1] >= _WORTH_THREADS):
             for k, name in enumerate(self._names):
-                one = self._summed(name)
-                total = one if total is None else total + one
+                moments = self._summed(name)
+                total = moments if total is None else total + moments
                 if keep == "folds":
-                    self._sums[int(name)] = one
-                del one
+                    self._sums[int(name)] = moments
+                del moments
                 if progress is not None:
                     progress(k + 1, len(self._names))
         assert total is not None  # there are two folds at least
@@ -142,11 +142,11 @@ class FoldSums:
         classes, into = self.classes, None
         if merge is not None:
             merge = instance("merge", merge, dict)
-            missing = [one for one in self.classes.tolist() if one not in merge]
+            missing = [name for name in self.classes.tolist() if name not in merge]
             if missing:
-                raise ProblemError(f"merge says nothing of class {missing[0]!r}")
+                raise refused("merge", f" says nothing of class {missing[0]!r}")
             classes, into = np.unique(
-                words("merge", [merge[one] for one in self.classes.tolist()]), return_inverse=True
+                words("merge", [merge[name] for name in self.classes.tolist()]), return_inverse=True
             )
         model.classes_ = classes
         shift = None if self._shift is None else self._shift[:used]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import shown, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
@@ -49,7 +50,7 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
     classes, row = np.unique(truth, return_inverse=True)
     if len(classes) < 2:
         values = f"all {shown(truth[0].item())}" if len(truth) else "[]"
-        raise ProblemError(f"labels are {values}: must be two at least, or there is nothing to tell")
+        raise refused("labels", f" are {values}: must be two at least, or there is nothing to tell")
     if groups is None:
         if len(truth) < parts:
             raise ProblemError(
@@ -129,7 +130,7 @@ def split(
     for name in range(int(fold.max()) + 1):
         train = np.flatnonzero(fold != name)
         mine = _inside(row[train], None if belongs is None else belongs[train], inner, seed)
-        parts.append(Part(np.flatnonzero(fold == name), train, tuple(train[one] for one in mine)))
+        parts.append(Part(np.flatnonzero(fold == name), train, tuple(train[group] for group in mine)))
     return Split(classes, row, fold, tuple(parts))
 
 

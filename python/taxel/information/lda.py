@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import finite, finite_numbers, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import warn
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
@@ -95,7 +96,7 @@ class LDA(Classifier):
         values -= centre
         varying = values.any(0)
         if not varying.any():
-            raise ProblemError("x: no feature varies")
+            raise refused("x", ": no feature varies")
         scale = varying.astype(np.float64)
         if self.ridge == 0:
             # Which directions are left out depends on the features' scale: their spread, as with few features.
@@ -148,7 +149,7 @@ class LDA(Classifier):
         weights = self._fitted("coef_")
         table = feature_table(x)
         if table.shape[1] != weights.shape[1]:
-            raise ProblemError(f"x has {table.shape[1]} features: it was fitted to {weights.shape[1]}")
+            raise refused("x", f" has {table.shape[1]} features: it was fitted to {weights.shape[1]}")
         scores = np.empty((len(table), len(weights)))
         for block, mine in blocks(table, None, np.float64, None):
             scores[mine] = block @ weights.T + self.intercept_
@@ -287,7 +288,7 @@ class GramLDA(Classifier):
         weights = self._fitted("dual_")
         across = finite_numbers("gram", gram)
         if across.ndim != 2 or across.shape[1] != len(weights):
-            raise ProblemError(f"gram has shape {across.shape}: must be (trials, {len(weights)})")
+            raise refused("gram", f" has shape {across.shape}: must be (trials, {len(weights)})")
         return np.asarray(across @ weights + self.intercept_)
 
     def predict(self, gram: ArrayLike) -> NDArray[Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import finite_numbers, numbers, whole
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.dual import gram_matrix
 
@@ -68,7 +68,7 @@ class NearestNeighbours(Classifier):
         """
         square = finite_numbers("distances", distances)
         if square.ndim != 2 or square.shape[0] != square.shape[1]:
-            raise ProblemError(f"distances has shape {square.shape}: must be (trials, trials)")
+            raise refused("distances", f" has shape {square.shape}: must be (trials, trials)")
         self.classes_, self.row_ = labelled(y, len(square))
         return self
 
@@ -95,7 +95,7 @@ class NearestNeighbours(Classifier):
         across = numbers("distances", distances, np.float64)
         finite_numbers("distances", np.where(across == np.inf, 0.0, across))
         if across.ndim != 2 or across.shape[1] != len(row):
-            raise ProblemError(f"distances has shape {across.shape}: must be (trials, {len(row)})")
+            raise refused("distances", f" has shape {across.shape}: must be (trials, {len(row)})")
         near = np.argsort(across, axis=1, kind="stable")[:, : self.neighbours]
         return np.asarray(self.classes_[majority(row[near], len(self.classes_))])
 

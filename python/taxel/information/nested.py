@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import instance, numbers, several, shown, whole
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.information._estimator import labelled
 from taxel.information._threads import threads
 from taxel.information.dual import LARGEST_RIDGE, Regressions, gram_matrix, residual
@@ -94,7 +94,7 @@ def nested_predictions(
     matrices = Matrices(grams, features)
     levels = numbers("ridges", ridges, np.float64)
     if levels.ndim != 1 or not len(levels) or not ((levels > 0) & (levels <= LARGEST_RIDGE)).all():
-        raise ProblemError(f"ridges is {shown(ridges)}: must be numbers above 0, at most {LARGEST_RIDGE:g}")
+        raise refused("ridges", f" is {shown(ridges)}: must be numbers above 0, at most {LARGEST_RIDGE:g}")
     nearest = tuple(whole("neighbours", k, 1) for k in several("neighbours", neighbours))
     parts = whole("inner", inner, 2)
     dealt = split(y, matrices.trials, count=count, inner=parts, groups=groups, seed=seed)
@@ -129,8 +129,8 @@ def _best(ways: _Ways, dealt: Split) -> NDArray[np.int64]:
     """Return for each fold the way that classifies most of its training trials correctly, in folds among themselves."""
     right = np.zeros((len(dealt.parts), ways.count), np.int64)
     inner = [(name, held) for name, part in enumerate(dealt.parts) for held in part.inner]
-    both = [np.concatenate([dealt.parts[name].test, held]) for name, held in inner]
-    for cases, out in _of_one_size(both):
+    tested = [np.concatenate([dealt.parts[name].test, held]) for name, held in inner]
+    for cases, out in _of_one_size(tested):
         correct = ways.predict_all(out) == dealt.row[out]
         for case, here in zip(cases, np.swapaxes(correct, 0, 1), strict=True):
             name, held = inner[case]
@@ -140,7 +140,7 @@ def _best(ways: _Ways, dealt: Split) -> NDArray[np.int64]:
 
 def _of_one_size(sets: list[NDArray[np.int64]]) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """Give sets of equally many trials together: their numbers, and the trials of each."""
-    sizes = np.array([len(one) for one in sets], np.int64)
+    sizes = np.array([len(chosen) for chosen in sets], np.int64)
     for size in np.unique(sizes):
         cases = np.flatnonzero(sizes == size)
         yield cases, np.stack([sets[case] for case in cases])
@@ -180,7 +180,7 @@ def training_curve(
     random, curve = np.random.default_rng(whole("seed", seed, 0)), []
     used = sorted(set(instance("nested", nested, Nested).chosen.values()))
     if len(nested.folds) != len(row) or any(matrix >= len(matrices.squares) for matrix, _ in used):
-        raise ProblemError("nested is of other trials or matrices")
+        raise refused("nested", " is of other trials or matrices")
     which = np.asarray(row[:, None] == np.arange(len(classes)), np.float64)
     regressions = Regressions(np.stack([matrices.residual(*way) for way in used]), which)
     for size in several("sizes", sizes):
@@ -209,15 +209,15 @@ class Matrices:
     """
 
     def __init__(self, grams: object, features: object) -> None:
-        self.squares = [gram_matrix(one) for one in several("grams", grams)]
+        self.squares = [gram_matrix(gram) for gram in several("grams", grams)]
         if not self.squares:
-            raise ProblemError("grams is []: must hold a matrix at least")
+            raise refused("grams", " is []: must hold a matrix at least")
         self.trials = len(self.squares[0])
-        if any(len(one) != self.trials for one in self.squares):
-            raise ProblemError(f"grams are of {[len(one) for one in self.squares]} trials: must all be of the same")
-        self.features = [whole("features", one, 1) for one in several("features", features)]
+        if any(len(gram) != self.trials for gram in self.squares):
+            raise refused("grams", f" are of {[len(gram) for gram in self.squares]} trials: must all be of the same")
+        self.features = [whole("features", count, 1) for count in several("features", features)]
         if len(self.features) != len(self.squares):
-            raise ProblemError(f"features has {len(self.features)} entries: must be {len(self.squares)}, one a matrix")
+            raise refused("features", f" has {len(self.features)} entries: must be {len(self.squares)}, one a matrix")
         self._residuals: dict[tuple[float, ...], NDArray[np.float64]] = {}
 
     def residual(self, matrix: int, ridge: float) -> NDArray[np.float64]:
@@ -273,7 +273,7 @@ class _Discriminants(_Ways):
 class _Neighbours(_Ways):
     def __init__(self, matrices: Matrices, row: NDArray[np.int64], classes: int, nearest: tuple[int, ...]) -> None:
         self._row, self._classes, self._nearest = row, classes, nearest
-        self._order = [np.argsort(squared_distances(one), axis=1, kind="stable") for one in matrices.squares]
+        self._order = [np.argsort(squared_distances(square), axis=1, kind="stable") for square in matrices.squares]
         self.count = len(matrices.squares) * len(nearest)
 
     def way(self, number: int) -> tuple[int, float]:

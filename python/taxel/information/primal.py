@@ -10,6 +10,7 @@ import scipy  # its modules load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import numbers
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 
 __all__ = ["ClassMoments", "Primal", "blocks", "feature_table", "is_exact", "solved"]
@@ -175,7 +176,7 @@ def solved(moments: ClassMoments, ridge: float, priors: str, shift: NDArray[np.f
     rounding = 1e-13 * squares
     varying = squares - trials * centre**2 > rounding
     if not varying.any():
-        raise ProblemError("x: no feature varies")
+        raise refused("x", ": no feature varies")
     variance = np.where(within.diagonal() > rounding, within.diagonal(), 0.0)
     variance += ridge * variance[varying].mean()
     # A feature that varies between classes alone cannot be weighed: left out, as scikit-learn's svd does.
@@ -297,12 +298,12 @@ def feature_table(x: ArrayLike) -> NDArray[Any]:
     """Return trials by features; raise `ProblemError` for what is no such table."""
     table = x if isinstance(x, np.ndarray) and x.dtype.kind in "biuf" else numbers("x", x, np.float64)
     if table.ndim != 2 or 0 in table.shape:
-        raise ProblemError(f"x has shape {table.shape}: must be (trials, features)")
+        raise refused("x", f" has shape {table.shape}: must be (trials, features)")
     if table.dtype.kind == "f":
         for first in range(0, len(table), _ROWS):
             wrong = np.argwhere(~(np.abs(table[first : first + _ROWS]) <= _LARGEST))
             if len(wrong):
                 place = first + wrong[0][0], wrong[0][1]
                 fault = f"beyond {_LARGEST:g}" if np.isfinite(table[place]) else "not finite"
-                raise ProblemError(f"x[{place[0]}, {place[1]}] is {fault}")
+                raise refused("x", f"[{place[0]}, {place[1]}] is {fault}")
     return table

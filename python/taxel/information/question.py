@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import number, several, shown, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
@@ -54,47 +55,48 @@ class Question:
 
     def __post_init__(self) -> None:
         if not self.trials:
-            raise ProblemError("trials is []: must hold one at least")
+            raise refused("trials", " is []: must hold one at least")
         shape = self.trials[0].array.shape
-        other = next((one for one in self.trials if one.array.shape != shape), None)
-        if other is not None:
-            sizes = " x ".join(map(str, other.array.shape)), " x ".join(map(str, shape))
+        differing = next((trial for trial in self.trials if trial.array.shape != shape), None)
+        if differing is not None:
+            sizes = " x ".join(map(str, differing.array.shape)), " x ".join(map(str, shape))
             raise ProblemError(
-                f"{other.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be of one"
+                f"{differing.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be "
+                "of one"
             )
-        self.labels = np.array([one.label for one in self.trials])
-        groups = [one.group for one in self.trials]
+        self.labels = np.array([trial.label for trial in self.trials])
+        groups = [trial.group for trial in self.trials]
         self.groups = np.array(groups) if any(groups) else None
         stratified(self.labels, count=self.folds, groups=self.groups, seed=self.seed)
         if self.encoder is None:
             self.encoder = ChangeEvents(noise_floor=floor_of(self.trials))
         if not isinstance(self.encoder, ChangeEvents | FA1):
-            raise ProblemError(f"encoder is {shown(self.encoder)}: must be ChangeEvents or FA1, one train a taxel")
-        sources = {id(one.source): one.source for one in self.trials}
+            raise refused("encoder", f" is {shown(self.encoder)}: must be ChangeEvents or FA1, one train a taxel")
+        sources = {id(trial.source): trial.source for trial in self.trials}
         held = {key: HeldValues(source) for key, source in sources.items()}
-        self.held = [held[id(one.source)] for one in self.trials]
+        self.held = [held[id(trial.source)] for trial in self.trials]
         self.finest = finest_us(list(sources.values()))
         if self.window_ms is None:
-            endless = next((one for one in self.trials if one.stop_us is None), None)
+            endless = next((trial for trial in self.trials if trial.stop_us is None), None)
             if endless is not None:
                 raise ProblemError(f"{endless.name}: has no end; give window_ms, or every trial its stop_us")
             reach = np.inf
         else:
             reach = to_us(number("window_ms", self.window_ms))
             if not self.finest <= reach < 1e12:
-                raise ProblemError(
-                    f"window_ms is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least, and below 1e9"
+                raise refused(
+                    "window_ms", f" is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least, and below 1e9"
                 )
         self.contact = contacts(self.trials, self.held, self.encoder, self.finest, reach)
         if np.isnan(self.contact).all():
-            lasts = max(int(np.ptp(one.source.t)) for one in self.trials if len(one.source))
+            lasts = max(int(np.ptp(trial.source.t)) for trial in self.trials if len(trial.source))
             if lasts < STEP_US:
                 raise ProblemError(
                     f"{self.trials[0].name}: its pictures all lie within {lasts} us, so they have no times; "
                     "give them some (taxel.Frames)"
                 )
-            raise ProblemError(f"trials: no event in any of them by {self.encoder!r}; a lower noise_floor may help")
-        ends = np.array([np.inf if one.stop_us is None else one.stop_us for one in self.trials])
+            raise refused("trials", f": no event in any of them by {self.encoder!r}; a lower noise_floor may help")
+        ends = np.array([np.inf if trial.stop_us is None else trial.stop_us for trial in self.trials])
         self.ended = bool(np.isfinite(ends).all())
         lengths = (ends - self.contact)[~np.isnan(self.contact)]
         self.window_us = float(reach if np.isfinite(reach) else max(lengths.min(), self.finest))
@@ -122,15 +124,15 @@ class Question:
         else:
             chosen = [to_us(number("periods_ms", p)) for p in several("periods_ms", periods_ms)]
             if any(not 0 < p <= window or abs(p - round(p)) > 1e-6 for p in chosen):
-                raise ProblemError(f"periods_ms is {shown(periods_ms)}: must be whole us, up to {to_ms(window):g} ms")
+                raise refused("periods_ms", f" is {shown(periods_ms)}: must be whole us, up to {to_ms(window):g} ms")
             self.periods = checked_periods([round(p) for p in chosen], self.finest)
         if windows_ms is None:
             self.windows = [*[float(w) for w in _series(max(window / 40, self.finest), window * 0.99)], window]
         else:
             chosen_windows = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
             if any(not self.finest <= w <= window for w in chosen_windows):
-                raise ProblemError(
-                    f"windows_ms is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
+                raise refused(
+                    "windows_ms", f" is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
                 )
             self.windows = sorted({*chosen_windows, window})
         self.taxels_at = self.periods[0]
@@ -139,18 +141,18 @@ class Question:
             self.taxels_at = next((p for p in self.periods if p == at), 0)
             if not self.taxels_at:
                 listed = ", ".join(f"{to_ms(p):g}" for p in self.periods)
-                raise ProblemError(f"taxels_at_ms is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
+                raise refused("taxels_at_ms", f" is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
         spikes = self.spikes(self.taxels_at, 0)
         self.active, self.events = np.unique(spikes.taxel), len(spikes.taxel)
         there = len(self.active)
         numbers = [whole("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
         if taxels is not None and any(n > there for n in numbers):
-            raise ProblemError(f"taxels is {shown(taxels)}: {there} of the array's ever send an event")
+            raise refused("taxels", f" is {shown(taxels)}: {there} of the array's ever send an event")
         self.random_taxels = [n for n in numbers if n < there]
         sides = [whole("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
         rows, columns = self.trials[0].array.shape
         if pools is not None and any(n > max(rows, columns) for n in sides):
-            raise ProblemError(f"pools is {shown(pools)}: the array is {rows} x {columns}")
+            raise refused("pools", f" is {shown(pools)}: the array is {rows} x {columns}")
         self.pools = [n for n in sides if n <= max(rows, columns)]
         self.columns = self._parameter_columns()
 
@@ -199,7 +201,7 @@ class Question:
         """Return the columns of parameters that can stand in for the labels; the notes name the others."""
         columns = {}
         for name in self.trials[0].parameters:
-            column = np.array([one.parameters.get(name, "") for one in self.trials])
+            column = np.array([trial.parameters.get(name, "") for trial in self.trials])
             if (column == self.labels).all():
                 self.notes.append(f"parameter {name} is left out: it says what the label says")
                 continue
@@ -222,14 +224,14 @@ def floor_of(trials: Sequence[LabelledTrial]) -> float:
         return 3.0 if first.intensity is not None else 0.5
     if first.unit == "ticks":
         return 3.0
-    sources = {id(one.source): one.source for one in trials}.values()
-    largest = max(float(np.abs(one.values).max(initial=0.0)) for one in sources if isinstance(one, Frames))
+    sources = {id(trial.source): trial.source for trial in trials}.values()
+    largest = max(float(np.abs(source.values).max(initial=0.0)) for source in sources if isinstance(source, Frames))
     if largest == 0:
-        raise ProblemError("trials: every picture is 0")
+        raise refused("trials", ": every picture is 0")
     return float(f"{largest / 40:.2g}")
 
 
 def _series(least: float, most: float) -> list[int]:
     """Return whole us in steps of 1, 2, 5 within limits."""
     steps = [step * 10**power for power in range(10) for step in _STEPS]
-    return [one for one in steps if least <= one <= most]
+    return [step for step in steps if least <= step <= most]

@@ -103,15 +103,15 @@ class _Sums:
             inside = end > self._bin
             if self._own[k] is None and not inside.all():
                 self._own[k] = self._common.copy()
-            own = self._own[k]
-            if own is not None and inside.any():
+            matrix = self._own[k]
+            if matrix is not None and inside.any():
                 product = state @ state.T if product is None else product
                 mine = np.flatnonzero(inside)
-                own[np.ix_(mine, mine)] += product[np.ix_(mine, mine)]
-        if any(own is None for own in self._own):
+                matrix[np.ix_(mine, mine)] += product[np.ix_(mine, mine)]
+        if any(matrix is None for matrix in self._own):
             self._common += state @ state.T if product is None else product
         self._bin += 1
 
     def finish(self) -> list[NDArray[np.float64]]:
         """Return the matrix of each window."""
-        return [self._common.copy() if own is None else own for own in self._own]
+        return [self._common.copy() if matrix is None else matrix for matrix in self._own]

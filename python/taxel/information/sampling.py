@@ -141,8 +141,8 @@ class _Pools(NamedTuple):
 
 def finest_us(sources: Sequence[Events | Frames]) -> int:
     """Return the finest period that recordings can show, us: between pictures, or what all stamps are multiples of."""
-    pictures = [int(np.median(np.diff(one.t))) for one in sources if isinstance(one, Frames) and len(one) > 1]
-    stamps = [int(np.gcd.reduce(np.append(one.t, 0))) for one in sources if not isinstance(one, Frames)]
+    pictures = [int(np.median(np.diff(of.t))) for of in sources if isinstance(of, Frames) and len(of) > 1]
+    stamps = [int(np.gcd.reduce(np.append(of.t, 0))) for of in sources if not isinstance(of, Frames)]
     return max(1, int(np.gcd.reduce([0, *stamps])), *pictures)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import instance, number, several, shown, text
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.sampling import Spikes
 from taxel.learn import ConeR, Tempotron
@@ -56,7 +56,7 @@ class _NeuronPerClass(Classifier):
         """
         learners = self._fitted("learners_")
         trains = _listed(self, patterns)
-        return np.array([[self._potential(one, s) for one in learners] for s in trains]).reshape(
+        return np.array([[self._potential(learner, s) for learner in learners] for s in trains]).reshape(
             len(trains), len(learners)
         )
 
@@ -78,7 +78,7 @@ class _NeuronPerClass(Classifier):
         return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
 
     @abstractmethod
-    def _trained(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> Any:
+    def _trained(self, trains: list[SpikeTrains], is_of_class: NDArray[np.bool_]) -> Any:
         """Return the trained neuron of one class, given which patterns are of that class."""
 
     @abstractmethod
@@ -123,10 +123,10 @@ class ConeRReadout(_NeuronPerClass):
     def _check(self) -> None:
         for name in ("tau", "bound", "max_seconds"):
             if not 0 < number(name, getattr(self, name)) < np.inf:
-                raise ProblemError(f"{name} is {shown(getattr(self, name))}: must be above 0, and finite")
+                raise refused(name, f" is {shown(getattr(self, name))}: must be above 0, and finite")
 
-    def _trained(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> ConeR:
-        targets = [[one.stop] if mine else [] for one, mine in zip(trains, own, strict=True)]
+    def _trained(self, trains: list[SpikeTrains], is_of_class: NDArray[np.bool_]) -> ConeR:
+        targets = [[train.stop] if mine else [] for train, mine in zip(trains, is_of_class, strict=True)]
         neuron = Neuron(tau=self.tau, after_spike="keep", step_ms=1.0)
         learner = ConeR(neuron=neuron, lb=-self.bound, ub=self.bound, max_seconds=self.max_seconds)
         return learner.fit(trains, targets)
@@ -175,8 +175,8 @@ class TempotronReadout(_NeuronPerClass):
     def _learner(self) -> Tempotron:
         return Tempotron(tau=self.tau, epochs=self.epochs, max_seconds=self.max_seconds, seed=self.seed)
 
-    def _trained(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> Tempotron:
-        return self._learner().fit(trains, own)
+    def _trained(self, trains: list[SpikeTrains], is_of_class: NDArray[np.bool_]) -> Tempotron:
+        return self._learner().fit(trains, is_of_class)
 
     def _potential(self, learner: Tempotron, trains: SpikeTrains) -> float:
         return learner.peak(learner.weights_, trains)[0]
@@ -204,8 +204,8 @@ def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
     offsets = np.searchsorted(key, np.arange(spikes.trials * len(active) + 1))
     times, patterns = times[order], []
     for k in range(spikes.trials):
-        own = offsets[k * len(active) : (k + 1) * len(active) + 1]
-        patterns.append(SpikeTrains(times[own[0] : own[-1]], own - own[0], 0.0, to_ms(window_us)))
+        of_trial = offsets[k * len(active) : (k + 1) * len(active) + 1]
+        patterns.append(SpikeTrains(times[of_trial[0] : of_trial[-1]], of_trial - of_trial[0], 0.0, to_ms(window_us)))
     return patterns
 
 
@@ -243,6 +243,6 @@ def _listed(reader: object, patterns: object) -> list[SpikeTrains]:
     """Return the patterns; refuse graded ones on behalf of `reader`."""
     name = type(reader).__name__
     return [
-        instance(f"pattern {k}", one, SpikeTrains)._ungraded(name)
-        for k, one in enumerate(several("patterns", patterns))
+        instance(f"pattern {k}", pattern, SpikeTrains)._ungraded(name)
+        for k, pattern in enumerate(several("patterns", patterns))
     ]

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base.arguments import instance, mapping, number, path, several, shown, text, whole
+from taxel._base.errors import helped, refused
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.number_text import float_of, int_of
 from taxel._core import FormatError, ProblemError
@@ -73,7 +74,7 @@ class LabelledTrial:
 
     def __post_init__(self) -> None:
         if not isinstance(self.source, Events | Frames):
-            raise ProblemError(f"source is {shown(self.source)}: must be taxel.Events or taxel.Frames")
+            raise refused("source", f" is {shown(self.source)}: must be taxel.Events or taxel.Frames")
         text("name", self.name)
         if not text("label", self.label):
             raise ProblemError(f"{self.name}: label is empty")
@@ -126,38 +127,43 @@ def read_trials(
     strange = sorted(names - set(by_name))
     if strange:
         line = next(line for line, row in rows if row["recording"] == strange[0])
-        alike = [str(one.path) for one in opened if strange[0] in (one.name, _stem(one))]
+        alike = [str(recording.path) for recording in opened if strange[0] in (recording.name, _stem(recording))]
         if len(alike) > 1:
             raise ProblemError(
                 f"{place}, line {line}: recording {strange[0]!r} may be {' or '.join(alike[:3])}; write the path"
             )
-        there = sorted({one.name for one in opened})
+        there = sorted({recording.name for recording in opened})
         listed = ", ".join(there[:5]) + (" ..." if len(there) > 5 else "")
         raise ProblemError(f"{place}, line {line}: recording {strange[0]!r} is not among those given: {listed}")
-    unnamed = [one.path for one in opened if not {str(one.path), one.name, _stem(one)} & names]
+    unnamed = [
+        recording.path for recording in opened if not {str(recording.path), recording.name, _stem(recording)} & names
+    ]
     if unnamed:
         raise ProblemError(f"{place}: says nothing of {unnamed[0]}; name it, or leave the recording out")
-    sources = {id(one): _source(one) for one in opened}
+    sources = {id(recording): _source(recording) for recording in opened}
     spans = {key: _span(source) for key, source in sources.items()}
-    clocks = {id(one): one.clock for one in opened} if any(row.get("host_ns") for _, row in rows) else {}
+    clocks = (
+        {id(recording): recording.clock for recording in opened} if any(row.get("host_ns") for _, row in rows) else {}
+    )
     trials = []
     for line, row in rows:
-        one = by_name[row["recording"]]
-        source = sources[id(one)]
+        recording = by_name[row["recording"]]
+        source = sources[id(recording)]
         where = f"{place}, line {line}"
         end, host_ns = (_whole(where, name, row[name]) if row.get(name) else None for name in ("stop_us", "host_ns"))
         start = _whole(where, "t_us", row["t_us"])
-        ahead = ahead_us(Note(row["label"], start, host_ns or 0), one.path, clocks.get(id(one)), place)
+        ahead = ahead_us(Note(row["label"], start, host_ns or 0), recording.path, clocks.get(id(recording)), place)
         start, stop = start - ahead, None if end is None else end - ahead
         if stop is None and window_ms is None:
-            raise ProblemError(f"{where}: has no stop_us; give it, or the trials' length by --window-ms")
+            error = ProblemError(f"{where}: has no stop_us, and the length of trials is not known")
+            raise helped(error, "window_ms", "give")
         if not row["label"]:
             raise FormatError(f"{where}: label is empty")
         if row["label"].lower() == "nan":
             raise FormatError(f"{where}: label is {row['label']!r}, as tables write what is missing; name it otherwise")
         more = {name: cell for name, cell in row.items() if name not in _KNOWN}
         trials.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
-        _inside(trials[-1], one.name, spans[id(one)], window_us)
+        _inside(trials[-1], recording.name, spans[id(recording)], window_us)
     if any(trial.group for trial in trials) and not all(trial.group for trial in trials):
         nameless = next(trial for trial in trials if not trial.group)
         raise ProblemError(f"{nameless.name}: group is empty; give every trial one, or none")
@@ -186,15 +192,17 @@ def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> lis
     """
     window_us = _window_us(window_ms)
     trials = []
-    for one in _once(recordings):
-        source = _source(one)
+    for recording in _once(recordings):
+        source = _source(recording)
         span = _span(source)
-        notes = sorted(((note.t, note.text) for note in one.notes if note.t is not None), key=lambda note: note[0])
+        notes = sorted(
+            ((note.t, note.text) for note in recording.notes if note.t is not None), key=lambda note: note[0]
+        )
         if not notes:
-            raise ProblemError(f"{one.path}: has no notes; leave it out, or give a table of trials")
+            raise ProblemError(f"{recording.path}: has no notes; leave it out, or give a table of trials")
         for start, label in notes:
-            trials.append(LabelledTrial(source, label, start, name=f"{one.path}, note at {start} us"))
-            _inside(trials[-1], one.name, span, window_us)
+            trials.append(LabelledTrial(source, label, start, name=f"{recording.path}, note at {start} us"))
+            _inside(trials[-1], recording.name, span, window_us)
     _apart(trials, window_us)
     return trials
 
@@ -219,25 +227,30 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
     if window_ms is not None:
         _window_us(window_ms)
     trials = []
-    for one in _once(recordings):
-        source = _source(one)
+    for recording in _once(recordings):
+        source = _source(recording)
         span = _span(source)
         if span is None:
-            raise ProblemError(f"{one.path}: holds nothing; leave it out")
+            raise ProblemError(f"{recording.path}: holds nothing; leave it out")
         start, stop = span[0], span[1] + 1
-        label = one.path.resolve().parent.name
-        trials.append(LabelledTrial(source, label, start, None if window_ms is not None else stop, name=str(one.path)))
+        label = recording.path.resolve().parent.name
+        trials.append(
+            LabelledTrial(source, label, start, None if window_ms is not None else stop, name=str(recording.path))
+        )
     return trials
 
 
 def _once(recordings: Sequence[Recording]) -> list[Recording]:
     """Return recordings, none of them twice: it would be trained on and tested."""
-    opened = [instance(f"recordings[{k}]", one, Recording) for k, one in enumerate(several("recordings", recordings))]
+    opened = [
+        instance(f"recordings[{k}]", recording, Recording)
+        for k, recording in enumerate(several("recordings", recordings))
+    ]
     seen: set[tuple[Path, str]] = set()
-    for one in opened:
-        key = one.path.resolve(), one.name
+    for recording in opened:
+        key = recording.path.resolve(), recording.name
         if key in seen:
-            raise ProblemError(f"{one.path}: is named twice; name it once")
+            raise ProblemError(f"{recording.path}: is named twice; name it once")
         seen.add(key)
     return opened
 
@@ -249,7 +262,7 @@ def _source(recording: Recording) -> Events | Frames:
 
 def _window_us(window_ms: float) -> int:
     if not 0 < number("window_ms", window_ms) < 1e9:
-        raise ProblemError(f"window_ms is {shown(window_ms)}: must be above 0 and below 1e9")
+        raise refused("window_ms", f" is {shown(window_ms)}: must be above 0 and below 1e9")
     return round(to_us(window_ms))
 
 
@@ -276,9 +289,10 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
             if apart == 0:
                 raise ProblemError(f"{after.name}: begins where {before} does; a touch must stand there once")
             if trial.stop_us is None and apart < window_us:
-                raise ProblemError(
-                    f"{after.name}: begins {to_ms(apart):g} ms after {before}, inside its window of "
-                    f"{to_ms(window_us):g} ms; give stop_us, or a shorter --window-ms"
+                raise refused(
+                    "window_ms",
+                    f" is {to_ms(window_us):g}: {after.name} begins {to_ms(apart):g} ms after {before}; must be "
+                    "shorter, or the trials must have stop_us",
                 )
             if trial.stop_us is not None and after.start_us < trial.stop_us:
                 raise ProblemError(
@@ -289,10 +303,10 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
 def _by_unique_name(recordings: Sequence[Recording]) -> dict[str, Recording]:
     """Return recordings by path, and by name and stem where only one has it."""
     by_name: dict[str, Recording] = {}
-    for names in ([_stem(one) for one in recordings], [one.name for one in recordings]):
+    for names in ([_stem(recording) for recording in recordings], [recording.name for recording in recordings]):
         count = Counter(names)
-        by_name |= {name: one for name, one in zip(names, recordings, strict=True) if count[name] == 1}
-    return by_name | {str(one.path): one for one in recordings}
+        by_name |= {name: recording for name, recording in zip(names, recordings, strict=True) if count[name] == 1}
+    return by_name | {str(recording.path): recording for recording in recordings}
 
 
 def _stem(recording: Recording) -> str:

@@ -25,7 +25,7 @@ class BatchLearner(SpikeLearner):
 
     weights_: NDArray[np.float64] = field(init=False)
     #: Names of further results, which the compiled part reads in `predict`.
-    _said: dict[str, Any] = field(init=False)
+    _results: dict[str, Any] = field(init=False)
 
     def fit(self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> Self:
         """Learn weights that fire the neuron at the targets and nowhere else.
@@ -48,8 +48,8 @@ class BatchLearner(SpikeLearner):
         ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
-        self.weights_, self._said = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
-        for name, value in self._said.items():
+        self.weights_, self._results = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
+        for name, value in self._results.items():
             setattr(self, f"{name}_", value)
         return self
 
@@ -57,5 +57,5 @@ class BatchLearner(SpikeLearner):
         self, patterns: list[SpikeTrains], instead: Mapping[str, Any] = MappingProxyType({})
     ) -> list[NDArray[np.float64]]:
         """Return the output spikes in each pattern; `instead` replaces learnt attributes by name."""
-        weights, learnt = self._fitted(), json.dumps(self._said | dict(instead))
-        return [_core.run_batch(self._kind, self._json(), weights, learnt, one._parts()) for one in patterns]
+        weights, learnt = self._fitted(), json.dumps(self._results | dict(instead))
+        return [_core.run_batch(self._kind, self._json(), weights, learnt, pattern._parts()) for pattern in patterns]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import several, shown
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.learn._examples import examples, windows
@@ -22,7 +23,7 @@ __all__ = ["checked_examples", "fitted"]
 def fitted(cone: object) -> NDArray[np.float64]:
     """Return the weights of a fit; refuse what is none."""
     if not isinstance(cone, ConeX | ConeR):
-        raise ProblemError(f"cone is {shown(cone)}: must be a taxel.learn.ConeX or ConeR")
+        raise refused("cone", f" is {shown(cone)}: must be a taxel.learn.ConeX or ConeR")
     return cone._fitted()
 
 
@@ -37,7 +38,7 @@ def checked_examples(
     _, times = examples(patterns, targets)
     cone._check()
     each = [None] * len(times) if silence is None else several("silence", silence)
-    asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
+    asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
     trained = several("patterns", patterns)
     if not len(trained) == len(times) == len(asked) or not trained:
         raise ProblemError(
@@ -59,10 +60,8 @@ def checked_examples(
             raise ProblemError(f"targets of pattern {p}: must ascend")
     for name, bound in (("lb", cone.lb), ("ub", cone.ub)):
         if np.ndim(bound) and np.size(bound) != trains:
-            raise ProblemError(
-                f"{name}: {np.size(bound)} bounds for {trains} trains, must be one a train, or one for all"
-            )
+            raise refused(name, f": {np.size(bound)} bounds for {trains} trains, must be one a train, or one for all")
     horizon = np.asarray(0.0 if cone.horizon is None else cone.horizon)
     if horizon.ndim and horizon.size != len(trained):
-        raise ProblemError(f"horizon: {horizon.size} values, must be one, or one a pattern, {len(trained)}")
+        raise refused("horizon", f": {horizon.size} values, must be one, or one a pattern, {len(trained)}")
     return trained, times, asked

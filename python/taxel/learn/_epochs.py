@@ -101,7 +101,7 @@ class EpochLearner(SpikeLearner):
 
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
         rule, weights = self._json(), self._fitted()
-        return [_core.run_rival(rule, weights, one._parts()) for one in patterns]
+        return [_core.run_rival(rule, weights, pattern._parts()) for pattern in patterns]
 
     def change(
         self, weights: ArrayLike, pattern: SpikeTrains, targets: ArrayLike

@@ -107,7 +107,9 @@ class ExactPotential:
                 quick = weight * (s / fast).exp() if self.rows.rate > 0 else Decimal(0)
                 self.terms[i] = _Terms(slow, quick, slow * s, abs(slow), abs(quick))
             columns = zip(*(self.terms[i] for i in range(first, until)), strict=True)
-            self.sums[first, until] = _Terms(*(sum(one, Decimal(0)) for one in columns)) if until > first else _NOTHING
+            self.sums[first, until] = (
+                _Terms(*(sum(terms, Decimal(0)) for terms in columns)) if until > first else _NOTHING
+            )
         return self.sums[first, until] if self.left >= 0 else None
 
     def time(self, t: float) -> Decimal:

@@ -9,6 +9,7 @@ from numpy import float64
 from numpy.typing import NDArray
 
 from taxel._base.arguments import floats, instance, numbers, several, shown
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 
@@ -18,10 +19,10 @@ __all__ = ["examples", "windows"]
 def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[float64]]]:
     """Return patterns and targets as the compiled part reads them; refuse other types."""
     if isinstance(patterns, SpikeTrains):
-        raise ProblemError(f"patterns is one SpikeTrains ({patterns!r}): must be a list of them, one a pattern")
+        raise refused("patterns", f" is one SpikeTrains ({patterns!r}): must be a list of them, one a pattern")
     trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))]
     if not np.iterable(targets):
-        raise ProblemError(f"targets is {shown(targets)}: must be a list of times (ms) for each pattern, [[20.0], []]")
+        raise refused("targets", f" is {shown(targets)}: must be a list of times (ms) for each pattern, [[20.0], []]")
     times = []
     of_pattern: Any
     for p, of_pattern in enumerate(several("targets", targets)):
@@ -39,5 +40,5 @@ def windows(name: str, given: object) -> NDArray[float64] | None:
         return None
     ends = numbers(name, given, np.float64, "ms")  # type: ignore[arg-type]
     if ends.size and (ends.ndim != 2 or ends.shape[1] != 2):
-        raise ProblemError(f"{name} has shape {ends.shape}: must hold windows, a start and a stop each")
+        raise refused(name, f" has shape {ends.shape}: must hold windows, a start and a stop each")
     return ends.reshape(-1)

@@ -112,7 +112,7 @@ class SpikeLearner(Learner, ABC):
 
 def patterns_of(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:
     """Return patterns as a list, each of which was checked; an error names the pattern."""
-    return [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
+    return [instance(f"pattern {p}", pattern, SpikeTrains) for p, pattern in enumerate(several("patterns", patterns))]
 
 
 def fired_by_neuron(learner: Any, patterns: list[SpikeTrains]) -> list[NDArray[float64]]:
@@ -122,4 +122,4 @@ def fired_by_neuron(learner: Any, patterns: list[SpikeTrains]) -> list[NDArray[f
         raise ProblemError(
             "the fit is infeasible: no weights meet its targets (status_, certificate_), so none can be run"
         )
-    return [learner.neuron_.run(weights, one) for one in patterns]
+    return [learner.neuron_.run(weights, pattern) for pattern in patterns]

@@ -38,7 +38,7 @@ def pattern_rows(
     horizons = [None] * count if cone.horizon is None else np.broadcast_to(np.asarray(cone.horizon, float), count)
     asked = [None] * count if windows is None else windows
     given = zip(patterns, targets, horizons, asked, strict=True)
-    return [PatternRows(neuron, *one, margin=margin) for one in given]
+    return [PatternRows(neuron, *example, margin=margin) for example in given]
 
 
 class Stated:
@@ -51,19 +51,19 @@ class Stated:
         self.cone, self.patterns, neuron = cone, patterns, patterns[0].neuron
         self.lb, self.ub = (np.broadcast_to(np.asarray(bound, np.float64), trains) for bound in (cone.lb, cone.ub))
         # 6.12 at each target, 6.10 behind it: coefficients, and their sizes.
-        self.names = [(p, k) for p, one in enumerate(patterns) for k in range(len(one.targets))]
+        self.names = [(p, k) for p, rows in enumerate(patterns) for k in range(len(rows.targets))]
         delay = 0.1 * neuron.tau if cone.delta_t_ms is None else cone.delta_t_ms
         at = [patterns[p].target(k) for p, k in self.names]
         behind = [patterns[p].row(patterns[p].targets[k] + delay, patterns[p].targets[:k]) for p, k in self.names]
         self.at, self.at_sizes = np.reshape(at, (-1, 2, trains)).swapaxes(0, 1)
         self.behind, self.behind_sizes = np.reshape(behind, (-1, 2, trains)).swapaxes(0, 1)
-        self.theta = np.concatenate([one.threshold(one.targets) for one in patterns])
+        self.theta = np.concatenate([rows.threshold(rows.targets) for rows in patterns])
         self.wanted = cone.kappa * self.theta
         # The factors of 6.14: each lambda over the sum of all and over the largest value of its term.
         most = np.maximum(np.abs(self.lb), np.abs(self.ub))
         shares = np.zeros(5)
         shares[: len(cone.lambdas)] = np.array(cone.lambdas) / max(np.sum(cone.lambdas), np.finfo(float).tiny)
-        above = [one.above(np.abs(one.values) * most[one.trains])[0] for one in patterns] if shares[4] > 0 else []
+        above = [rows.above(np.abs(rows.values) * most[rows.trains])[0] for rows in patterns] if shares[4] > 0 else []
         largest = np.array(
             [
                 most.sum(),
@@ -79,8 +79,8 @@ class Stated:
                 largest[term] = max(len(self.theta), term == 4)
         self.factors = np.divide(shares, largest, out=np.zeros(5), where=largest > 0)
         # The most terms of a sum, and the most roundings of a kernel's age.
-        inputs = max(len(one.times) for one in patterns)
-        self.terms = inputs + trains + len(self.theta) + max(one.roundings for one in patterns)
+        inputs = max(len(rows.times) for rows in patterns)
+        self.terms = inputs + trains + len(self.theta) + max(rows.roundings for rows in patterns)
 
     @property
     def sides(self) -> tuple[str, str]:
@@ -94,7 +94,7 @@ class Stated:
         x, e = self.behind @ w - self.wanted, self.at @ w - self.theta
         x = np.minimum(x, 0.0) if sides_b == "below" else x
         e = np.maximum(-e, 0.0) if sides_c == "below" else np.abs(e)
-        above = [one.above(one.values * w[one.trains]) for one in self.patterns] if d > 0 else [np.zeros(2)]
+        above = [rows.above(rows.values * w[rows.trains]) for rows in self.patterns] if d > 0 else [np.zeros(2)]
         above, above_size = np.sum(above, axis=0)
         norms = l1 * sizes.sum() + l2 * np.linalg.norm(w) ** (2 if self.cone.norm == "square" else 1)
         value = norms + b * (x @ x) + c * e.sum() + d * above

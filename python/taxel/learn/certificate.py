@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import flag, floats, instance
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import NotFittedError, ProblemError
 from taxel.learn._checked import checked_examples, fitted
@@ -65,7 +66,7 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
     flag("margin", margin)
     if len(certificate.rows) != len(certificate.multipliers):
         many = f"{counted(len(certificate.multipliers), 'multiplier')} for {counted(len(certificate.rows), 'row')}"
-        raise ProblemError(f"certificate: {many}: must be one a row")
+        raise refused("certificate", f": {many}: must be one a row")
     cone, patterns = problem._restated()
     neuron = Neuron() if cone.neuron is None else cone.neuron
     rows = pattern_rows(cone, neuron, patterns, problem.targets, margin=problem.margin)
@@ -78,7 +79,7 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
     multipliers = np.ldexp(certificate.multipliers, -np.frexp(np.abs(certificate.multipliers).max(initial=0.0))[1])
     for (kind, pattern, at), multiplier in zip(certificate.rows, multipliers, strict=True):
         if not 0 <= pattern < len(rows):
-            raise ProblemError(f"certificate: a row of pattern {pattern}, there are {len(rows)}")
+            raise refused("certificate", f": a row of pattern {pattern}, there are {len(rows)}")
         if multiplier < 0 and kind != "target":
             return False
         here = rows[pattern]
@@ -161,7 +162,7 @@ def check_gap(
     w = fitted(cone)
     hard = isinstance(cone, ConeX)
     if hard and silence is not None:
-        raise ProblemError("silence: ConeX requires it everywhere and has no windows")
+        raise refused("silence", ": ConeX requires it everywhere and has no windows")
     trained, times, asked = checked_examples(cone, len(w), patterns, targets, silence)
     margin = cone.problem_.margin if isinstance(cone, ConeX) else Margin(cone.margin, 0.0)
     stated = Stated(cone, pattern_rows(cone, cone.neuron_, trained, times, margin=margin, windows=asked), len(w))

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, floats, instance, parameters, several
+from taxel._base.errors import refused
 from taxel._base.messages import warn
 from taxel._base.parameters import defaults
-from taxel._core import NotFittedError, ProblemError
+from taxel._core import NotFittedError
 from taxel.learn._examples import examples, windows
 from taxel.learn._learner import SpikeLearner, Status, fired_by_neuron
 from taxel.learn.cone_x import Multipliers, _multipliers
@@ -289,7 +290,7 @@ class ConeRProblem:
     ) -> None:
         trains, times = examples(patterns, targets)
         each = [None] * len(trains) if silence is None else several("silence", silence)
-        asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
+        asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
         self._trains = len(trains[0][1]) - 1 if trains else 0
         self._counted = _counted(instance("cone", cone, ConeR), trains)
         if self._counted is not None:
@@ -310,13 +311,11 @@ class ConeRProblem:
         for name, away in (("lb", np.greater), ("ub", np.less)):
             bound = np.asarray(plain[name], np.float64)
             if bound.ndim and len(bound) != self._trains:
-                raise ProblemError(
-                    f"{name}: {len(bound)} bounds for {self._trains} trains, must be one a train, or one for all"
+                raise refused(
+                    name, f": {len(bound)} bounds for {self._trains} trains, must be one a train, or one for all"
                 )
             if away(bound, 0.0)[silent if bound.ndim else ...].any():
-                raise ProblemError(
-                    f"{name}: holds a train without a spike away from 0; lay the rows out with these bounds"
-                )
+                raise refused(name, ": holds a train without a spike away from 0; lay the rows out with these bounds")
             largest = np.maximum(largest, np.abs(bound[silent] if bound.ndim else bound))
             if bound.ndim:
                 plain[name] = bound[self._counted].tolist()
@@ -378,17 +377,18 @@ class ConeRProblem:
         if self._counted is None:
             return weights
         if weights.shape != (self._trains,):
-            raise ProblemError(f"weights: {weights.size} for {self._trains} trains, must be one a train")
+            raise refused("weights", f": {weights.size} for {self._trains} trains, must be one a train")
         return weights[self._counted]
 
 
 def _weighed(name: str, count: int, what: str) -> None:
     """Refuse more trains than a fit can have."""
     if count > _MOST_TRAINS:
-        raise ProblemError(
-            f"{name}: {count} {what}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
+        raise refused(
+            name,
+            f": {count} {what}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
             "with the cube of them; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
-            "contact_area), fewer levels, or a part of the array"
+            "contact_area), fewer levels, or a part of the array",
         )
 
 

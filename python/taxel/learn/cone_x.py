@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, flag, floats, instance, number, several, shown, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.parameters import defaults
-from taxel._core import NotFittedError, ProblemError
+from taxel._core import NotFittedError
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner, Status, fired_by_neuron
 from taxel.neuron import Neuron
@@ -116,13 +117,11 @@ class Certificate:
         """
         names = ("rows", "multipliers", "gap", "at_all", "text")
         if not isinstance(held, Mapping) or set(held) != set(names):
-            raise ProblemError(f"certificate: must be a dict of {', '.join(names)}, as to_dict gives it")
+            raise refused("certificate", f": must be a dict of {', '.join(names)}, as to_dict gives it")
         rows = [_row(_name(row)) for row in several("rows", held["rows"])]
         multipliers = floats("multipliers", held["multipliers"])
         if len(rows) != len(multipliers):
-            raise ProblemError(
-                f"certificate: {counted(len(multipliers), 'multiplier')} for {counted(len(rows), 'row')}"
-            )
+            raise refused("certificate", f": {counted(len(multipliers), 'multiplier')} for {counted(len(rows), 'row')}")
         gap = number("gap", held["gap"], "mV")
         return cls(rows, multipliers, gap, flag("at_all", held["at_all"]), str(held["text"]))
 
@@ -444,7 +443,7 @@ class ConeXProblem:
     def _restated(self) -> tuple[ConeX, list[SpikeTrains]]:
         """Return the learner's parameters and the patterns that state the problem."""
         json_text, parts = self._stated
-        return ConeX._from_values(json.loads(json_text)), [SpikeTrains._from_parts(one) for one in parts]
+        return ConeX._from_values(json.loads(json_text)), [SpikeTrains._from_parts(part) for part in parts]
 
     def __getstate__(self) -> dict[str, Any]:
         return {"_stated": self._stated, "targets": self.targets, "margin": self.margin}
@@ -570,9 +569,9 @@ def _name(row: object) -> tuple[str, int, float]:
         given: Any = row
         kind, pattern, at = given
     except (TypeError, ValueError):
-        raise ProblemError(f"row is {shown(row)}: must be kind, pattern and target or time") from None
+        raise refused("row", f" is {shown(row)}: must be kind, pattern and target or time") from None
     if not isinstance(kind, str):
-        raise ProblemError(f"row is {shown(row)}: its kind must be a text")
+        raise refused("row", f" is {shown(row)}: its kind must be a text")
     return kind, whole("pattern", pattern, 0), number("target or time", at, "ms")
 
 

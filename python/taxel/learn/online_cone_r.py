@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._base.arguments import callback, floats, instance, several
+from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel._core import ProblemError
 from taxel.learn._examples import windows
 from taxel.learn.cone_r import ConeR, _keep, _warn, _weighed
 from taxel.spikes import SpikeTrains
@@ -157,17 +157,17 @@ class OnlineConeR(ConeR):
         ProblemError : invalid patterns or targets (names pattern and target)
         """
         if start is not None:
-            raise ProblemError("start: a window starts from its own last fit")
+            raise refused("start", ": a window starts from its own last fit")
         if progress is not None:
             callback("progress", progress)
-            raise ProblemError("progress: a window reports none")
+            raise refused("progress", ": a window reports none")
         trains, times = several("patterns", patterns), several("targets", targets)
         if len(trains) != len(times) or not trains:
-            raise ProblemError(f"targets: {len(times)} lists for {len(trains)} patterns, must be one a pattern")
+            raise refused("targets", f": {len(times)} lists for {len(trains)} patterns, must be one a pattern")
         each = [None] * len(trains) if silence is None else several("silence", silence)
         if len(each) != len(trains):
-            raise ProblemError(f"silence: {len(each)} lists for {len(trains)} patterns, must be one a pattern")
-        asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
+            raise refused("silence", f": {len(each)} lists for {len(trains)} patterns, must be one a pattern")
+        asked = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
         with self._locked():
             self._begin()
             for p, (pattern, target, here) in enumerate(zip(trains, times, asked, strict=True)):

@@ -136,7 +136,7 @@ class SKIM(BatchLearner):
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
         super().fit(patterns, targets)
-        self.scores_ = [tuple(score) for score in self._said["scores"]]
+        self.scores_ = [tuple(score) for score in self._results["scores"]]
         return self
 
     def rows(self, pattern: SpikeTrains) -> NDArray[np.float64]:

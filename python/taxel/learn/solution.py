@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.learn._checked import checked_examples, fitted
 from taxel.learn._exact import ExactPotential
 from taxel.learn._statement import AT_EDGE, BLOCK, PatternRows, pattern_rows
@@ -115,7 +115,7 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
     """
     w = fitted(cone)
     if not np.isfinite(w).all():
-        raise ProblemError(f"cone: is {cone.status_} and has no weights to be checked")
+        raise refused("cone", f": is {cone.status_} and has no weights to be checked")
     trained, times, _ = checked_examples(cone, len(w), patterns, targets)
     all_rows = pattern_rows(cone, cone.neuron_, trained, times, margin=Margin(0.0, 0.0))
     missed, room, slope = 0.0, np.inf, np.inf
@@ -283,11 +283,11 @@ def _room(rows: PatternRows, w: _Floats, exact: ExactPotential, touch: float) ->
     least, found = _Least(np.inf, rows.start, True), np.inf
     for first in range(0, len(begin), BLOCK):
         here = slice(first, first + BLOCK)
-        one, found = _Curves(rows, w, exact, begin[here], end[here]).least(found, touch)
-        if one.silent is False:
-            return one
-        if least.silent and (one.silent is None or one.room < least.room):
-            least = one
+        margin, found = _Curves(rows, w, exact, begin[here], end[here]).least(found, touch)
+        if margin.silent is False:
+            return margin
+        if least.silent and (margin.silent is None or margin.room < least.room):
+            least = margin
     return least
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, several
+from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel._core import ProblemError
 from taxel.learn._learner import SpikeLearner
 from taxel.spikes import SpikeTrains
 
@@ -114,13 +114,13 @@ class STDP(SpikeLearner):
         ProblemError : no patterns, or an invalid one (names it)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights learnt until then stay
         """
-        trains = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
+        trains = [instance(f"pattern {p}", train, SpikeTrains) for p, train in enumerate(several("patterns", patterns))]
         if not trains:
-            raise ProblemError("patterns: none, must be one or more")
+            raise refused("patterns", ": none, must be one or more")
         self._neuron = _core.STDP(self._json(), len(trains[0]))
-        for one in trains:
+        for train in trains:
             self._neuron.rest()
-            self._learn(one)
+            self._learn(train)
         return self
 
     def partial_fit(self, piece: SpikeTrains) -> Self:
@@ -160,10 +160,10 @@ class STDP(SpikeLearner):
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
         # With the present weights, each pattern from the resting state.
         weights, fired = self._fitted(), []
-        for one in patterns:
+        for pattern in patterns:
             neuron = _core.STDP(self._json(), len(weights))
             neuron.set_weights(weights)
-            fired.append(neuron.push(one._parts(), False))
+            fired.append(neuron.push(pattern._parts(), False))
         return fired
 
     def _learn(self, piece: SpikeTrains) -> Self:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, flag, floats, instance, several
+from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel._core import ProblemError
 from taxel.learn._epochs import keep
 from taxel.learn._learner import Learner, Status, patterns_of
 from taxel.spikes import SpikeTrains
@@ -129,7 +129,7 @@ class Tempotron(Learner):
         ProblemError : invalid patterns, labels or first weights
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
-        trains = [one._parts() for one in patterns_of(patterns)]
+        trains = [pattern._parts() for pattern in patterns_of(patterns)]
         truth = _labels(labels)
         first = None if start is None else floats("start", start)
         if progress is not None:
@@ -178,7 +178,7 @@ class Tempotron(Learner):
         """
         fired, truth = self.predict(patterns), _labels(labels)
         if len(truth) != len(fired) or not truth:
-            raise ProblemError(f"labels: {len(truth)} for {len(fired)} patterns, must be one a pattern")
+            raise refused("labels", f": {len(truth)} for {len(fired)} patterns, must be one a pattern")
         return float(np.mean(fired == np.array(truth)))
 
     def peak(self, weights: ArrayLike, pattern: SpikeTrains) -> tuple[float, float, float]:

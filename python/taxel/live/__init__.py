@@ -2,7 +2,7 @@
 
 from taxel.live.bridge import Bridge
 from taxel.live.client import PanelClient
-from taxel.live.live import Live, heard
+from taxel.live.live import Live
 from taxel.live.panel import Panel
 from taxel.live.remote import Remote
 from taxel.live.sending import PORT, send
@@ -22,6 +22,5 @@ __all__ = [
     "Summary",
     "Viewer",
     "Viewing",
-    "heard",
     "send",
 ]

@@ -45,7 +45,7 @@ class DetectionMessage(TypedDict):
     label: str
     t_us: int
     known_us: int
-    said_us: int
+    reported_us: int
     slope_mv_per_ms: float | None
 
 

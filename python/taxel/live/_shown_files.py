@@ -138,14 +138,14 @@ class ShownFiles:
         frames = {name: one.frames() for name, one in _sources(recording).items()}
         _, lefts = side_by_side([one.array for one in frames.values()])
         found: dict[str, _Taxels] = {"dead": [], "stuck": [], "noisy": []}
-        untold = 0
+        untested = 0
         for left, one in zip(lefts, frames.values(), strict=True):
             judged = health(one)
-            untold += int(np.count_nonzero(judged.untold))
+            untested += int(np.count_nonzero(judged.untested))
             for kind, places in judged.named().items():
                 if kind in found:
                     found[kind] += [(x + left, y) for x, y in places]
-        return found["dead"], found["stuck"], found["noisy"], untold
+        return found["dead"], found["stuck"], found["noisy"], untested
 
     def _temporary(self) -> Path:
         with self._lock:
@@ -235,7 +235,7 @@ def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, float, bool,
     """
     rest = of_pictures(frames)
     source, flickers = {"unit": "given"}.get(rest.source, rest.source), np.flatnonzero(flickering(frames)).tolist()
-    return source, rest.values, ticks_by_unit(frames), loaded_from(frames, rest), rest.falls, flickers, rest.on
+    return source, rest.values, ticks_by_unit(frames), loaded_from(frames, rest), rest.falls, flickers, rest.preload_at
 
 
 def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:

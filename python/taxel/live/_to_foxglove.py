@@ -42,7 +42,7 @@ _SCHEMAS = {
         "label": _TEXT,
         "t_us": _WHOLE,
         "known_us": _WHOLE,
-        "said_us": _SOME,
+        "reported_us": _SOME,
         "latency_us": _SOME,
         "slope": _SOME,
     },
@@ -137,7 +137,7 @@ class ToFoxglove:
                     if len(t):
                         self._row("/spikes", t[0], encoder=item.encoder, train=train.tolist(), value=value.tolist())
             case Detection():
-                when = {"known_us": item.known, "said_us": item.said, "latency_us": item.latency}
+                when = {"known_us": item.known, "reported_us": item.reported, "latency_us": item.latency}
                 slope = None if math.isnan(item.slope) else item.slope
                 self._row("/detections", item.t, label=item.label, **when, slope=slope)
             case Note() if item.t is not None:

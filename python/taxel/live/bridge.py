@@ -15,6 +15,7 @@ from typing import Any
 
 from taxel import _core
 from taxel._base.arguments import number, text
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._core import DeviceError, ProblemError
 from taxel.live.live import Live
@@ -114,7 +115,7 @@ class Bridge:
     def counts(self) -> dict[str, dict[str, Any]]:
         """Parcels sent and dropped for "block" (recorders) and "drop" (viewers), and whether there is a subscriber."""
         counts = dict(zip(("block", "drop"), with_taxel_errors(self._zenoh.counts), strict=True))
-        return {what: dict(zip(("sent", "dropped", "heard"), row, strict=True)) for what, row in counts.items()}
+        return {what: dict(zip(("sent", "dropped", "subscribed"), row, strict=True)) for what, row in counts.items()}
 
     def stop(self) -> None:
         """Publish what waits, and end; stop the `Live` first if everything must be published.
@@ -154,7 +155,7 @@ def _places(name: str, addresses: str | Sequence[str]) -> list[str]:
     for place in places:
         match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[\w.-]+):(\d{1,5})", text(name, place), re.ASCII)
         if not match or not 1 <= int(match[2]) <= 65_535:
-            raise ProblemError(f"{name} is {place!r}: must be HOST:PORT, as {PLACE}")
+            raise refused(name, f" is {place!r}: must be HOST:PORT, as {PLACE}")
     return places
 
 

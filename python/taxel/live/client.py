@@ -16,7 +16,8 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number, shown, text
+from taxel._base.arguments import finite, instance, number, shown, text
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detections import Detection
 from taxel.encode import Encoder
@@ -178,9 +179,7 @@ class PanelClient:
         self, url: str, *, rate_hz: float = 30.0, encoder: Encoder | None = None, recording: str | None = None
     ) -> None:
         address, token, opens = _parts(url)
-        rate = number("rate_hz", rate_hz)
-        if not 1.0 <= rate <= _MOST_HZ:
-            raise ProblemError(f"rate_hz is {rate:g}: must lie in 1 to {_MOST_HZ:g}")
+        rate = finite("rate_hz", rate_hz, least=1.0, most=_MOST_HZ)
         spikes = None if encoder is None else instance("encoder", encoder, Encoder).to_json()
         opens = opens if recording is None else text("recording", recording)
         self._socket = _connected(address, token)
@@ -282,7 +281,7 @@ class PanelClient:
             self._noise_floor = message["values"]["noise_floor"]
         elif message["type"] == "detection" and self._subject is not None:
             slope = math.nan if message["slope_mv_per_ms"] is None else message["slope_mv_per_ms"]
-            times = message["t_us"], message["known_us"], slope, message["said_us"]
+            times = message["t_us"], message["known_us"], slope, message["reported_us"]
             yield self._subject, Detection(message["label"], *times)
         elif message["type"] == "spikes" and self._subject is not None:
             yield self._subject, _spikes(message)
@@ -393,7 +392,7 @@ def _parts(url: object) -> tuple[str, str, str | None]:
     parts = urlsplit(text("url", url))
     keys = parse_qs(parts.fragment)
     if parts.scheme != "http" or not parts.netloc or "token" not in keys:
-        raise ProblemError(f"url is {shown(url)}: must be a panel's address, http://HOST:PORT/#token=...")
+        raise refused("url", f" is {shown(url)}: must be a panel's address, http://HOST:PORT/#token=...")
     return parts.netloc, keys["token"][0], keys.get("open", [None])[0]
 
 

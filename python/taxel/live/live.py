@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from functools import partial
 from types import TracebackType
@@ -14,21 +14,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, instance, number, numbers, parameters, several, shown, text, whole
+from taxel._base.arguments import finite, flag, numbers, shown, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped
 from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detections import Detection, Detections
+from taxel.detections import Detection
 from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.options import LiveOptions
 from taxel.live.summary import Summary, summary_of
 from taxel.recording.changes import Zeroing
 from taxel.tare import Tare
 
-__all__ = ["Live", "heard"]
+__all__ = ["Live"]
 
 #: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"
@@ -50,48 +51,65 @@ class Live:
     Parameters
     ----------
     port : int, 0 to 65535
-        The UDP port to listen on; 0 finds a free one, see `address`.
+        The UDP port that the board sends to. 0 finds a free one, see `address`.
     host : str
-        The address of this machine to listen on. Default: all its addresses.
+        The address of this machine to listen on; 0.0.0.0: all.
     remote : Remote, optional
-        A board of another computer, in place of `port` and `host`. Stop the `Live` before the `Remote`.
+        Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there. Stop the
+        `Live` before the `Remote`.
     array : Array, optional
-        The sensor. Default: the remote board's or the readout's own, or the thesis' 64 x 64.
-    registers : str or taxel.wire.Registers, optional
-        The contents of the board's registers, or the name of a preset, "5.2 kHz", "2 kHz" or "20.8 kHz", of
-        which a smaller array drives fewer lines. Default: those of a board of this array at reset, up to 64 x 64
-        at 5.2 kHz; a remote board reports its own.
+        Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
+    registers : str or Registers, optional
+        The board's registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its
+        own. The contents of the registers, or the name of a preset, of which a smaller array drives fewer lines.
+        Default: those of a board of this array at reset.
     differences : bool
-        Whether the board sends differences for intensities (the panel's "delta intensity").
-    readout : Readout or taxel.detect.PlainRule, optional
-        The readout of the events. Without one nothing is detected.
-    tare : Tare or float (s), optional
-        For a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first
-        event on, which ends early where the board marks a start. The board must be at rest then, with its noise floor
-        at 0.
+        The board sends intensity differences. The panel's "delta intensity".
+    readout : Readout or PlainRule, optional
+        A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none. Without one nothing
+        is detected.
+    tare : Tare or float, optional
+        Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON). For a plain rule, or a
+        readout whose encoder needs one: a tare, or how long to take a fresh one from the first event on, s, which ends
+        early where the board marks a start. The board must be at rest then, with its noise floor at 0.
     record : path, optional
-        A new file: `.mcap` for all data, `.lsa` for the raw bytes of the manual.
+        Record in a new file (.mcap or .lsa). `.mcap` holds all data, `.lsa` the raw bytes of the manual.
     record_later : bool
-        Whether recordings begin and end while it runs (`record`, `end_recording`); then none begins here, and `sources`
-        are recorded while one runs.
+        Recordings begin and end while it runs (`record`, `end_recording`). Then none begins here, and `sources` are
+        recorded while one runs.
     name : str
-        The board's name in the recording.
+        The board's name among the sources of the recording.
     sources : mapping of str to str, optional
-        The other sources of the recording (`.mcap`), by name, each with its own clock:
-        "udp:HOST:PORT,array=16x16,preset=2 kHz" another board, which sends to that address of this machine;
-        "serial:PATH@BAUD" or "pipe:PATH" lines of numbers, as of an IMU ("-" is the standard input); "given" numbers
-        that a program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of a line (default: those
-        of the first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called `t_us`,
-        `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its
-        arrival.
-    compression : {"none", "lz4", "zstd"}
-        Compression of a `.mcap`.
+        Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
+        (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated. By name, in a `.mcap`, each with its own
+        clock: "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which sends to that address of this machine;
+        "serial:PATH@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard input); "given" are numbers that a
+        program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of a line (default: those of the
+        first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called `t_us`, `time_ms` ...;
+        "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its arrival.
+    compression : str
+        Compression of a .mcap: none, lz4 or zstd.
     overwrite : bool
-        Whether an existing file may be replaced.
+        Replace the file if it exists.
     guard_frames : float, 0 or more
-        While no events arrive the readout's time follows the host's clock, this many frames behind it.
+        How far, in frames, a readout stays behind the host's clock while no events arrive.
     gap_frames : float, 0 or more
-        At a gap in the sequence of wire version 2 time waits this many frames: the datagrams may only be late.
+        At a gap in the sequence of version 2, frames to wait for what may only be late.
+    lines : bool
+        Print one line of JSON for each detection, and nothing else.
+    send : str or sequence of str
+        Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated. UDP
+        sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
+        streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
+        counted.
+    kernel_buffer_bytes : int, 0 to 2147483647
+        How much may wait in the kernel, bytes.
+    queue_bytes : int, 0 to 2147483647
+        How much may wait for the decoder, bytes.
+    readout_events : int, 0 to 2147483647
+        How many events may wait for the readout.
+    gro : bool
+        Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`). It then counts its drops in trains.
     say : callable, optional
         Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and
         is raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues
@@ -116,7 +134,7 @@ class Live:
 
     Notes
     -----
-    `t` and `known` of a detection are the same live and from the recording; `said` is the time of its output. The
+    `t` and `known` of a detection are the same live and from the recording; `reported` is the time of its output. The
     offset and drift of the clocks are estimated from arrivals: a delay is never negative, so the lower envelope of
     arrival time minus board time is the offset.
 
@@ -136,7 +154,7 @@ class Live:
         #: Whether the registers were stated; the panel shows no frame rate that is only assumed.
         self._registers_stated = options.registers is not None or options.remote is not None
         options = options.completed()
-        remote, readout, tare, say = options.remote, options.readout, options.tare, options.say
+        remote, readout, say = options.remote, options.readout, options.say
         self.array = Array._of(options.array)
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
@@ -147,23 +165,15 @@ class Live:
         self._labels = None if readout is None else list(readout.labels)
         receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
+        stated = options.for_rust(
+            send=[to for to in destinations if not to.startswith(_LSL)],
+            sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in sources],
+        )
         feed = None if remote is None else remote._fed(options.queue_bytes)
         self._core = _core.Live(
-            text("host", options.host),
-            whole("port", options.port, 0, 65_535),
-            self.array._parts(),
-            parameters(
-                options.for_rust(
-                    send=[to for to in destinations if not to.startswith(_LSL)],
-                    sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in sources],
-                )
-            ),
-            options.recording(),
-            None if readout is None else readout.to_json(),
-            tare.to_json() if isinstance(tare, Tare) else None,
-            None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
+            stated,
+            None if options.record is None else checked_path("record", options.record),
             None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
-            flag("lines", options.lines),
             feed,
         )
         self._remote, self._place = remote, self._core.place()
@@ -186,7 +196,7 @@ class Live:
         ProblemError : the board is another computer's
         """
         if self._remote is not None:
-            raise ProblemError(f"live: receives from {self.place}, and on no address of this computer")
+            raise refused("live", f": receives from {self.place}, and on no address of this computer")
         return self._core.address()
 
     @property
@@ -240,7 +250,7 @@ class Live:
         `heartbeat_us` (the longest interval between heartbeats of a board of version 2, or None), `arrival` (state:
         "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended),
         `bridged` (None, or of a board of another computer: parcels, missing, dropped, dropped_by_kernel, repeated,
-        refused, restarts, silences, heard, ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`,
+        refused, restarts, silences, received, ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`,
         `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range
@@ -248,7 +258,7 @@ class Live:
         each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble),
         `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
-        `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
+        `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
         drift_ppm, or None), `pace` (drift_ppm, delay: as a latency, beyond the shortest; doubt: why they cannot be, or
         None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 
@@ -339,8 +349,8 @@ class Live:
         arrival = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
         given = numbers("values", values, np.float64).reshape(-1)
         for k in np.flatnonzero(np.abs(given) > VALUE)[:1]:
-            raise ProblemError(
-                f"values[{k}] is {shown(given[k].item())}: must fit 32 bits, or be NaN where it is missing"
+            raise refused(
+                "values", f"[{k}] is {shown(given[k].item())}: must fit 32 bits, or be NaN where it is missing"
             )
         self._core.sample(text("name", name), given.tolist(), arrival)
 
@@ -364,8 +374,8 @@ class Live:
         """
         columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
-            raise ProblemError(
-                f"x has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
+            raise refused(
+                "x", f" has {counted(len(columns), 'column')}, y {counted(len(rows), 'row')}: must be as many"
             )
         for name, places in (("x", columns), ("y", rows)):
             if len(places) and (places.min() < 0 or places.max() > _MOST_PLACE):
@@ -378,19 +388,28 @@ class Live:
         """The latest zeroing of each taxel that was zeroed, by `zero` or a panel."""
         return tuple(Zeroing(**one) for one in self._core.zeroed())
 
-    def note(self, said: str) -> None:
+    def note(self, message: str) -> None:
         """Write a note into the recording, with the current time.
 
         Parameters
         ----------
-        said : str
+        message : str
             The text.
 
         Raises
         ------
         ProblemError : nothing is recorded, or to a `.lsa`, which holds bytes only
+
+        Examples
+        --------
+        >>> import tempfile, taxel
+        >>> path = f"{tempfile.mkdtemp()}/walk.mcap"
+        >>> with Live(0, host="127.0.0.1", record=path) as live:
+        ...     live.note("heel strike")
+        >>> taxel.open(path).notes[0].text
+        'heel strike'
         """
-        self._core.note(text("note", said))
+        self._core.note(text("note", message))
 
     def record(
         self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
@@ -478,43 +497,3 @@ class Live:
 
 def _given(inlet: LslInlet) -> str:
     return f"given,columns={':'.join(inlet.columns)}"
-
-
-def _stretch_us(seconds: float) -> int:
-    stretch = number("tare", seconds)
-    if not 1e-6 <= stretch <= 3600:
-        raise ProblemError(f"tare is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
-    return round(stretch * 1e6)
-
-
-def heard(said: Sequence[Detection]) -> Detections:
-    """Return detections of a `Live` as columns.
-
-    Parameters
-    ----------
-    said : sequence of Detection
-
-    Returns
-    -------
-    Detections
-
-    Raises
-    ------
-    ProblemError : something that is no detection
-
-    Examples
-    --------
-    >>> heard([Detection("contact", 1000, 1344)])
-    Detections(1: contact 1; 1000 to 1000 us)
-    """
-    detections = [instance("said", one, Detection) for one in several("said", said)]
-    times = [one.said for one in detections]
-    reported: Any = None if None in times else times
-    return Detections._of(
-        [one.label for one in detections],
-        [one.t for one in detections],
-        [one.known for one in detections],
-        [one.slope for one in detections],
-        reported,
-        [one.repaired for one in detections],
-    )

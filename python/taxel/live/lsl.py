@@ -121,5 +121,5 @@ class LslOutlet:
 
     def __call__(self, detection: Any) -> None:
         """Send a `taxel.Detection`."""
-        ago_s = (time.time_ns() - detection.said_ns) * 1e-9 + (detection.said - detection.t) * 1e-6
+        ago_s = (time.time_ns() - detection.reported_ns) * 1e-9 + (detection.reported - detection.t) * 1e-6
         self._outlet.push_sample([detection.label], self._clock() - ago_s)

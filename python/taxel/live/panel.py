@@ -11,6 +11,7 @@ from types import TracebackType
 from taxel import _core
 from taxel._base.arguments import callback, flag, instance, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detect import load
 from taxel.device import Cable
@@ -87,9 +88,9 @@ class Panel:
         if self._live is None:
             place = Path(checked_path("shows", shows))
             if control is not None:
-                raise ProblemError("control: a recording has no board; give a taxel.live.Live")
+                raise refused("control", ": a recording has no board; give a taxel.live.Live")
             if folder is not None:
-                raise ProblemError("folder: is the recording's own")
+                raise refused("folder", ": is the recording's own")
             folder, opened = _shown(place, how.layout)
             opens = how.joined if opens is None and how.given() else opens
             shown = None if place.is_dir() and not is_bag(place) else folder / opened

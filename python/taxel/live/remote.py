@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from taxel import _core
 from taxel._base.arguments import finite, shown, text
+from taxel._base.errors import refused
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 
@@ -132,7 +133,7 @@ class Remote:
     def __init__(self, address: str, *, congestion: str = "block", timeout: float = 5.0) -> None:
         self.address = Address.of(address)
         if congestion not in ("block", "drop"):
-            raise ProblemError(f"congestion is {shown(congestion)}: must be block or drop")
+            raise refused("congestion", f" is {shown(congestion)}: must be block or drop")
         self.congestion = congestion
         self._zenoh = with_taxel_errors(wheel().Subscriber, [self.address.place])
         try:
@@ -192,10 +193,15 @@ class Remote:
         """Whether the board sends differences for intensities."""
         return bool(self._about["differences"])
 
-    def _fed(self, queue_bytes: int | None) -> _core.Feed:
+    @property
+    def _place(self) -> str:
+        """The board's whole address."""
+        return str(self.address._replace(name=self.name))
+
+    def _fed(self, queue_bytes: int) -> _core.Feed:
         """Return the feed for a pipeline."""
         self._only_one()
-        return _core.Feed(str(self.address._replace(name=self.name)), queue_bytes)
+        return _core.Feed(self._place, queue_bytes)
 
     def _begin(self, feed: _core.Feed) -> None:
         """Feed the pipeline from now on."""
@@ -205,7 +211,7 @@ class Remote:
 
     def _only_one(self) -> None:
         if self._feed is not None:
-            raise ProblemError("remote: is in use already; make another one")
+            raise refused("remote", ": is in use already; make another one")
 
     def _run(self, feed: _core.Feed) -> None:
         """Feed received parcels until the pipeline ends, or `stop` is called."""

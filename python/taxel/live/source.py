@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, number, numbers, parameters, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted, plain
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.live.sending import PORT
 from taxel.wire import Registers
@@ -97,7 +97,7 @@ class Source:
         values, shape, most = numbers("frame", frame, np.float64), self.array.shape, 2**self.bits - 1
         if values.shape not in (shape, (shape[0] * shape[1],)):
             right = f"{shape[0]} x {shape[1]} (rows x columns), or {shape[0] * shape[1]} row by row"
-            raise ProblemError(f"frame: of shape {' x '.join(map(str, values.shape)) or 'one number'}, must be {right}")
+            raise refused("frame", f": of shape {' x '.join(map(str, values.shape)) or 'one number'}, must be {right}")
         values = values.reshape(shape)
         is_whole = values == np.rint(values)
         wrong = np.argwhere(~(is_whole & (values >= 0) & (values <= most)))
@@ -105,9 +105,10 @@ class Source:
             row, column = (int(k) for k in wrong[0])
             value = float(values[row, column])
             scaled = f"; scale readings to it first: np.rint(readings / full * {most}), full the greatest of them"
-            raise ProblemError(
-                f"frame: row {row}, column {column} is {plain(value)}; must be a whole number from 0 to {most} "
-                f"({counted(self.bits, 'bit')})" + scaled * (not is_whole[row, column])
+            raise refused(
+                "frame",
+                f": row {row}, column {column} is {plain(value)}; must be a whole number from 0 to {most} "
+                f"({counted(self.bits, 'bit')})" + scaled * (not is_whole[row, column]),
             )
         return values.astype(np.int64)
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any
 
-from taxel._base.arguments import instance, number, shown, text
+from taxel._base.arguments import finite, instance, number, shown, text
 from taxel._base.child_process import ChildProcess
+from taxel._base.errors import refused
 from taxel._base.messages import escaped, installing
-from taxel._core import ProblemError
 from taxel.encode import Encoder
 from taxel.live._external_viewer import KINDS
 from taxel.live.live import Live
@@ -103,10 +103,8 @@ class Viewer:
         rate_hz: float = 30.0,
     ) -> None:
         where = _where(to)
-        pace, rate = number("speed", speed), number("rate_hz", rate_hz)
-        for name, value, least, most in (("speed", pace, 0.001, 100.0), ("rate_hz", rate, 1.0, 60.0)):
-            if not least <= value <= most:
-                raise ProblemError(f"{name} is {value:g}: must lie in {least:g} to {most:g}")
+        pace = finite("speed", speed, least=0.001, most=100.0)
+        rate = finite("rate_hz", rate_hz, least=1.0, most=60.0)
         spikes = None if encoder is None else instance("encoder", encoder, Encoder).to_json()
         if encoder is not None and isinstance(shows, Live):
             encoder.stream(shows.array)
@@ -225,7 +223,7 @@ def _where(to: object) -> dict[str, Any]:
     plain = None if kind is None else re.fullmatch(r"(.+):([0-9]{1,5})" if kind.has_host else r"()([0-9]{1,5})", place)
     if plain is None or int(plain[2]) > _MOST_PORT:
         forms = [form for n, k in KINDS.items() for form in (n, f"{n}:{'HOST:' * k.has_host}PORT")]
-        raise ProblemError(f"to is {shown(to)}: must be {', '.join(forms[:-1])} or {forms[-1]}")
+        raise refused("to", f" is {shown(to)}: must be {', '.join(forms[:-1])} or {forms[-1]}")
     return {"what": what, "host": plain[1] or "127.0.0.1", "port": int(plain[2])}
 
 

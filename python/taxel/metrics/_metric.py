@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._base.arguments import bare, floats, instance, number, parameters, several, shown, text
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.parameters import ranges
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.spikes import SpikeTrains
 
@@ -34,7 +34,7 @@ def _plain(metric: str, name: str, value: Any) -> Any:
     if name == "window" and value is not None:
         ends = floats(name, value, "ms")
         if len(ends) != 2:
-            raise ProblemError(f"{name} has {len(ends)} entries: must be start and stop, ms")
+            raise refused(name, f" has {len(ends)} entries: must be start and stop, ms")
         return ends.tolist()
     known = ranges(metric).get(name, {})
     if "infinite" in known:
@@ -50,8 +50,8 @@ def _plain(metric: str, name: str, value: Any) -> Any:
 def distance(metric: str, a: Pattern, b: Pattern, options: Mapping[str, Any]) -> float:
     """Return the distance of two trains or two patterns."""
     if isinstance(a, SpikeTrains) != isinstance(b, SpikeTrains):
-        name, value, other = ("b", b, "a") if isinstance(a, SpikeTrains) else ("a", a, "b")
-        raise ProblemError(f"{name} is {shown(value)}: must be a taxel.SpikeTrains, as {other} is")
+        name, value, wanted = ("b", b, "a") if isinstance(a, SpikeTrains) else ("a", a, "b")
+        raise refused(name, f" is {shown(value)}: must be a taxel.SpikeTrains, as {wanted} is")
     return _core.distance(stated(metric, options), _one(metric, "a", a), _one(metric, "b", b))
 
 
@@ -67,7 +67,7 @@ def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[
     """Return several patterns: the trains of one `SpikeTrains`, a list of `SpikeTrains`, or a list of times a train."""
     if isinstance(x, SpikeTrains):
         if x.signed:
-            raise ProblemError(f"{name} has signed trains: choose some by split_by_sign(), or give a list of patterns")
+            raise refused(name, " has signed trains: choose some by split_by_sign(), or give a list of patterns")
         x._ungraded(metric)
         return name, len(x), 1, x.times, x.offsets, (x.start, x.stop), True
     entries = several(name, x)
@@ -80,8 +80,8 @@ def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[
     trains = len(patterns[0])
     for p, pattern in enumerate(patterns):
         if len(pattern) != trains:
-            raise ProblemError(
-                f"{name}[{p}] has {counted(len(pattern), 'train')}, {name}[0] has {trains}: must be equally many"
+            raise refused(
+                name, f"[{p}] has {counted(len(pattern), 'train')}, {name}[0] has {trains}: must be equally many"
             )
     offsets = _offsets(np.concatenate([p.counts for p in patterns]))
     return name, len(patterns), trains, _joined([p.times for p in patterns]), offsets, window, True

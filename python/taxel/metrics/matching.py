@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, number, several
+from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel._core import ProblemError
 
 __all__ = ["Matching", "f1", "matching"]
 
@@ -42,8 +42,8 @@ class Matching(NamedTuple):
     @property
     def f1(self) -> float:
         """Twice the number of targets found, divided by the number of targets and spikes; 1 without either."""
-        both = 2 * self.found + self.missed + self.false
-        return 2 * self.found / both if both else 1.0
+        events = 2 * self.found + self.missed + self.false
+        return 2 * self.found / events if events else 1.0
 
 
 def matching(
@@ -83,9 +83,9 @@ def matching(
     fired = [floats(f"spikes[{p}]", times, "ms") for p, times in enumerate(several("spikes", spikes))]
     target_times = [floats(f"targets[{p}]", times, "ms") for p, times in enumerate(several("targets", targets))]
     if len(fired) != len(target_times):
-        raise ProblemError(f"targets: {len(target_times)} lists for {len(fired)} patterns, must be one a pattern")
+        raise refused("targets", f": {len(target_times)} lists for {len(fired)} patterns, must be one a pattern")
     pairs = _core.match_spikes(fired, target_times, number("window_ms", window_ms, "ms"))
-    errors = [fired[p][j] - target_times[p][i] for p, own in enumerate(pairs) for j, i in own]
+    errors = [fired[p][j] - target_times[p][i] for p, matched in enumerate(pairs) for j, i in matched]
     matched = len(errors)
     return Matching(
         matched, sum(map(len, target_times)) - matched, sum(map(len, fired)) - matched, np.array(errors, np.float64)

@@ -17,6 +17,7 @@ from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from taxel._base.arguments import finite
+from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -69,10 +70,10 @@ def film(
     """
     place = Path(path)
     if not finite("slower", slower) > 0:
-        raise ProblemError(f"slower is {slower:g}: must be above 0")
+        raise refused("slower", f" is {slower:g}: must be above 0")
     writer = writer_of(place)
     if not len(events) or events.intensity is None:
-        raise ProblemError("events: nothing to draw; a film is of events with intensities")
+        raise refused("events", ": nothing to draw; a film is of events with intensities")
     begin = events.markers[0][0] if events.markers else int(events.t[0])
     period_us = 1e6 / _RATE_HZ / slower
     events = events.sorted()

@@ -9,7 +9,7 @@ from html import escape
 from matplotlib.figure import Figure
 
 from taxel._base.arguments import shown
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
@@ -46,7 +46,7 @@ def html(noun: Drawn) -> str:
     True
     """
     if not isinstance(noun, Drawn):
-        raise ProblemError(f"noun is {shown(noun)}: must be one that draws itself, as taxel.Events")
+        raise refused("noun", f" is {shown(noun)}: must be one that draws itself, as taxel.Events")
     line = f"<code>{escape(repr(noun))}</code>"
     # A figure without pyplot, so that no window or notebook shows it a second time.
     figure = Figure(figsize=(7.0, 2.6) if isinstance(noun, Recording) else (4.2, 2.8), layout="constrained")

@@ -9,6 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from taxel._base.arguments import finite, instance, shown
+from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.detections import Detections
@@ -26,7 +27,7 @@ def axes(ax: Axes | None, size: tuple[float, float]) -> Axes:
     if ax is None:
         return plt.subplots(figsize=size, layout="constrained")[1]
     if not isinstance(ax, Axes):
-        raise ProblemError(f"ax is {shown(ax)}: must be matplotlib's Axes")
+        raise refused("ax", f" is {shown(ax)}: must be matplotlib's Axes")
     return ax
 
 
@@ -62,8 +63,8 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
         ax.scatter(times, train, size, "black", marker="|", linewidths=0.8)
     else:
         names = ("ON", "OFF") if trains.signed else ("above 0", "below 0")
-        for on, colour, name in zip((True, False), (ON, OFF), names, strict=True):
-            chosen = (trains.values > 0) == on
+        for rising, colour, name in zip((True, False), (ON, OFF), names, strict=True):
+            chosen = (trains.values > 0) == rising
             ax.scatter(times[chosen], train[chosen], size, colour, marker="|", linewidths=0.8, label=name)
         ax.legend(loc="upper right")
     ax.set(xlabel="time (ms)", ylabel="train", xlim=_wide(trains.start, trains.stop), ylim=(-0.7, len(trains) - 0.3))

@@ -71,8 +71,8 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         span = (float(t.min()), float(t.max())) if len(events) else (0.0, 1.0)
         bins = np.linspace(span[0], max(span[1], span[0] + 1e-4), 201)
         width = bins[1] - bins[0]
-        for on, colour, name in ((True, "#c44e52", "rises"), (False, "#4c72b0", "falls")):
-            rate = np.histogram(t[events.p == on], bins)[0] / width
+        for rising, colour, name in ((True, "#c44e52", "rises"), (False, "#4c72b0", "falls")):
+            rate = np.histogram(t[events.p == rising], bins)[0] / width
             over.stairs(rate, bins, color=colour, label=name)
         # The axis is logarithmic from one event a bin on, as a tare has a thousand times the event rate of a touch.
         over.set_yscale("symlog", linthresh=1 / width)

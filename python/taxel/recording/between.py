@@ -37,7 +37,7 @@ def between(of: Contents, start: float, stop: float) -> Contents:
     every, whole = of.sources, _between(of.one, of.sources, start, stop)
     if len(every) == 1:
         return Contents.of(whole)
-    every_part = {name: _between(one, every, start, stop) for name, one in inside(every).items()}
+    every_part = {name: _between(source, every, start, stop) for name, source in inside(every).items()}
     apart = Once(lambda: len(every) > 1 and of.one.timing.clock_of is None and not together(every))
     return Contents(whole, Slices(every_part, of.one.origin, apart))
 
@@ -92,7 +92,7 @@ def _verdict(of: Source, sources: Mapping[str, Source]) -> Verdict | None:
     said = verdict_of(of)
     if said.stretch_of is not None:
         return said
-    verdicts = [verdict_of(one).to_dict() for one in sources.values()]
+    verdicts = [verdict_of(source).to_dict() for source in sources.values()]
     try:
         about = _ends(of.origin.path)
     except OSError:
@@ -113,8 +113,8 @@ def _ends(path: Path) -> bytes:
 class Slices(Mapping[str, Source]):
     """Hold the same part of all sources of a file; refuse access to those whose clock is not that of the interval."""
 
-    def __init__(self, every_part: Mapping[str, Source], one: parts.Origin, apart: Once[bool]) -> None:
-        self._parts, self._one, self._apart = every_part, one, apart
+    def __init__(self, every_part: Mapping[str, Source], origin: parts.Origin, apart: Once[bool]) -> None:
+        self._parts, self._one, self._apart = every_part, origin, apart
 
     def __getitem__(self, name: str) -> Source:
         part = self._parts[name]

@@ -138,7 +138,7 @@ class Several(Source):
 
 def parts_of(of: Source) -> dict[str, parts.Part]:
     """Return the parts of a source by the names of its fields."""
-    return {one.name: getattr(of, one.name) for one in fields(of) if one.metadata.get("is_part", True)}
+    return {field.name: getattr(of, field.name) for field in fields(of) if field.metadata.get("is_part", True)}
 
 
 def applied(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Callable[[], Iterable[str]] = tuple) -> S:
@@ -234,7 +234,7 @@ def alone(sources: Mapping[str, Source]) -> Contents:
 
     The verdict is that of all sources.
     """
-    boards = [one for one in sources.values() if not isinstance(one, Stream)]
+    boards = [source for source in sources.values() if not isinstance(source, Stream)]
     if len(sources) == 1:
         return Contents(next(iter(sources.values())), sources)
     if len(boards) != 1:
@@ -255,7 +255,7 @@ def several(sources: Mapping[str, Source]) -> Several:
         )
 
     no: Once[Any] = Once(refuse)
-    every = [one.losses for one in sources.values()]
+    every = [source.losses for source in sources.values()]
     return Several(
         # A source is named after its file and itself.
         replace(first.origin, name=first.origin.name.removesuffix(f" {first.origin.label}"), label=""),
@@ -267,18 +267,18 @@ def several(sources: Mapping[str, Source]) -> Several:
         marks=replace(first.marks, board_changes=no, zeroings=no),
         timing=parts.Timing(no, first.timing.clock_of),
         losses=parts.Losses(
-            counts=Once(lambda: {name: one.losses.counts() for name, one in sources.items()}),
+            counts=Once(lambda: {name: source.losses.counts() for name, source in sources.items()}),
             verdict=Once(lambda: _verdict(sources)),
-            remarks=named([(name, one.losses.remarks) for name, one in sources.items()]),
-            truncated=any(one.truncated for one in every),
-            lost=Once(lambda: tuple(dict.fromkeys(line for one in every for line in one.lost()))),
+            remarks=named([(name, source.losses.remarks) for name, source in sources.items()]),
+            truncated=any(losses.truncated for losses in every),
+            lost=Once(lambda: tuple(dict.fromkeys(line for losses in every for line in losses.lost()))),
         ),
     )
 
 
 def _verdict(sources: Mapping[str, Source]) -> Verdict | None:
     """Return what several sources lost, as far as they say it."""
-    said = [(name, one.losses.verdict()) for name, one in sources.items()]
+    said = [(name, source.losses.verdict()) for name, source in sources.items()]
     each = [(name, verdict) for name, verdict in said if verdict is not None]
     return Verdict._of_sources(each) if each else None
 
@@ -293,8 +293,8 @@ def named(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:
 def together(sources: Mapping[str, Source]) -> bool:
     """Return whether sources share one clock: frames without arrival times, as those of two feet."""
     return all(
-        not one.has_events
-        and not (isinstance(one, Stream) and one.lines.samples.holds())
-        and not one.timing.clock.holds()
-        for one in sources.values()
+        not source.has_events
+        and not (isinstance(source, Stream) and source.lines.samples.holds())
+        and not source.timing.clock.holds()
+        for source in sources.values()
     )

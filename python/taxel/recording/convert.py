@@ -14,6 +14,7 @@ import numpy as np
 from taxel import _core
 from taxel._base import limits
 from taxel._base.arguments import flag, path, shown, text
+from taxel._base.errors import refused
 from taxel._base.files import whole_file, write_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -94,25 +95,27 @@ def convert(
     whole = _contents(source)
     if frames_hz is not None:
         if isinstance(source, Frames):
-            raise ProblemError("frames_hz: pictures keep their own times; open the file and ask it for frames(rate_hz)")
+            raise refused("frames_hz", ": pictures keep their own times; open the file and ask it for frames(rate_hz)")
         if whole.is_several and together(whole.sources):
-            whole = alone({name: pictures(one, frames_hz, name="frames_hz") for name, one in whole.sources.items()})
+            whole = alone(
+                {name: pictures(source, frames_hz, name="frames_hz") for name, source in whole.sources.items()}
+            )
         else:
             whole = Contents(pictures(whole.one, frames_hz, name="frames_hz"), whole.sources)
     written = stored(whole, place)
-    one, lost = written.one, list(written.one.losses.lost())
+    made, lost = written.one, list(written.one.losses.lost())
     match kind:
         case ".lsa":
-            _write_lsa(place, one, overwrite)
+            _write_lsa(place, made, overwrite)
         case ".npz":
-            write_whole(place, lambda file: write_npz(file, one), overwrite=overwrite)
+            write_whole(place, lambda file: write_npz(file, made), overwrite=overwrite)
         case ".csv":
-            write_whole(place, lambda file: write_csv(file, one.table), overwrite=overwrite)
+            write_whole(place, lambda file: write_csv(file, made.table), overwrite=overwrite)
         case ".h5":
-            write_h5(place, one, overwrite=overwrite)
+            write_h5(place, made, overwrite=overwrite)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                before = whole.sources if written.is_several else {one.origin.label: whole.one}
+                before = whole.sources if written.is_several else {made.origin.label: whole.one}
                 counts = {name: _counts(before[name], source) for name, source in written.sources.items()}
                 write_mcap(part, written, compression, counts)
                 lost += _read_otherwise(part, whole.one)
@@ -142,7 +145,7 @@ def _contents(source: object) -> Contents:
     if isinstance(source, Recording):
         return source._contents
     if not isinstance(source, Events | Frames):
-        raise ProblemError(f"source is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
+        raise refused("source", f" is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
     return Contents.of(source_from(source))
 
 

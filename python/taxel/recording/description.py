@@ -161,28 +161,28 @@ def zeroings_of(records: Any) -> tuple[Zeroing, ...]:
     """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
     zeroings = (
         Zeroing(
-            whole("t", one["t"], -limits.TIME_US, limits.TIME_US),
-            whole("x", one["x"], 0, 65_535),
-            whole("y", one["y"], 0, 65_535),
-            number("rest", one["rest"]),
-            None if one["before"] is None else number("before", one["before"]),
+            whole("t", record["t"], -limits.TIME_US, limits.TIME_US),
+            whole("x", record["x"], 0, 65_535),
+            whole("y", record["y"], 0, 65_535),
+            number("rest", record["rest"]),
+            None if record["before"] is None else number("before", record["before"]),
         )
-        for one in records
+        for record in records
     )
-    return tuple(sorted(zeroings, key=lambda one: one.t))
+    return tuple(sorted(zeroings, key=lambda zeroing: zeroing.t))
 
 
 def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
     """Return changes of the board from pairs of a host time (ns) and a record of t_us, change, version, asked."""
     return tuple(
         BoardChange(
-            _time("t_us", one["t_us"]),
+            _time("t_us", record["t_us"]),
             whole("at_ns", at),
-            text("change", one["change"]),
-            None if one.get("version") is None else whole("version", one["version"], 0, 255),
-            flag("asked", one.get("asked", False)),
+            text("change", record["change"]),
+            None if record.get("version") is None else whole("version", record["version"], 0, 255),
+            flag("asked", record.get("asked", False)),
         )
-        for at, one in records
+        for at, record in records
     )
 
 
@@ -215,7 +215,7 @@ def turned_of(value: Any) -> float:
 def _texts(texts: Any) -> tuple[str, ...]:
     if not isinstance(texts, list):
         raise ProblemError("no list")
-    return tuple(text("entry", one) for one in texts)
+    return tuple(text("entry", entry) for entry in texts)
 
 
 #: The reader of each entry by name; registers are checked later, as the array that they drive is another entry.

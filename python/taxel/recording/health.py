@@ -12,8 +12,8 @@ from taxel import _core
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.messages import counted
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -60,7 +60,7 @@ class Health:
     activity : int64, shape (rows, columns)
         Number of events (or changes of the picture) at each taxel.
     dead, stuck, noisy : bool, shape (rows, columns)
-    untold : bool, shape (rows, columns)
+    untested : bool, shape (rows, columns)
         Not touched enough to say: neither named nor seen to work.
     """
 
@@ -69,7 +69,7 @@ class Health:
     dead: NDArray[np.bool_]
     stuck: NDArray[np.bool_]
     noisy: NDArray[np.bool_]
-    untold: NDArray[np.bool_]
+    untested: NDArray[np.bool_]
 
     def named(self) -> dict[str, list[tuple[int, int]]]:
         """Return column and row (x, y) of the taxels that are dead, stuck and noisy."""
@@ -85,10 +85,10 @@ class Health:
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(places)} {name}" for name, places in self.named().items())
-        untold = int(np.count_nonzero(self.untold))
+        untested = int(np.count_nonzero(self.untested))
         return (
             f"Health({counted(self.array.taxels, 'taxel')}: {counts}"
-            + f", {untold} not touched enough to say" * bool(untold)
+            + f", {untested} not touched enough to say" * bool(untested)
             + ")"
         )
 
@@ -97,9 +97,9 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     """Return which taxels are dead, stuck or noisy, each compared with its neighbours.
 
     A recording cannot show whether taxels work in a region that was never touched: a taxel is named dead or stuck only
-    if its neighbours were touched three times or more. One that was touched less and did nothing is *untold*. States of
-    wire version 2 (`Events.repaired`) and the values held at the beginning count as held values, but not as changes of
-    the taxel. Without neighbours, as in one channel, no taxel is named.
+    if its neighbours were touched three times or more. One that was touched less and did nothing is *untested*. States
+    of wire version 2 (`Events.repaired`) and the values held at the beginning count as held values, but not as changes
+    of the taxel. Without neighbours, as in one channel, no taxel is named.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     if isinstance(held, Events):
         return judged(held.array, _statistics_of_events(held))
     if not isinstance(held, Frames):
-        raise ProblemError(f"recorded is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
+        raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     activity, moved = (of.astype(np.int64).reshape(held.array.shape) for of in _core.changes_of_frames(held._parts()))
     # The values of pictures count from the least one.
     scale, least = ticks_by_unit(held), np.fmin.reduce(held.values, axis=None, initial=np.inf)
@@ -159,7 +159,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     loaded = held.values[0] > least
     noisy = result.noisy | flickering(held)
     dead, stuck = (of & ~noisy for of in (result.dead & ~loaded, result.stuck | result.dead & loaded))
-    return replace(result, dead=dead, stuck=stuck, noisy=noisy, untold=result.untold & ~noisy)
+    return replace(result, dead=dead, stuck=stuck, noisy=noisy, untested=result.untested & ~noisy)
 
 
 class Touches(NamedTuple):
@@ -236,20 +236,20 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
     noisy &= min(array.shape) > 1
     dead &= ~stuck
     works = enough | where(of.pressed > 0) | (activity >= WORKS_FROM)
-    untold = exists & ~dead & ~stuck & ~noisy & ~works
-    return Health(array, activity, dead, stuck, noisy, untold)
+    untested = exists & ~dead & ~stuck & ~noisy & ~works
+    return Health(array, activity, dead, stuck, noisy, untested)
 
 
 def _statistics_of_events(events: Events) -> TaxelStatistics:
     """Return the statistics of each taxel; an event that a state repaired counts for the held value only."""
-    own = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
+    sent = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
     index = events.array.index(events.x, events.y).astype(np.int64)
-    activity, moved = _ways(index[own], np.where(events.p[own], 1, -1), events.array)
+    activity, moved = _ways(index[sent], np.where(events.p[sent], 1, -1), events.array)
     touches = Touches.of(*_core.touches_of_events(events.sorted()._parts()))
     if events.intensity is None or events.present is None:
         return TaxelStatistics(activity, moved, touches)
     shape, size = events.array.shape, events.array.rows * events.array.columns
-    pairs = np.unique(index[events.present & own] * 65_536 + events.intensity[events.present & own].astype(np.int64))
+    pairs = np.unique(index[events.present & sent] * 65_536 + events.intensity[events.present & sent].astype(np.int64))
     values = np.bincount(pairs // 65_536, minlength=size).astype(np.int32)
     ticks = events.intensity[events.present].astype(np.int32)
     least, greatest = np.full(size, 65_536, np.int32), np.full(size, -1, np.int32)
@@ -264,9 +264,9 @@ def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[ND
     """Return how many changes each taxel has, and how many of them have the direction of the one before."""
     order = np.argsort(index, kind="stable")
     taxel, way = index[order], way[order]
-    on = taxel[1:][(taxel[1:] == taxel[:-1]) & (way[1:] == way[:-1])]
+    again = taxel[1:][(taxel[1:] == taxel[:-1]) & (way[1:] == way[:-1])]
     size = array.rows * array.columns
-    counts = (np.bincount(of, minlength=size).reshape(array.shape) for of in (taxel, on))
+    counts = (np.bincount(of, minlength=size).reshape(array.shape) for of in (taxel, again))
     activity, moved = counts
     return activity, moved
 

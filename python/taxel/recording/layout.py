@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen_whole
+from taxel._base.errors import refused
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -38,7 +39,7 @@ def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
     """
     if size != array.shape:
         held = " x ".join(map(str, size))
-        raise ProblemError(f"array: {array.rows} x {array.columns} taxels; {path} holds pictures of {held}")
+        raise refused("array", f": {array.rows} x {array.columns} taxels; {path} holds pictures of {held}")
 
 
 def on_array(of: S, array: Array) -> S:
@@ -46,13 +47,13 @@ def on_array(of: S, array: Array) -> S:
     if array.names is None and of.sensor.array.names is not None:
         array = replace(array, names=of.sensor.array.names)
 
-    def events(own: Events) -> Events:
-        same = own[:]
+    def events(table: Events) -> Events:
+        same = table[:]
         same.array = array
         return same
 
-    def frames(own: Frames) -> Frames:
-        return Frames(own.values.reshape(-1, *array.shape), own.t, unit=own.unit, array=array)
+    def frames(table: Frames) -> Frames:
+        return Frames(table.values.reshape(-1, *array.shape), table.t, unit=table.unit, array=array)
 
     same = replace(of, sensor=replace(of.sensor, array=array))
     if isinstance(same, Board):
@@ -79,26 +80,26 @@ def laid_out(of: Contents, layout: Layout, *, given: bool) -> Contents:
     """
     return alone(
         {
-            name: one if isinstance(one, Stream) else _laid_out(one, layout, given=given)
-            for name, one in of.sources.items()
+            name: source if isinstance(source, Stream) else _laid_out(source, layout, given=given)
+            for name, source in of.sources.items()
         }
     )
 
 
 def _laid_out(of: Source, layout: Layout, *, given: bool) -> Source:
     """Return a source with what its layout says of it."""
-    kind, name, own = of.origin.kind, of.origin.name, of.sensor
+    kind, name, sensor = of.origin.kind, of.origin.name, of.sensor
     strict = given or kind not in _STATING
     try:
         array = _array(of, layout)
     except ProblemError as error:
         if strict:
             raise FormatError(f"{layout.place}: {name}: {first_line(error)}") from None
-        array = own.array
-    if strict and own.heel and layout.heel not in ("", own.heel):
-        raise FormatError(f"{layout.place}: says heel {layout.heel}; {name} says {own.heel}")
-    same = of if array == own.array else on_array(of, array)
-    same = replace(same, sensor=replace(same.sensor, side=own.side or layout.side, heel=own.heel or layout.heel))
+        array = sensor.array
+    if strict and sensor.heel and layout.heel not in ("", sensor.heel):
+        raise FormatError(f"{layout.place}: says heel {layout.heel}; {name} says {sensor.heel}")
+    same = of if array == sensor.array else on_array(of, array)
+    same = replace(same, sensor=replace(same.sensor, side=sensor.side or layout.side, heel=sensor.heel or layout.heel))
     if not isinstance(same, Pictures):
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz):
             raise FormatError(f"{layout.place}: {name} holds events; falls, unit and rate_hz are of pictures")
@@ -116,18 +117,20 @@ def _laid_out(of: Source, layout: Layout, *, given: bool) -> Source:
 
 def _array(of: Source, layout: Layout) -> Array:
     """Return the sensor of a recording as its layout says, which may not contradict the file."""
-    own, kind = of.sensor.array, of.origin.kind
-    array = layout.array(own.rows * own.columns, own, of.sensor.side)
-    if of.has_events and array.shape != own.shape:
-        raise ProblemError(f"says {array.rows} x {array.columns} taxels; its events are of {own.rows} x {own.columns}")
-    if min(own.shape) > 1 and array.shape != own.shape:
-        raise ProblemError(f"says {array.rows} x {array.columns} taxels; the file says {own.rows} x {own.columns}")
+    held, kind = of.sensor.array, of.origin.kind
+    array = layout.array(held.rows * held.columns, held, of.sensor.side)
+    if of.has_events and array.shape != held.shape:
+        raise ProblemError(
+            f"says {array.rows} x {array.columns} taxels; its events are of {held.rows} x {held.columns}"
+        )
+    if min(held.shape) > 1 and array.shape != held.shape:
+        raise ProblemError(f"says {array.rows} x {array.columns} taxels; the file says {held.rows} x {held.columns}")
     if not array._is_measured:
-        kept = own if array.shape == own.shape else replace(array, pitch_mm=own.pitch_mm, name=own.name)
-        return kept if own.places is None or array.shape == own.shape else array
-    along = own.places is not None and kind in _ALONG and own.places == _places_along(of)
-    if own._is_measured and not along and (own.pitch_mm, own.places) != (array.pitch_mm, array.places):
-        raise ProblemError(f"says taxels {array._apart()}; the file says {own._apart()}")
+        kept = held if array.shape == held.shape else replace(array, pitch_mm=held.pitch_mm, name=held.name)
+        return kept if held.places is None or array.shape == held.shape else array
+    along = held.places is not None and kind in _ALONG and held.places == _places_along(of)
+    if held._is_measured and not along and (held.pitch_mm, held.places) != (array.pitch_mm, array.places):
+        raise ProblemError(f"says taxels {array._apart()}; the file says {held._apart()}")
     return array
 
 
@@ -147,13 +150,13 @@ _ALONE = ("table", "arrays", "npz", "h5", "csv")
 _STATING = ("mcap", "npz", "h5")
 
 
-def _read(own: Frames, layout: Layout, full: float | None, name: str, *, is_alone: bool, strict: bool) -> Frames:
+def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_alone: bool, strict: bool) -> Frames:
     """Return pictures in the unit and at the rate that a layout says, turned to `full` less the reading if it is given.
 
     If it is not `strict`, the unit and the times of the file stay where it has them. No other code holds these pictures
     yet, so that `own` is changed in place: its times only if it is alone in its file.
     """
-    unit, t, values = own.unit, own.t, own.values
+    unit, t, values = table.unit, table.t, table.values
     if layout.unit is not None:
         if unit in _UNSAID:
             unit = layout.unit
@@ -181,7 +184,7 @@ def _read(own: Frames, layout: Layout, full: float | None, name: str, *, is_alon
                 )
             part[...] = risen
         frozen_whole(values)
-    return Frames(values, t, unit=unit, array=own.array)
+    return Frames(values, t, unit=unit, array=table.array)
 
 
 def _parts(length: int) -> Iterator[slice]:
@@ -219,8 +222,8 @@ def _writable(array: NDArray[Any]) -> NDArray[Any]:
         part = part.base
     if part is not None:
         return array.copy()
-    for one in (*reversed(parts), array):
-        one.setflags(write=True)
+    for level in (*reversed(parts), array):
+        level.setflags(write=True)
     return array
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import flag, instance, number, several, shown
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array, names_beside
@@ -77,7 +78,7 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
     flag("beside", beside)
     gap = None if gap_us is None else number("gap_us", gap_us)
     if gap is not None and not 0 <= gap < 2**52:
-        raise ProblemError(f"gap_us is {shown(gap_us)}: must be 0 or more")
+        raise refused("gap_us", f" is {shown(gap_us)}: must be 0 or more")
     if not sources:
         raise ProblemError("recordings: there must be one or more")
     return Recording(merged([part._contents for part in sources], gap, beside=beside))
@@ -87,8 +88,8 @@ def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: 
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
     sources = [recording.one for recording in recordings]
     if len({part.has_events for part in sources}) > 1:
-        other = next(part for part in sources if part.has_events != sources[0].has_events)
-        events, pictures = (sources[0], other) if sources[0].has_events else (other, sources[0])
+        differing = next(part for part in sources if part.has_events != sources[0].has_events)
+        events, pictures = (sources[0], differing) if sources[0].has_events else (differing, sources[0])
         raise ProblemError(
             f"recordings: {events.origin.name} holds events, {pictures.origin.name} pictures; convert one of them first"
         )
@@ -99,9 +100,9 @@ def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: 
     lost = [line for source in sources for line in source.losses.lost()]
     for recording, source in zip(recordings, sources, strict=True):
         lost += [*source.part(parts.Wire).lines(), *source.part(parts.Lines).received(), *recording.others()]
-    both = merging.source()
+    merged = merging.source()
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
-    return Contents.of(with_losses(both, known((*lost, *merging.lost))))
+    return Contents.of(with_losses(merged, known((*lost, *merging.lost))))
 
 
 @dataclass
@@ -118,7 +119,7 @@ class _Merging:
 
     def source(self) -> Source:
         """Return the sources as one."""
-        names = ", ".join(one.origin.name for one in self.sources)
+        names = ", ".join(source.origin.name for source in self.sources)
         header: dict[str, Any] = {
             "origin": parts.Origin(Path("merged"), "merged", "merged", source=f"merged of {names}"),
             "sensor": self.sensor(),
@@ -138,7 +139,7 @@ class _Merging:
     def agreed(self, values: Iterable[T], empty: T, line: str, same: Callable[[T, T], bool] = operator.eq) -> T:
         """Return the common value if all recordings agree, else the empty value; then a line says so."""
         first, *others = every = list(values)
-        if all(one is first or same(first, one) for one in others):
+        if all(value is first or same(first, value) for value in others):
             return first
         if any(map(anything, every)):
             self.lost.append(f"{line} (the recordings differ)")
@@ -157,29 +158,29 @@ class _Merging:
         """Merge what describes the sensors; what one of them says of its taxels may be lost."""
         array, sensors = self.array, [part.sensor for part in self.sources]
         for part in self.sources:
-            own, name = part.sensor.array, part.origin.name
-            if own._is_measured and (own.pitch_mm, own.places) != (array.pitch_mm, array.places):
-                self.lost.append(f"the pitch or places of {name} ({own._apart()})")
-            if not self.beside and own.names not in (None, array.names):
+            stated, name = part.sensor.array, part.origin.name
+            if stated._is_measured and (stated.pitch_mm, stated.places) != (array.pitch_mm, array.places):
+                self.lost.append(f"the pitch or places of {name} ({stated._apart()})")
+            if not self.beside and stated.names not in (None, array.names):
                 self.lost.append(f"the names of the taxels of {name}")
-        calibrations = [one.calibration() for one in sensors]
+        calibrations = [sensor.calibration() for sensor in sensors]
         calibration = self.agreed(calibrations, None, "the calibration", _same_calibration)
         if self.beside and calibration is not None and len(sensors) > 1:
             self.lost.append("the calibration (it is of one of the sensors)")
             calibration = None
         return parts.Sensor(
             array,
-            self.agreed((one.side for one in sensors), "", "the side"),
-            self.agreed((one.heel for one in sensors), "", "where the heel lies"),
+            self.agreed((sensor.side for sensor in sensors), "", "the side"),
+            self.agreed((sensor.heel for sensor in sensors), "", "where the heel lies"),
             known(calibration),
         )
 
     def settings(self) -> parts.Settings:
         """Merge registers that are equal, and the values that the taxels held at the beginning."""
         each = [part.settings for part in self.sources]
-        registers = [one.registers() for one in each]
+        registers = [settings.registers() for settings in each]
         held = _beside_held(self.sources, self.array, self.lefts) if self.beside else self.held()
-        changes = self.agreed((one.register_changes() for one in each), (), "the settings of the registers")
+        changes = self.agreed((settings.register_changes() for settings in each), (), "the settings of the registers")
         return parts.Settings(
             held=known(held),
             registers=known(self.agreed(registers, None, "the board's registers", _same_registers)),
@@ -190,10 +191,10 @@ class _Merging:
         """Merge what happened at a time; a note with its name stands at the beginning of each recording."""
         changes, notes, found = list[tuple[BoardChange, ...]](), list[Note](), list[Any]()
         for part, table, shift in zip(self.sources, self.tables, self.shifts, strict=True):
-            own, d = part.marks, part.marks.detections()
-            changes.append(tuple(_later(change, shift) for change in own.board_changes()))
+            marks, d = part.marks, part.marks.detections()
+            changes.append(tuple(_later(change, shift) for change in marks.board_changes()))
             notes.append(Note(part.origin.name, int(table.t.min()) + shift if len(table) else shift, 0))
-            notes += [_later(note, shift) for note in own.notes()]
+            notes += [_later(note, shift) for note in marks.notes()]
             found += zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True)
         found.sort(key=lambda row: int(row[2]))
         label, t, when, slope, repaired = ([row[k] for row in found] for k in range(5))
@@ -208,7 +209,7 @@ class _Merging:
         """Merge clocks that are equal."""
         clocks = [part.timing.clock() for part in self.sources]
         clock = clocks[0]
-        if len(set(self.shifts)) > 1 or not all(one is clock or _same_clock(clock, one) for one in clocks[1:]):
+        if len(set(self.shifts)) > 1 or not all(c is clock or _same_clock(clock, c) for c in clocks[1:]):
             self.lost += ["arrival times"] * any(map(anything, clocks))
             clock = None
         return parts.Timing(
@@ -219,14 +220,18 @@ class _Merging:
         """Merge what was lost; counts only if they are equal."""
         each = [part.losses for part in self.sources]
         verdict = None
-        if any(one.verdict() is not None for one in each):
+        if any(losses.verdict() is not None for losses in each):
             verdict = Verdict._together(_of_files(self.sources, self.shifts))
         return parts.Losses(
-            counts=known(self.agreed((one.counts() for one in each), {}, "what each received and lost, by cause")),
+            counts=known(
+                self.agreed((losses.counts() for losses in each), {}, "what each received and lost, by cause")
+            ),
             verdict=known(verdict),
             remarks=named([(part.origin.name, part.losses.remarks) for part in self.sources]),
-            truncated=any(one.truncated for one in each),
-            rebuilt=known(self.agreed((one.rebuilt() for one in each), {}, "what reading each had to put up with")),
+            truncated=any(losses.truncated for losses in each),
+            rebuilt=known(
+                self.agreed((losses.rebuilt() for losses in each), {}, "what reading each had to put up with")
+            ),
         )
 
     def readings(self) -> parts.Readings:
@@ -235,8 +240,8 @@ class _Merging:
         each = [part.readings for part in self.sources if isinstance(part, Pictures)]
         return parts.Readings(
             known(_frames(tables, self.shifts, self.array, self.beside)),
-            all(one.untimed for one in each),
-            self.agreed((one.turned for one in each), None, "whether readings were turned"),
+            all(readings.untimed for readings in each),
+            self.agreed((readings.turned for readings in each), None, "whether readings were turned"),
         )
 
     def zeroings(self) -> tuple[Zeroing, ...]:
@@ -245,11 +250,11 @@ class _Merging:
             [replace(z, t=z.t + shift, x=z.x + left) for z in part.marks.zeroings()]
             for part, shift, left in zip(self.sources, self.shifts, self.lefts, strict=True)
         ]
-        together = tuple(sorted({z for own in every for z in own}, key=lambda z: (z.t, z.x, z.y)))
+        together = tuple(sorted({z for zeroings in every for z in zeroings}, key=lambda z: (z.t, z.x, z.y)))
         # Sensors side by side have no taxels in common.
-        for part, own, shift in zip(self.sources, every, self.shifts, strict=True):
+        for part, zeroings, shift in zip(self.sources, every, self.shifts, strict=True):
             stop = _end(part) + shift
-            if not self.beside and {z for z in together if z.t < stop} != {z for z in own if z.t < stop}:
+            if not self.beside and {z for z in together if z.t < stop} != {z for z in zeroings if z.t < stop}:
                 self.lost.append(f"{len(together)} zeroed taxels (the recordings differ)")
                 return ()
         return together
@@ -257,7 +262,7 @@ class _Merging:
     def held(self) -> NDArray[np.uint16] | None:
         """Return the values held at the beginning, if they and the events since imply those held in later parts."""
         every = list(zip(self.sources, self.tables, self.shifts, strict=True))
-        every.sort(key=lambda one: _begin(one[0]) + one[2])
+        every.sort(key=lambda entry: _begin(entry[0]) + entry[2])
         first = every[0][0].settings.held()
         now = np.full(self.array.shape, UNKNOWN, np.uint16) if first is None else first.copy()
         # All events by time determine the values that the taxels hold at the beginning of each recording.
@@ -319,7 +324,7 @@ def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[st
         verdicts.setdefault(file, {}).setdefault(source, {}).setdefault(said, (part.origin.name, said._later(shift)))
     of_files = []
     for of_file in verdicts.values():
-        each = [(next(iter(own.values()))[0], Verdict._of_stretches(own.values())) for own in of_file.values()]
+        each = [(next(iter(spans.values()))[0], Verdict._of_stretches(spans.values())) for spans in of_file.values()]
         of_files.append((each[0][0], Verdict._of_sources(each)))
     return of_files
 
@@ -342,12 +347,12 @@ def _begin(part: Source) -> int:
 def _beside_held(sources: Sequence[Source], array: Array, lefts: Sequence[int]) -> NDArray[np.uint16] | None:
     """Return the values that the taxels of all sensors held at the beginning."""
     every = [part.settings.held() for part in sources]
-    if all(own is None for own in every):
+    if all(values is None for values in every):
         return None
     held = np.full(array.shape, UNKNOWN, np.uint16)
-    for own, left in zip(every, lefts, strict=True):
-        if own is not None:
-            held[: own.shape[0], left : left + own.shape[1]] = own
+    for values, left in zip(every, lefts, strict=True):
+        if values is not None:
+            held[: values.shape[0], left : left + values.shape[1]] = values
     return held
 
 

@@ -40,14 +40,14 @@ def on_clock(of: Contents, name: str) -> Contents:
     ------
     ProblemError : no such source, one without arrival times, or a part by another clock
     """
-    one, sources = of.one, of.sources
-    path, label = one.origin.path, one.origin.label
-    if one.timing.stretch is not None and one.timing.clock_of is None:
+    whole, sources = of.one, of.sources
+    path, label = whole.origin.path, whole.origin.label
+    if whole.timing.stretch is not None and whole.timing.clock_of is None:
         raise ProblemError(f"{path}: a slice by its own clock; say on_clock({name!r}) before between")
     if name not in (*sources, HOST):
         raise ProblemError(f"{path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
-    if one.timing.clock_of is not None:
-        raise ProblemError(f"{path}: is on the clock of {one.timing.clock_of} already")
+    if whole.timing.clock_of is not None:
+        raise ProblemError(f"{path}: is on the clock of {whole.timing.clock_of} already")
     to = None if name == HOST else _clock(sources[name])
     moved = {
         of_source: _moved(source, name, None if of_source == name else _times(_clock(source), to))
@@ -55,14 +55,14 @@ def on_clock(of: Contents, name: str) -> Contents:
     }
     if of.is_several:
         return alone(moved)
-    own = moved[label]
+    named = moved[label]
 
     def verdict() -> Verdict | None:
         # It may be that of all sources.
-        is_own = one.losses.verdict() == sources[label].losses.verdict()
-        return (own if is_own else alone(moved).one).losses.verdict()
+        is_own = whole.losses.verdict() == sources[label].losses.verdict()
+        return (named if is_own else alone(moved).one).losses.verdict()
 
-    return Contents(replace(own, losses=replace(own.losses, verdict=Once(verdict))), moved)
+    return Contents(replace(named, losses=replace(named.losses, verdict=Once(verdict))), moved)
 
 
 def _clock(of: Source) -> Clock:
@@ -74,11 +74,11 @@ def _clock(of: Source) -> Clock:
     return clock
 
 
-def _times(own: Clock, to: Clock | None) -> Times:
+def _times(clock: Clock, to: Clock | None) -> Times:
     """Return a function that converts times of one clock to those of another; None is the host's clock."""
 
     def times(t: NDArray[np.int64]) -> NDArray[np.int64]:
-        host = own.host_ns(np.asarray(t, np.int64))
+        host = clock.host_ns(np.asarray(t, np.int64))
         return np.asarray((host + 500) // 1000 if to is None else to.board_us_at(host), np.int64)
 
     return times
@@ -89,32 +89,34 @@ def _moved(of: Source, name: str, times: Times | None) -> Source:
     if times is None:
         return replace(of, timing=replace(of.timing, clock_of=name))
 
-    def one(t: int) -> int:
+    def time(t: int) -> int:
         return int(times(np.array([t]))[0])
 
     def at(every: tuple[M, ...]) -> tuple[M, ...]:
-        return tuple(replace(mark, t=None if mark.t is None else one(mark.t)) for mark in every)
+        return tuple(replace(mark, t=None if mark.t is None else time(mark.t)) for mark in every)
 
-    def events(own: Events) -> Events:
-        more: dict[str, Any] = {"array": own.array, "repaired": own.repaired}
-        if own.intensity is not None:
-            more |= {"intensity": own.intensity, "present": own.present}
-        return Events(times(own.t), own.x, own.y, own.p, markers=[(one(t), start) for t, start in own.markers], **more)
+    def events(table: Events) -> Events:
+        more: dict[str, Any] = {"array": table.array, "repaired": table.repaired}
+        if table.intensity is not None:
+            more |= {"intensity": table.intensity, "present": table.present}
+        return Events(
+            times(table.t), table.x, table.y, table.p, markers=[(time(t), start) for t, start in table.markers], **more
+        )
 
-    def frames(own: Frames) -> Frames:
-        return Frames(own.values, ascending(times(own.t)), unit=own.unit, array=own.array)
+    def frames(table: Frames) -> Frames:
+        return Frames(table.values, ascending(times(table.t)), unit=table.unit, array=table.array)
 
-    def detections(own: Detections) -> Detections:
-        return Detections._of(own.label, times(own.t), times(own.known), own.slope, repaired=own.repaired)
+    def detections(found: Detections) -> Detections:
+        return Detections._of(found.label, times(found.t), times(found.known), found.slope, repaired=found.repaired)
 
-    def clock(own: Clock | None) -> Clock | None:
-        return None if own is None else Clock(times(own.board_us), own.arrived_ns)
+    def clock(before: Clock | None) -> Clock | None:
+        return None if before is None else Clock(times(before.board_us), before.arrived_ns)
 
-    def verdict(own: Verdict | None) -> Verdict | None:
+    def verdict(before: Verdict | None) -> Verdict | None:
         told = verdict_of(of)
         doubtful, steps = told.doubtful_after_us, told.steps_back
         after = steps[0]["after_us"] if doubtful is None and steps else doubtful
-        return own if after is None else told._later(one(after) - after)
+        return before if after is None else told._later(time(after) - after)
 
     def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
         match part:

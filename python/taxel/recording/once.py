@@ -62,9 +62,9 @@ class Once(Generic[T]):
 
 def known(value: T) -> Once[T]:
     """Return a value that needs no reading."""
-    one = Once(lambda: value)
-    one()
-    return one
+    held = Once(lambda: value)
+    held()
+    return held
 
 
 def anything(value: object) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 
 from taxel._base.arguments import instance, several, text
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout
@@ -73,12 +74,16 @@ class OpenOptions:
             ros=self.ros,
             limit=self.limit,
         )
-        return [self._timed(self._on_array(one)) for one in opened]
+        return [self._timed(self._on_array(recording)) for recording in opened]
 
     def given(self) -> dict[str, Any]:
         """Return the options that differ from their defaults, as JSON holds them."""
-        given = ((one.name, getattr(self, one.name)) for one in fields(self))
-        return {name: str(one) if isinstance(one, Path) else one for name, one in given if one not in (None, [], ())}
+        given = ((f.name, getattr(self, f.name)) for f in fields(self))
+        return {
+            name: str(value) if isinstance(value, Path) else value
+            for name, value in given
+            if value not in (None, [], ())
+        }
 
     def words(self) -> list[str]:
         """Return the options as words of a command line."""
@@ -104,19 +109,19 @@ class OpenOptions:
         # A bag holds no sensor, so that its messages are of the given one or are left out.
         if not self.array or recording.kind == "ros":
             return recording
-        own, given = recording.array, of_size(self.array[0], of_wire=False)
+        stated, given = recording.array, of_size(self.array[0], of_wire=False)
         if _is_row_of(recording, given):
             return _laid_on(recording, given)
-        differs = given.pitch_mm is not None and (own.pitch_mm, own.places) != (given.pitch_mm, None)
-        if own.shape != given.shape or differs:
+        differs = given.pitch_mm is not None and (stated.pitch_mm, stated.places) != (given.pitch_mm, None)
+        if stated.shape != given.shape or differs:
             sizes = ", ".join(self.array)
-            raise ProblemError(f"--array {sizes}: {recording.path} holds its own sensor, {own!r}; leave it out")
+            raise refused("array", f" is {sizes}: {recording.path} holds its own sensor, {stated!r}; leave it out")
         # A .mcap holds its sensor, whose pitch may be unknown.
-        if not recording.has_events or own._is_measured or recording.kind == "mcap":
+        if not recording.has_events or stated._is_measured or recording.kind == "mcap":
             return recording
         # A size without a pitch says nothing of it, and events without one are of the board's wire.
         wire = of_size(self.array[0])
-        return _laid_on(recording, Array(*own.shape, wire.pitch_mm, own.exists, wire.name))
+        return _laid_on(recording, Array(*stated.shape, wire.pitch_mm, stated.exists, wire.name))
 
     def joined(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
@@ -127,7 +132,7 @@ class OpenOptions:
 
         Each sensor of a file with several is a recording of its own (`Recording.title`).
         """
-        return [one for path in several("paths", paths) for each in self.open(path) for one in sensors(each)]
+        return [of for path in several("paths", paths) for each in self.open(path) for of in sensors(each)]
 
     def _timed(self, recording: Recording) -> Recording:
         return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
@@ -141,27 +146,27 @@ class OpenOptions:
         """
         every = self.joined(path)
         if len(every) != 1:
-            some = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
+            some = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
             raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")
         return every[0]
 
 
 def _laid_on(recording: Recording, array: Array) -> Recording:
     """Return a recording on another description of its sensor."""
-    own = recording._contents
-    return type(recording)(Contents(on_array(own.one, array), own.sources))
+    contents = recording._contents
+    return type(recording)(Contents(on_array(contents.one, array), contents.sources))
 
 
 def _is_row_of(recording: Recording, given: Array) -> bool:
     """Return whether pictures are a row of as many channels as a sensor has taxels, as tables and arrays may be."""
-    own, is_one = recording.array, len(recording.sources) < 2
-    row = own.shape == (1, given.rows * given.columns) and given.rows > 1 and own.taxels == own.columns
-    return is_one and row and not own._is_measured and not recording.has_events and not recording.is_stream
+    stated, is_one = recording.array, len(recording.sources) < 2
+    row = stated.shape == (1, given.rows * given.columns) and given.rows > 1 and stated.taxels == stated.columns
+    return is_one and row and not stated._is_measured and not recording.has_events and not recording.is_stream
 
 
 def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
     """Return each sensor of recordings as one of its own; refuse what is no recording."""
     given = [recordings] if isinstance(recordings, Recording) else several(name, recordings)
     if not len(given):
-        raise ProblemError(f"{name} is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
-    return [one for each in given for one in sensors(instance(name, each, Recording))]
+        raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
+    return [recording for each in given for recording in sensors(instance(name, each, Recording))]

@@ -15,6 +15,7 @@ import numpy as np
 from taxel import _core, formats
 from taxel._base import arguments, limits
 from taxel._base.arguments import flag, instance, text, whole
+from taxel._base.errors import helped
 from taxel._base.limits import opening
 from taxel._base.messages import warn
 from taxel._core import FormatError, ProblemError
@@ -134,7 +135,7 @@ def open_one(
         raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
     every = _open(place, how)
     if len(every) != 1:
-        names = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
+        names = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
         raise ProblemError(f"{place}: holds {len(every)} recordings ({names}); taxel.open_all opens each")
     return every[0]
 
@@ -205,7 +206,7 @@ def _open(place: Path, how: How) -> list[Recording]:
         # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
         if place.exists() and (names := _formats(place)) and not _is_own(place):
             trials = _kept(formats.trials(place, names[0]))
-            return [_named_beside(place, Path(one.name), _of(one, place, names[0], how.layout)) for one in trials]
+            return [_named_beside(place, Path(trial.name), _of(trial, place, names[0], how.layout)) for trial in trials]
         return [_named_beside(place, Path(place.name), _open_one(place, how))]
 
 
@@ -281,15 +282,16 @@ def _open_one(place: Path, how: How) -> Recording:
         elif how.topics.are_given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
         else:
-            own = None if how.array is None else instance("array", how.array, Array)
-            contents = _read(place, kind, own, how.pairing, how.differences)
+            array = None if how.array is None else instance("array", how.array, Array)
+            contents = _read(place, kind, array, how.pairing, how.differences)
         return Recording(
             with_sidecars(contents if said is None else laid_out(contents, said, given=how.layout is not None))
         )
     except MemoryError:
-        raise FormatError(
-            f"{place}: needs more memory than there is ({limits.available()} bytes are available): --limit BYTES "
-            "(limit=) says how many may be read"
+        raise helped(
+            FormatError(f"{place}: needs more memory than there is ({limits.available()} bytes are available)"),
+            "limit",
+            "larger",
         ) from None
 
 
@@ -300,10 +302,10 @@ def _on_given(of: Source, array: Array) -> Source:
     ------
     ProblemError : another number of taxels, rows or columns
     """
-    own = of.sensor.array
-    if own.shape != (1, array.rows * array.columns):
-        check_size(of.origin.path, own.shape, array)
-    says_more = array.shape != own.shape or (array._is_measured and not own._is_measured)
+    stated = of.sensor.array
+    if stated.shape != (1, array.rows * array.columns):
+        check_size(of.origin.path, stated.shape, array)
+    says_more = array.shape != stated.shape or (array._is_measured and not stated._is_measured)
     return on_array(of, array) if says_more else of
 
 
@@ -320,12 +322,12 @@ def _folder(folder: Path, how: How) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
     inside = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
     files = sorted(inside, key=_order)
-    own = [file for file in files if _is_own(file)]
-    if how.topic or not own:
-        own = [file for file in files if file in own or is_bag(file)]
-    if own:
-        _warn_of_tables(folder, own, files, how)
-        opened = [_kept_one(_open_one(file, how)) for file in own]
+    recorded = [file for file in files if _is_own(file)]
+    if how.topic or not recorded:
+        recorded = [file for file in files if file in recorded or is_bag(file)]
+    if recorded:
+        _warn_of_tables(folder, recorded, files, how)
+        opened = [_kept_one(_open_one(file, how)) for file in recorded]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
     elif not (names := _formats(folder)) and (foreign := _laid_out_in(files, how.layout)):
         pairs = [(file.relative_to(folder), _kept_one(_open_one(file, how))) for file in foreign]
@@ -355,10 +357,10 @@ def _kept(trials: Iterable[Trial]) -> Iterator[Trial]:
 
 def _kept_one(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
-    for one in recording._contents.sources.values():
+    for source in recording._contents.sources.values():
         for table in (
-            one.changes.events if isinstance(one, Board) else None,
-            one.readings.frames if isinstance(one, Pictures) else None,
+            source.changes.events if isinstance(source, Board) else None,
+            source.readings.frames if isinstance(source, Pictures) else None,
         ):
             limits.keep(0 if table is None or not table.is_read else _size(table()))
     return recording
@@ -370,13 +372,13 @@ def _size(table: object) -> int:
     return sum(column.nbytes for column in columns if isinstance(column, np.ndarray))
 
 
-def _warn_of_tables(folder: Path, own: Sequence[Path], files: Sequence[Path], how: How) -> None:
+def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], how: How) -> None:
     """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
-    stems = {file.stem for file in own}
-    left = [file.name for file in _laid_out_in(files, how.layout) if file not in own and file.stem not in stems]
+    stems = {file.stem for file in recorded}
+    left = [file.name for file in _laid_out_in(files, how.layout) if file not in recorded and file.stem not in stems]
     if left:
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
-        kept = ", ".join(file.name for file in own[:3]) + " ..." * (len(own) > 3)
+        kept = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
         warn(
             f"{folder}: {names} left out, as beside recordings ({kept}) tables and arrays are not read: convert them, "
             "or keep them in a folder of their own",
@@ -403,8 +405,8 @@ def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recordin
 
 def _named_beside(place: Path, name: Path, recording: Recording) -> Recording:
     """Add the reference events of the folder to the notes of pictures that it names; the page opens them one by one."""
-    table, own = place.parent / LABELS, recording._contents
-    if any(one.has_events for one in own.sources.values()):
+    table, contents = place.parent / LABELS, recording._contents
+    if any(source.has_events for source in contents.sources.values()):
         return recording
     if not (table.is_file() and is_label_table(table)):
         return recording
@@ -414,12 +416,12 @@ def _named_beside(place: Path, name: Path, recording: Recording) -> Recording:
 
 def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     """Add the reference events of a recording, and of each of its sources, to the notes."""
-    own = recording._contents
-    if not own.is_several:
-        return recording.with_notes(_notes(labels, name, own.one))
+    contents = recording._contents
+    if not contents.is_several:
+        return recording.with_notes(_notes(labels, name, contents.one))
     sources = {
-        label: one if isinstance(one, Stream) else noted(one, tuple(_notes(labels, name, one)))
-        for label, one in own.sources.items()
+        label: source if isinstance(source, Stream) else noted(source, tuple(_notes(labels, name, source)))
+        for label, source in contents.sources.items()
     }
     return Recording(Contents(several(sources), sources))
 
@@ -492,9 +494,9 @@ def recordings_in(folder: Path, layout: str | os.PathLike[str] | None = None) ->
     """
     there = [file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir())]
     bags = sorted((file for file in there if os.access(file, os.R_OK) and is_bag(file)), key=_order)
-    own = [file for file in there if file not in bags and _is_own(file)]
+    recorded = [file for file in there if file not in bags and _is_own(file)]
     others = [file for kind in formats.FORMATS.values() for file in kind.files(folder)]
-    found = own or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(there, layout))
+    found = recorded or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(there, layout))
     return [*sorted(found, key=_order), *bags]
 
 
@@ -550,18 +552,21 @@ def joined(opened: Sequence[Recording]) -> list[Recording]:
     """
     groups: dict[tuple[str, str], dict[str, Contents]] = {}
     for recording in opened:
-        own = recording._contents.one.origin
+        origin = recording._contents.one.origin
         # In a folder the path of a trial ends with its name, and so with its foot.
-        key = (str(own.path).removesuffix(f" {own.label}"), own.name.removesuffix(f" {own.label}"))
-        groups.setdefault(key, {})[own.label or own.name] = recording._contents
+        key = (str(origin.path).removesuffix(f" {origin.label}"), origin.name.removesuffix(f" {origin.label}"))
+        groups.setdefault(key, {})[origin.label or origin.name] = recording._contents
     together: list[Recording] = []
     for (path, _), feet in groups.items():
         if set(feet) == set(FEET):
-            both = {foot: feet[foot].one for foot in FEET}
-            both = {foot: replace(one, origin=replace(one.origin, path=Path(path))) for foot, one in both.items()}
-            together.append(Recording(Contents(several(both), both)))
+            sources = {foot: feet[foot].one for foot in FEET}
+            sources = {
+                foot: replace(source, origin=replace(source.origin, path=Path(path)))
+                for foot, source in sources.items()
+            }
+            together.append(Recording(Contents(several(sources), sources)))
         else:
-            together += [Recording(one) for one in feet.values()]
+            together += [Recording(contents) for contents in feet.values()]
     return together
 
 
@@ -569,7 +574,7 @@ def sensors(recording: Recording) -> list[Recording]:
     """Return each sensor of a file with several as a recording; any other recording itself."""
     if not recording._contents.is_several:
         return [recording]
-    return [one for one in recording.sources.values() if not one.is_stream]
+    return [source for source in recording.sources.values() if not source.is_stream]
 
 
 def open_joined(path: str | os.PathLike[str], **how: Any) -> list[Recording]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import number
 from taxel._base.columns import frozen
+from taxel._base.errors import refused
 from taxel._base.limits import TIME_US
 from taxel._core import ProblemError
 from taxel.events import Events
@@ -34,9 +35,9 @@ def period_us(name: str, rate_hz: float) -> int:
     """
     rate = number(name, rate_hz, "Hz")
     if not 0 < rate <= 1e6:
-        raise ProblemError(f"{name} is {rate}: must be above 0, at most 1000000")
+        raise refused(name, f" is {rate}: must be above 0, at most 1000000")
     if rate < 1e-9:
-        raise ProblemError(f"{name} is {rate}: must be 1e-9 or more, a picture in 31 years")
+        raise refused(name, f" is {rate}: must be 1e-9 or more, a picture in 31 years")
     return round(1e6 / rate)
 
 
@@ -85,7 +86,7 @@ def pictures(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz")
     if not isinstance(of, Board):
         # Reading the events raises the error that lists the sources.
         _ = of.table
-    header = {one: getattr(of, one) for one in ("marks", "timing", "losses")}
+    header = {part: getattr(of, part) for part in ("marks", "timing", "losses")}
     # The first picture includes the held values.
     header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
     frames = Once(lambda: _drawn(of, period))
@@ -101,11 +102,13 @@ def _drawn(of: Source, period: int | None) -> Frames:
     return Frames.from_events(events, period, *(() if stretch is None else stretch()), held=begins)
 
 
-def _resampled(own: Frames, period: int | None) -> Frames:
-    if period is None or not len(own):
-        return own
-    t = np.arange(own.t[0], own.t[-1] + 1, period, dtype=np.int64)
-    return Frames(own.values[np.searchsorted(own.t, t, side="right") - 1], t, unit=own.unit, array=own.array)
+def _resampled(frames: Frames, period: int | None) -> Frames:
+    if period is None or not len(frames):
+        return frames
+    t = np.arange(frames.t[0], frames.t[-1] + 1, period, dtype=np.int64)
+    return Frames(
+        frames.values[np.searchsorted(frames.t, t, side="right") - 1], t, unit=frames.unit, array=frames.array
+    )
 
 
 def at_rate(of: Contents, rate_hz: float) -> Contents:
@@ -118,7 +121,7 @@ def at_rate(of: Contents, rate_hz: float) -> Contents:
     period_us("rate_hz", rate_hz)
     if not of.one.untimed:
         raise ProblemError(f"{of.one.origin.path}: has times of its own; a rate is of pictures without times")
-    sources = {name: _at_rate(one, rate_hz) for name, one in of.sources.items()}
+    sources = {name: _at_rate(source, rate_hz) for name, source in of.sources.items()}
     return Contents(several(sources) if of.is_several else _at_rate(of.one, rate_hz), sources)
 
 
@@ -126,11 +129,11 @@ def _at_rate(of: Source, rate_hz: float) -> Source:
     if not isinstance(of, Pictures) or not of.untimed:
         return of
 
-    def frames(own: Frames) -> Frames:
-        return Frames(own.values, frozen(times_at(own.t, rate_hz)), unit=own.unit, array=own.array)
+    def frames(table: Frames) -> Frames:
+        return Frames(table.values, frozen(times_at(table.t, rate_hz)), unit=table.unit, array=table.array)
 
-    def notes(own: tuple[Note, ...]) -> tuple[Note, ...]:
-        return tuple(replace(n, t=None if n.t is None else round(n.t * 1e6 / rate_hz)) for n in own)
+    def notes(before: tuple[Note, ...]) -> tuple[Note, ...]:
+        return tuple(replace(n, t=None if n.t is None else round(n.t * 1e6 / rate_hz)) for n in before)
 
     readings = parts.Readings(of.readings.frames.to(frames), untimed=False, turned=of.readings.turned)
     return replace(of, readings=readings, marks=replace(of.marks, notes=of.marks.notes.to(notes)))

@@ -161,8 +161,8 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     of = _series_of(drawn, rest, events.array)
     moments = _moments(events, drawn, rest, of)
     # They are pictures more, at which the rest is tracked as at the others.
-    both = replace(drawn, t=np.union1d(drawn.t, moments))
-    return replace(of, largest=_series_of(both, rest, events.array)) if len(both.t) > len(drawn.t) else of
+    at_all = replace(drawn, t=np.union1d(drawn.t, moments))
+    return replace(of, largest=_series_of(at_all, rest, events.array)) if len(at_all.t) > len(drawn.t) else of
 
 
 def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
@@ -267,7 +267,7 @@ class _Drawn:
     since: NDArray[np.int64]
     held: _core.HeldValues
     #: Times of events, us: of each `_TRACKED_US` with any, the first.
-    heard: NDArray[np.int64]
+    changed: NDArray[np.int64]
     #: The place of each taxel in the rectangle around them, and that one's shape.
     places: NDArray[np.int64]
     box: tuple[int, int]
@@ -300,8 +300,8 @@ class _Drawn:
         zeroings = [(of.get(z.y * events.array.columns + z.x), z.t, z.rest) for z in recording.zeroings]
         zeroed = tuple((k, t, rest) for k, t, rest in zeroings if k is not None)
         steps = events.t // _TRACKED_US
-        heard = events.t[np.diff(steps, prepend=steps[0] - 1) != 0]
-        return cls(_times(recording), taxels, since, values, heard, places, (rows, columns), corner, zeroed)
+        changed = events.t[np.diff(steps, prepend=steps[0] - 1) != 0]
+        return cls(_times(recording), taxels, since, values, changed, places, (rows, columns), corner, zeroed)
 
     def areas(self, array: Array) -> NDArray[np.float64]:
         """Return the area of each of the taxels, mm2; 1 each where it is not known."""
@@ -318,8 +318,8 @@ class _Drawn:
             return self.t, self.t
         first, last = self.t[0], self.t[-1]
         count = -((first - last) // _TRACKED_US)
-        heard = (self.heard - first) // _TRACKED_US
-        steps = np.union1d(heard[(heard > 0) & (heard < count)], np.arange(min(1, count)))
+        changed = (self.changed - first) // _TRACKED_US
+        steps = np.union1d(changed[(changed > 0) & (changed < count)], np.arange(min(1, count)))
         until = np.append(steps, count)[1:]
         since = list(range(_IN_SILENCE + 1))
         while since[-1] < count:
@@ -358,9 +358,9 @@ class _Drawn:
         """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""
         size, pictures = self.box[0] * self.box[1], lambda: (picture for _, picture in self.blocks())
         rest = found(pictures, size, self.box[1], corner=self.corner, stands_for=self.sampled[1])
-        lay = None if rest.lay is None else rest.lay[self.places]
+        preload = None if rest.preload is None else rest.preload[self.places]
         # A board's comparators are turned by its register, not by a layout file.
-        return replace(rest, values=rest.values[self.places], lay=lay, falls=False)
+        return replace(rest, values=rest.values[self.places], preload=preload, falls=False)
 
     def above(self, rest: Rest) -> Iterator[tuple[int, NDArray[np.float32]]]:
         """Yield the number of the first picture of each block, and the values of the taxels above rest."""
@@ -500,13 +500,13 @@ def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float]
     if events.present is None or not events.present.any():
         return None
     drawn = _Drawn.of(recording)
-    rest, values, lay = _rest_of(recording, drawn, tare), np.full(events.array.shape, np.nan), None
+    rest, values, preload = _rest_of(recording, drawn, tare), np.full(events.array.shape, np.nan), None
     values.reshape(-1)[drawn.taxels] = rest.values
-    if rest.lay is not None:
-        lay = np.zeros(values.size)
-        lay[drawn.taxels] = rest.lay
+    if rest.preload is not None:
+        preload = np.zeros(values.size)
+        preload[drawn.taxels] = rest.preload
     raw = recording.frames(_rate_hz(recording))
-    return raw, replace(rest, values=values.reshape(-1), lay=lay), ContactArea().above
+    return raw, replace(rest, values=values.reshape(-1), preload=preload), ContactArea().above
 
 
 def _rest_of(recording: Recording, drawn: _Drawn, tare: Tare | None) -> Rest:
@@ -525,8 +525,8 @@ def _given(recording: Recording, tare: Tare | None) -> Rest | None:
     """Return the measured rest; NaN where a taxel has none."""
     if tare is not None:
         if tare.array.shape != recording.array.shape:
-            given, own = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
-            raise ProblemError(f"the tare is of {given} taxels, {recording.path} of {own}")
+            given, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
+            raise ProblemError(f"the tare is of {given} taxels, {recording.path} of {stated}")
         return Rest("tare", tare.rest.reshape(-1))
     of = recording.calibration
     return None if of is None or of.rest is None else Rest("calibration", of.rest.reshape(-1))

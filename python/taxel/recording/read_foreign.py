@@ -164,7 +164,7 @@ def unit_of(name: str) -> str | None:
 
 def listed(there: Mapping[str, tuple[int, ...]]) -> str:
     """Return the names and shapes of the first arrays, those that could hold pictures before the others."""
-    first = sorted(there.items(), key=lambda one: len(one[1]) not in (2, 3))[:8]
+    first = sorted(there.items(), key=lambda entry: len(entry[1]) not in (2, 3))[:8]
     said = [f"{_short(name) or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
     return (", ".join(said) or "no numbers") + " ..." * (len(there) > 8)
 
@@ -195,11 +195,11 @@ def _table(path: Path, layout: Layout) -> _Read:
     names = cells(lines[0], how.separator)
     if len(names) > COLUMNS:
         raise FormatError(f"{path.name}, line {first}: {len(names)} columns; at most {COLUMNS} are read")
-    other = next((mark for mark in ",;\t " if all(mark in line.strip() for line in lines[:2])), None)
-    if len(names) == 1 and other is not None:
+    separator = next((mark for mark in ",;\t " if all(mark in line.strip() for line in lines[:2])), None)
+    if len(names) == 1 and separator is not None:
         raise FormatError(
-            f"{path.name}, line {first}: one column by the separator {shown(how.separator)}, and {shown(other)} within "
-            "it; say in the layout which it is: [table] separator"
+            f"{path.name}, line {first}: one column by the separator {shown(how.separator)}, and {shown(separator)} "
+            "within it; say in the layout which it is: [table] separator"
         )
     # An empty cell, as at the end of a line that ends in a separator, makes no name of the others.
     named = not all(_is_number(cell, how) for cell in names if cell) or not any(names)
@@ -220,7 +220,7 @@ def _table(path: Path, layout: Layout) -> _Read:
     names = names if named else [f"column {k}" for k in range(1, len(names) + 1)]
     first += above
     column = None if how.time_column is None else _column(path, "time_column", how.time_column, names, named)
-    left = {_column(path, "leave_out", one, names, named) for one in how.leave_out}
+    left = {_column(path, "leave_out", column, names, named) for column in how.leave_out}
     if column in left:
         raise FormatError(f"{path.name}: column {shown(names[column or 0])} is time_column, and left out")
     times = times_of([name if k not in left else "" for k, name in enumerate(names)])

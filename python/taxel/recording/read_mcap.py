@@ -54,16 +54,16 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     reader = _core.RecordingReader(path, limits.memory(limit), limit is not None)
     sources: dict[str, Source] = {}
     for name in reader.sources():
-        one = _Source(path, reader.of_source(name), limit)
-        if one.header.get("pictures") is not None:
-            sources[name] = one.pictures()
+        channel = _Source(path, reader.of_source(name), limit)
+        if channel.header.get("pictures") is not None:
+            sources[name] = channel.pictures()
         else:
-            sources[name] = one.board(pairing) if one.header.get("stream") is None else one.stream()
-    sensors = [name for name, one in sources.items() if type(one) is Pictures]
+            sources[name] = channel.board(pairing) if channel.header.get("stream") is None else channel.stream()
+    sensors = [name for name, source in sources.items() if type(source) is Pictures]
     if len(sensors) > 1:
         for name in sensors:
-            own = sources[name]
-            sources[name] = replace(own, origin=replace(own.origin, name=f"{path.name} {name}"))
+            source = sources[name]
+            sources[name] = replace(source, origin=replace(source.origin, name=f"{path.name} {name}"))
     return alone(sources)
 
 
@@ -133,7 +133,7 @@ class _Source:
             board_changes=Once(lambda: board_changes_of(self.remarks().board)),
             notes=Once(lambda: notes_of(self.remarks().notes)),
             detections=Once(lambda: detections_of(self.remarks().detections)),
-            zeroings=Once(lambda: zeroings_of([one for _, one in self.remarks().zeroings])),
+            zeroings=Once(lambda: zeroings_of([remark for _, remark in self.remarks().zeroings])),
         )
 
     def pictures(self) -> Pictures:
@@ -170,8 +170,8 @@ class _Source:
             lines = read()
             rows = lines.values.reshape(len(lines.t), self.array.columns)
             if stream.get("time") is not None:
-                own = lines.t / float(stream["unit_us"])
-                rows = np.insert(rows, stream["columns"].index(stream["time"]), own, axis=1)
+                times = lines.t / float(stream["unit_us"])
+                rows = np.insert(rows, stream["columns"].index(stream["time"]), times, axis=1)
             return Samples(self.header, lines.arrived_ns, lines.number, lines.t, np.ascontiguousarray(rows))
 
         def frames() -> Frames:

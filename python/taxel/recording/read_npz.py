@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taxel._base.archive import read_arrays, stored_names
 from taxel._base.columns import frozen_whole
+from taxel._base.errors import refused
 from taxel._base.limits import MARKERS, TAXELS
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
@@ -131,7 +132,7 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
 
 def _held(held: NDArray[Any], array: Array) -> NDArray[np.uint16]:
     if held.dtype != np.uint16 or held.shape != array.shape:
-        raise ProblemError(f"held is {held.dtype} of shape {held.shape}: must be uint16 of {array.shape}")
+        raise refused("held", f" is {held.dtype} of shape {held.shape}: must be uint16 of {array.shape}")
     return held
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from taxel._base import arguments
 from taxel._base.columns import frozen_whole
+from taxel._base.errors import helped, refused
 from taxel._base.messages import counted, warn
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -49,11 +50,11 @@ class Topics:
     @property
     def are_given(self) -> bool:
         """Whether any of them is."""
-        return any(one is not None for one in (self.topic, self.field, self.types, self.ros))
+        return any(option is not None for option in (self.topic, self.field, self.types, self.ros))
 
     def but(self, said: Mapping[str, Any]) -> Topics:
         """Return what is given, and what a layout says of the rest."""
-        return replace(self, **{name: one for name, one in said.items() if getattr(self, name) is None})
+        return replace(self, **{name: value for name, value in said.items() if getattr(self, name) is None})
 
     @property
     def folder(self) -> Path | None:
@@ -66,22 +67,22 @@ class Topics:
         count = max(len(topics), len(fields), len(arrays))
         for name, given in (("topic", len(topics)), ("field", len(fields)), ("array", len(arrays))):
             if given not in (0, 1, count):
-                raise ProblemError(f"{name}: given {given} times for {count} sources; must be once, or for each")
+                raise refused(name, f": given {given} times for {count} sources; must be once, or for each")
         topics = topics * count if len(topics) == 1 else topics
         every_field: Sequence[str | None] = fields * count if len(fields) == 1 else fields or [None] * count
         every_array: Sequence[Array | None] = arrays * count if len(arrays) == 1 else arrays or [None] * count
-        return [Chosen(*one) for one in zip(topics, every_field, every_array, strict=True)]
+        return [Chosen(*choice) for choice in zip(topics, every_field, every_array, strict=True)]
 
 
 def _texts(name: str, given: str | Sequence[str] | None) -> list[str]:
     entries = [given] if isinstance(given, str) else [] if given is None else arguments.several(name, given)
-    return [arguments.text(name, one) for one in entries]
+    return [arguments.text(name, entry) for entry in entries]
 
 
 def _arrays(array: Array | Sequence[Array] | None) -> list[Array]:
     if array is None or isinstance(array, Array):
         return [] if array is None else [array]
-    return [arguments.instance("array", one, Array) for one in arguments.several("array", array)]
+    return [arguments.instance("array", entry, Array) for entry in arguments.several("array", array)]
 
 
 def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) -> Contents:
@@ -93,37 +94,40 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     FormatError : no topic is chosen, or as `taxel.formats.ros.read`
     """
     if not topics.topic:
-        raise FormatError(
-            f"{path}: a ROS bag; say what to open of it: --topic NAME --field NAME (topic=, field=), or [ros] in a "
-            f"layout file; taxel info {path} lists its topics"
+        error = FormatError(
+            f"{path}: a ROS bag, of which a topic, or [ros] in a layout file, is opened; taxel info {path} lists its "
+            "topics"
         )
+        raise helped(error, "topic", "give")
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
     sources: dict[str, Source] = {}
-    for name, one in zip(_names(path, reads), reads, strict=True):
-        told = tuple(_told(one))
+    for name, topic in zip(_names(path, reads), reads, strict=True):
+        told = tuple(_told(topic))
         for line in told:
-            warn(f"{path}: topic {one.topic}: {line}", stacklevel=5)
+            warn(f"{path}: topic {topic.topic}: {line}", stacklevel=5)
         losses = Losses(
             known(
                 {
-                    "messages": len(one.t),
-                    "messages_of_another_length": one.left_out,
-                    "times_by_the_bag": one.by_the_bag,
+                    "messages": len(topic.t),
+                    "messages_of_another_length": topic.left_out,
+                    "times_by_the_bag": topic.by_the_bag,
                 }
             ),
-            remarks=() if one.has_stamps else ("at the bag's times, as its messages have no header",),
-            lost=known((*told, f"other topics of the bag: {', '.join(one.unread)}") if one.unread else told),
+            remarks=() if topic.has_stamps else ("at the bag's times, as its messages have no header",),
+            lost=known((*told, f"other topics of the bag: {', '.join(topic.unread)}") if topic.unread else told),
         )
-        source = one.topic + f".{one.field}" * bool(one.field) + f" ({one.type})"
-        frames = Frames(frozen_whole(one.values), frozen_whole(ascending(one.t)), unit=one.unit, array=one.array)
+        source = topic.topic + f".{topic.field}" * bool(topic.field) + f" ({topic.type})"
+        frames = Frames(
+            frozen_whole(topic.values), frozen_whole(ascending(topic.t)), unit=topic.unit, array=topic.array
+        )
         sources[name] = source_from(frames, Origin(path, path.name, "ros", name, source), losses=losses)
     return alone(sources)
 
 
 def _names(path: Path, reads: Sequence[Read]) -> list[str]:
     """Return the names of sources: their topics (/palm/left: palm_left), with the field where one is opened twice."""
-    topics = [one.topic.strip("/") for one in reads]
-    whole = [f"{t}.{one.field}" if topics.count(t) > 1 else t for t, one in zip(topics, reads, strict=True)]
+    topics = [read.topic.strip("/") for read in reads]
+    whole = [f"{t}.{read.field}" if topics.count(t) > 1 else t for t, read in zip(topics, reads, strict=True)]
     names = [source_of(name) for name in whole]
     for k, name in enumerate(names):
         if name in names[:k]:
@@ -136,14 +140,14 @@ def _names(path: Path, reads: Sequence[Read]) -> list[str]:
     return names
 
 
-def _told(one: Read) -> Iterator[str]:
+def _told(topic: Read) -> Iterator[str]:
     """Yield what was left out, and how many of the stamps were wrong."""
-    if one.left_out:
-        whole = counted(one.left_out + len(one.t), "message")
-        rows, columns = one.array.shape
-        yield f"{one.left_out} of {whole} left out, as they do not hold {rows} x {columns} values"
-    if one.by_the_bag:
+    if topic.left_out:
+        whole = counted(topic.left_out + len(topic.t), "message")
+        rows, columns = topic.array.shape
+        yield f"{topic.left_out} of {whole} left out, as they do not hold {rows} x {columns} values"
+    if topic.by_the_bag:
         yield (
-            f"{one.by_the_bag} of {counted(len(one.t), 'message')} at the bag's time, as stamps are 0, do not ascend, "
-            "or are far from it"
+            f"{topic.by_the_bag} of {counted(len(topic.t), 'message')} at the bag's time, as stamps are 0, do not "
+            "ascend, or are far from it"
         )

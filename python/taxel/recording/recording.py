@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, text, window
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, plain
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -86,11 +87,11 @@ class Recording:
 
     def __init__(self, contents: Contents) -> None:
         if not isinstance(contents, Contents):
-            raise ProblemError(f"contents is {shown(contents)}: a recording is opened by taxel.open(path), not built")
+            raise refused("contents", f" is {shown(contents)}: a recording is opened by taxel.open(path), not built")
         self._contents = contents
-        one = contents.one
-        self.path, self.name, self.kind = one.origin.path, one.origin.name, one.origin.kind
-        self.array, self.source = one.sensor.array, one.origin.source
+        whole = contents.one
+        self.path, self.name, self.kind = whole.origin.path, whole.origin.name, whole.origin.kind
+        self.array, self.source = whole.sensor.array, whole.origin.source
         self._cut_from: tuple[weakref.ref[Recording], float, float] | None = None
 
     path: Path
@@ -240,7 +241,7 @@ class Recording:
     def title(self) -> str:
         """The path, with the name of the source or of the trial where the file holds several."""
         place, sources = str(self.path), inside(self._contents.sources)
-        if self.label and sum(not isinstance(one, Stream) for one in sources.values()) > 1:
+        if self.label and sum(not isinstance(source, Stream) for source in sources.values()) > 1:
             return f"{place} {self.label}"
         return place if place.endswith(self.name) else f"{place}, {self.name}"
 
@@ -484,17 +485,19 @@ class Recording:
         return draw("html", self)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
-        own = self._contents
-        if own.is_several:
-            return escaped(f"Recording({self.name}: {len(own.sources)} sources: {', '.join(own.sources)})")
-        what = own.one.table
+        contents = self._contents
+        if contents.is_several:
+            return escaped(f"Recording({self.name}: {len(contents.sources)} sources: {', '.join(contents.sources)})")
+        what = contents.one.table
         noun = "event" if self.has_events else "picture"
         time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) and self.timed else "no time"
         more = [counted(len(self.notes), "note")] * bool(self.notes)
         more += [counted(len(self.detections), "detection")] * bool(len(self.detections))
         more += [counted(len(self.zeroings), "zeroed taxel")] * bool(self.zeroings)
         more += ["truncated"] * self.truncated
-        others = [] if self.is_slice and not self.is_on_clock else [name for name in own.sources if name != self.label]
+        others = (
+            [] if self.is_slice and not self.is_on_clock else [name for name in contents.sources if name != self.label]
+        )
         more += [f"beside {', '.join(others)}"] * bool(others)
         size = f"{self.array.rows} x {self.array.columns} taxels"
         return escaped(f"Recording({self.name}: {', '.join([counted(len(what), noun), time, size, *more])})")
@@ -504,8 +507,8 @@ def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:
     """Return the same contents with further notes."""
     label, sources = of.one.origin.label, of.sources
     if label in sources:
-        one = noted(inside(sources)[label], more)
-        sources = sources.but(label, one) if isinstance(sources, Slices) else {**sources, label: one}
+        source = noted(inside(sources)[label], more)
+        sources = sources.but(label, source) if isinstance(sources, Slices) else {**sources, label: source}
     return Contents(noted(of.one, more), sources)
 
 

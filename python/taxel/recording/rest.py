@@ -88,10 +88,10 @@ class Rest:
     falls : bool
         Whether values of pictures go further below the rest of a quiet stretch than above it, and come back: less may
         mean more pressure.
-    lay : float64, one a taxel, in the sensor's unit, optional
+    preload : float64, one a taxel, in the sensor's unit, optional
         Of a grid: how much more than at rest a taxel read in the quiet stretch, where something lay on it then and was
         taken away; 0 elsewhere.
-    on : str
+    preload_at : str
         Where that was, for people; empty where nothing lay there.
     """
 
@@ -101,8 +101,8 @@ class Rest:
     begin_us: int = 0
     zeroed: int = 0
     falls: bool = False
-    lay: NDArray[np.float64] | None = None
-    on: str = ""
+    preload: NDArray[np.float64] | None = None
+    preload_at: str = ""
 
     def __str__(self) -> str:
         """Return the line of ``taxel info``."""
@@ -114,13 +114,13 @@ class Rest:
             "tare": "the given tare",
             "calibration": "the calibration's",
             "unit": "0, as the values are force or pressure",
-            "none": "not known, as no half second was quiet with nothing on it; give --tare",
+            "none": "not known, as no half second was quiet with nothing on it; a tare can be given",
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:
             first, end = ((us - self.begin_us) / 1e6 for us in self.quiet_us)
             text = f"a quiet stretch, {first:.3f} to {end:.3f} s, tracked from there"
-            text += f"; something lay on {self.on} in it" * bool(self.on)
+            text += f"; something lay on {self.preload_at} in it" * bool(self.preload_at)
         if self.falls:
             text += f"; {self.fall(path)}"
         return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
@@ -196,10 +196,10 @@ def flickering(frames: Frames) -> NDArray[np.bool_]:
     spans = np.nan_to_num(most.astype(np.float64) - least)
     for _ in range(found.size // _FEW):
         y, x = np.unravel_index(np.argmax(spans), found.shape)
-        own = values[:, y, x]
-        if not spans[y, x] or not np.isfinite(own).all():
+        series = values[:, y, x]
+        if not spans[y, x] or not np.isfinite(series).all():
             return found
-        apart = np.abs(own - np.median(own))
+        apart = np.abs(series - np.median(series))
         far = apart > apart.max() / 2
         times = np.count_nonzero(far[1:] & ~far[:-1])
         if times < _FLICKERS or np.count_nonzero(far) >= 2 * times:
@@ -277,9 +277,9 @@ def found(
     begins[loaded] = np.nan
     if np.isnan(begins).all():
         return Rest("none", unknown)
-    lay = quiet / np.maximum(in_quiet, 1) + np.where(loaded, less / np.maximum(released, 1), 0.0)
-    lay, on = _core.lain(np.where(known > 0, lay, np.nan), columns, LOADED_TICKS / scale, corner)
-    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, lay=lay, on=on)
+    loads = quiet / np.maximum(in_quiet, 1) + np.where(loaded, less / np.maximum(released, 1), 0.0)
+    preload, where = _core.preload(np.where(known > 0, loads, np.nan), columns, LOADED_TICKS / scale, corner)
+    return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, preload=preload, preload_at=where)
 
 
 def of_pictures(frames: Frames) -> Rest:
@@ -297,7 +297,7 @@ def of_quiet(frames: Frames) -> Rest:
         return rest
     fallen = _of_rising(frames, scale, falls=True)
     # Without a rest of their own the values are tracked from their first ones on. What they rise by is no load.
-    return replace(rest, values=fallen.values, falls=True, lay=None, on="")
+    return replace(rest, values=fallen.values, falls=True, preload=None, preload_at="")
 
 
 def _of_rising(frames: Frames, scale: float, *, falls: bool = False) -> Rest:

@@ -20,7 +20,7 @@ def with_sidecars(of: Contents) -> Contents:
     """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration in its folder."""
     # Labels are by the clock of the file's first source, or of all.
     labelled = set(of.sources) if together(of.sources) else {*list(of.sources)[:1]}
-    return alone({name: _of_one(one, labelled=name in labelled) for name, one in of.sources.items()})
+    return alone({name: _of_one(source, labelled=name in labelled) for name, source in of.sources.items()})
 
 
 def _of_one(of: Source, *, labelled: bool) -> Source:
@@ -38,10 +38,10 @@ def _notes(of: Source) -> tuple[Note, ...]:
     """
     labels, which = Labels(beside(of.origin.path)), labels_of(of.origin)
     replaced = labels._replaced(*which)
-    own = tuple(note for note in of.marks.notes() if note.t is None or note.t not in replaced)
-    noted = {(note.text, note.t) for note in own}
+    kept = tuple(note for note in of.marks.notes() if note.t is None or note.t not in replaced)
+    noted = {(note.text, note.t) for note in kept}
     more = sorted((row for row in labels._rows(*which) if (row.text, row.t) not in noted), key=lambda row: row.t or 0)
-    return own + tuple(Note(row.text, row.t, row.at_ns) for row in more)
+    return kept + tuple(Note(row.text, row.t, row.at_ns) for row in more)
 
 
 def labels_of(origin: Origin) -> tuple[Path, str, str]:
@@ -77,13 +77,13 @@ def calibrated_by(of: Contents, place: Path) -> Contents:
     ProblemError : it is of another array than the recording, or of readings in another unit
     """
 
-    def one(source: Source) -> Source:
+    def with_calibration(source: Source) -> Source:
         if isinstance(source, Stream):
             return source
-        own: Once[Calibration | None] = known(_fitting(place, source))
-        return calibrated(replace(source, sensor=replace(source.sensor, calibration=own)))
+        calibration: Once[Calibration | None] = known(_fitting(place, source))
+        return calibrated(replace(source, sensor=replace(source.sensor, calibration=calibration)))
 
-    return alone({name: one(source) for name, source in of.sources.items()})
+    return alone({name: with_calibration(source) for name, source in of.sources.items()})
 
 
 def _fitting(place: Path, of: Source) -> Calibration:

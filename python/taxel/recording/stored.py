@@ -58,16 +58,16 @@ def stored(of: Contents, place: Path) -> Contents:
     ------
     ProblemError : contents that the kind of file cannot hold at all (pictures in a .lsa)
     """
-    ending, one = place.suffix.lower(), of.one
+    ending, main = place.suffix.lower(), of.one
     if of.is_several and ending == ".mcap" and together(of.sources):
         each = {name: _stored(source, ending, place) for name, source in of.sources.items()}
         each = {name: _named(source, f"{place.name} {name}", name) for name, source in each.items()}
         return Contents(several(each), each)
     if of.is_several:
         # Reading the events raises the error that lists the sources.
-        _ = one.table
-    kept = _stored(one, ending, place)
-    if not isinstance(one, Pictures) or ending != ".mcap":
+        _ = main.table
+    kept = _stored(main, ending, place)
+    if not isinstance(main, Pictures) or ending != ".mcap":
         kept = _named(kept, place.name, "board")
     return Contents.of(with_losses(kept, of.others))
 
@@ -152,11 +152,11 @@ def _csv(of: Source, place: Path) -> _Kept:
             f"{place}: the readings were turned already, which a .csv cannot state, and {beside} beside it would turn "
             "them again; write it to another folder, or as a .npz, .h5 or .mcap"
         )
-    whole, own = of.table, of.sensor.array
+    whole, stated = of.table, of.sensor.array
     array = array_in_csv(whole)
-    same = replace(own, name=array.name, names=None) == array
-    lost = [f'the name of the sensor ("{own.name}")' if same else _sensor(own)]
-    lost += ["the names of the taxels"] * (own.names is not None)
+    same = replace(stated, name=array.name, names=None) == array
+    lost = [f'the name of the sensor ("{stated.name}")' if same else _sensor(stated)]
+    lost += ["the names of the taxels"] * (stated.names is not None)
     if isinstance(whole, Events):
         lost += [f"{counted(len(whole.markers), 'marker')} of start and stop"] * bool(whole.markers)
         events = whole[:]
@@ -172,7 +172,7 @@ def _csv(of: Source, place: Path) -> _Kept:
 def _lsa(of: Source, place: Path) -> _Kept:
     """Return what a .lsa holds: the board's bytes as received, or made of the events."""
     board = _board(of, place)
-    events, wire, own = board.table, board.wire, of.sensor.array
+    events, wire, stated = board.table, board.wire, of.sensor.array
     datagrams, made = wire.datagrams(), is_made(of)
     payload = wire.payload if datagrams is None else datagrams.payload
     if made or wire.version_2():
@@ -180,13 +180,13 @@ def _lsa(of: Source, place: Path) -> _Kept:
     else:
         of_wire = ["arrival times, and where datagrams begin"] * wire.datagrams.holds()
     of_wire += ["that intensities are differences"] * wire.differences
-    lost = [_sensor(own)] * (own != Array.thesis())
+    lost = [_sensor(stated)] * (stated != Array.thesis())
     if payload is None or made or wire.version_2():
         times = np.concatenate([events.t, np.array([at for at, _ in events.markers], np.int64)])
         lost += ["times finer than 100 us"] * bool((times % STAMP_US).any())
         lost += ["which events are repaired"] * (events.repaired is not None)
         payload = np.frombuffer(_core.wire_encode(events._parts()), np.uint8)
-    again = wire_decode(payload, array=own, differences=wire.differences and not made)
+    again = wire_decode(payload, array=stated, differences=wire.differences and not made)
     if len(again) != len(events):
         lost.append(f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)")
     elif (again.t != events.t // STAMP_US * STAMP_US).any():

@@ -90,9 +90,9 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
         "registers": None if recording.registers is None else recording.registers._held,
         "taxels": of_taxels.named(),
-        "taxels_untold": int(np.count_nonzero(of_taxels.untold)),
-        "taxels_untold_at": [
-            (int(k % array.columns), int(k // array.columns)) for k in np.flatnonzero(of_taxels.untold)[:_PLACES]
+        "taxels_untested": int(np.count_nonzero(of_taxels.untested)),
+        "taxels_untested_at": [
+            (int(k % array.columns), int(k // array.columns)) for k in np.flatnonzero(of_taxels.untested)[:_PLACES]
         ],
         "counts": recording.counts,
         "truncated": recording.truncated,

@@ -81,17 +81,17 @@ class Verdict(str):
     @classmethod
     def _together(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on several recordings or sources, each with its name."""
-        return cls._of({"together": [(name, one._held) for name, one in parts]})
+        return cls._of({"together": [(name, part._held) for name, part in parts]})
 
     @classmethod
     def _of_sources(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on the sources of one file, each with its name; damage of the file counts once."""
-        return cls._of({"sources": [(name, one._held) for name, one in parts]})
+        return cls._of({"sources": [(name, part._held) for name, part in parts]})
 
     @classmethod
     def _of_stretches(cls, parts: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on stretches of one recording, each with its name; what the whole lost counts once."""
-        return cls._of({"stretches": [(name, one._held) for name, one in parts]})
+        return cls._of({"stretches": [(name, part._held) for name, part in parts]})
 
     def _as_stretch_of(self, whole: str) -> Self:
         """Return the same verdict as that of a stretch of the recording of this name."""
@@ -195,33 +195,34 @@ def _are_steps(steps: Any) -> bool:
 
 def _stated(held: Any) -> dict[str, Any]:
     """Return a verdict from `to_dict` as the compiled part states it."""
-    own = held if isinstance(held, Mapping) else {}
-    numbers, parts, doubtful = ([*(own.get(name, {}) for name in _NUMBERS)], own.get("parts", {}), "doubtful_after_us")
+    said = held if isinstance(held, Mapping) else {}
+    numbers, parts = [*(said.get(name, {}) for name in _NUMBERS)], said.get("parts", {})
+    doubtful = "doubtful_after_us"
     counts = [count for each in numbers if isinstance(each, Mapping) for count in each.values()]
     if (
-        own.get("status") not in STATUSES
-        or not isinstance(own.get("text"), str)
+        said.get("status") not in STATUSES
+        or not isinstance(said.get("text"), str)
         or not all(isinstance(each, Mapping) for each in (*numbers, parts))
         or not all(type(count) is int and 0 <= count < 2**64 for count in counts)
-        or type(own.get(doubtful, None)) not in (int, type(None))
-        or not isinstance(own.get("stretch_of"), str | None)
-        or not _are_steps(own.get("steps_back", []))
+        or type(said.get(doubtful, None)) not in (int, type(None))
+        or not isinstance(said.get("stretch_of"), str | None)
+        or not _are_steps(said.get("steps_back", []))
     ):
         raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
     for name, least in (("lost", "lost"), ("damaged", "damaged")):
-        if STATUSES.index(own["status"]) < STATUSES.index(least) and any(own.get(name, {}).values()):
+        if STATUSES.index(said["status"]) < STATUSES.index(least) and any(said.get(name, {}).values()):
             raise ProblemError(
-                f"verdict: its status is {own['status']}, but its {name} is not empty: must be {least}, or worse"
+                f"verdict: its status is {said['status']}, but its {name} is not empty: must be {least}, or worse"
             )
-    if STATUSES.index(own["status"]) < STATUSES.index("damaged") and own.get(doubtful) is not None:
+    if STATUSES.index(said["status"]) < STATUSES.index("damaged") and said.get(doubtful) is not None:
         raise ProblemError(
-            f"verdict: its status is {own['status']}, but its times are doubtful: must be damaged, or worse"
+            f"verdict: its status is {said['status']}, but its times are doubtful: must be damaged, or worse"
         )
     stated = {str(name): _stated(part) for name, part in parts.items()}
     for name, part in stated.items():
         inner = part["status"]
-        if STATUSES.index(inner) > STATUSES.index(own["status"]):
-            raise ProblemError(f"verdict: its status is {own['status']}, that of {name} is {inner}: must be no better")
+        if STATUSES.index(inner) > STATUSES.index(said["status"]):
+            raise ProblemError(f"verdict: its status is {said['status']}, that of {name} is {inner}: must be no better")
     for name, totals in zip(_NUMBERS, numbers, strict=True):
         for cause in {cause for part in stated.values() for cause in part[name]}:
             # Not their sum: damage of a file is that of each of its sources.
@@ -230,8 +231,8 @@ def _stated(held: Any) -> dict[str, Any]:
                 raise ProblemError(
                     f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be no fewer"
                 )
-    made = {"status": own["status"], "text": own["text"], doubtful: own.get(doubtful)}
-    made |= {"steps_back": [dict(step) for step in own.get("steps_back", [])]}
-    made |= {"stretch_of": own.get("stretch_of")}
+    made = {"status": said["status"], "text": said["text"], doubtful: said.get(doubtful)}
+    made |= {"steps_back": [dict(step) for step in said.get("steps_back", [])]}
+    made |= {"stretch_of": said.get("stretch_of")}
     made |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
     return made | {"parts": list(stated.items())}

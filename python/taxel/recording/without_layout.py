@@ -61,10 +61,10 @@ def refuse_without_layout(path: Path) -> None:
         kind_of(path)  # refuses what is not of the kind that its name says
     if path.suffix.lower() not in ARRAYS:
         lines = text.beginning(path)
-        found = _Found.of(lines, texts=False)
+        found = _TextTable.of(lines, texts=False)
         if found is None:
             _refuse_decimal_commas(path, lines)
-            found = _Found.of(lines, texts=True)
+            found = _TextTable.of(lines, texts=True)
         if found is None:
             return
         holds, lines = _of_table(found)
@@ -78,7 +78,7 @@ def refuse_without_layout(path: Path) -> None:
                 "file, an array of pictures x rows x columns or pictures x taxels (docs/files.md)"
             )
         holds, lines = listed(there), _of_arrays(path, name, there)
-        says = "says which are the pictures" if len(there) > 1 else "says what it is"
+        says = "says which are the pictures" if len(there) > 1 else "or rate_hz, says what it is"
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
@@ -91,14 +91,14 @@ def are_spike_trains(path: Path) -> bool:
 def _of_arrays(path: Path, name: str, there: Mapping[str, tuple[int, ...]]) -> list[str]:
     """Return the layout of the array of a name."""
     count, *shape = there[name]
-    time = next((one for one, of in there.items() if of == (count,) and unit_of(one) is not None), None)
+    time = next((name for name, of in there.items() if of == (count,) and unit_of(name) is not None), None)
     times = [] if time is None else [f"time = {_quoted(time)}", *_unit(time, arrays_of(path, [time])[time])]
     data = [f"array = {_quoted(name)}"] * bool(name) + times
     return [*_size(shape), *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
 
 
 @dataclass(frozen=True)
-class _Found:
+class _TextTable:
     """Hold the parts of a table: the cells of its names (none), of its units (none) and of its lines of numbers."""
 
     separator: str
@@ -110,7 +110,7 @@ class _Found:
     numeric: Sequence[bool]
 
     @classmethod
-    def of(cls, lines: Sequence[str], *, texts: bool) -> _Found | None:
+    def of(cls, lines: Sequence[str], *, texts: bool) -> _TextTable | None:
         """Find the parts; None of a text that does not end in lines of numbers, with `texts` beside texts."""
         there = [(k, line) for k, line in enumerate(lines) if line.strip()]
         # The separator that makes most columns of numbers.
@@ -170,7 +170,7 @@ class _Found:
         return sorted({0, *left}) if counts else left
 
 
-def _of_table(found: _Found) -> tuple[str, list[str]]:
+def _of_table(found: _TextTable) -> tuple[str, list[str]]:
     """Return what a table holds, and its layout."""
     time, of_time = found.time()
     left = found.left_out(time)
@@ -182,7 +182,7 @@ def _of_table(found: _Found) -> tuple[str, list[str]]:
     missing = {row[k] for row in found.body for k in taxels if row[k] in MISSING}
     table += [f"missing = {_quoted(cell)}" for cell in sorted(missing - {"nan"} or missing)[-1:]]
     units = {found.units[k].strip("[]()") for k in taxels} if found.units else set()
-    unit = [f"unit = {_quoted(one)}" for one in units if one and len(units) == 1]
+    unit = [f"unit = {_quoted(name)}" for name in units if name and len(units) == 1]
     rate = [_NO_RATE] if time is None else []
     holds = f"a table of {counted(len(found.numeric), 'column')}"
     return holds, [*_size([len(taxels)]), *unit, *rate, *(["[table]", *table] if table else [])]
@@ -206,7 +206,9 @@ def _holds_numbers(column: Sequence[str]) -> bool:
 
 def _fits(row: Sequence[str], numeric: Sequence[bool]) -> bool:
     """Whether a row has as many cells, with numbers where they are."""
-    return len(row) == len(numeric) and _are_numbers([c for c, one in zip(row, numeric, strict=True) if one])
+    return len(row) == len(numeric) and _are_numbers(
+        [c for c, is_number in zip(row, numeric, strict=True) if is_number]
+    )
 
 
 def _refuse_decimal_commas(path: Path, lines: Sequence[str]) -> None:
@@ -235,14 +237,14 @@ def _unit(name: str, times: NDArray[np.float64]) -> list[str]:
     unit = said if said in UNITS_US else next((u for u in UNITS_US if most * UNITS_US[u] <= TIME_US), "us")
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} pictures/s"] if step > 0 else []
-    notes += [" ".join(f"or {_quoted(other)}" for other in UNITS_US if other != unit)] * (not said)
+    notes += [" ".join(f"or {_quoted(unit_name)}" for unit_name in UNITS_US if unit_name != unit)] * (not said)
     return [f"time_unit = {_quoted(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
     """Whether cells are numbers, at least one of them, or marks of missing values."""
     finite = [math.isfinite(_number(cell)) for cell in cells]
-    return any(finite) and all(one or cell in MISSING for one, cell in zip(finite, cells, strict=True))
+    return any(finite) and all(is_finite or cell in MISSING for is_finite, cell in zip(finite, cells, strict=True))
 
 
 def _number(cell: str) -> float:

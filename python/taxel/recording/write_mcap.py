@@ -50,26 +50,26 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     ------
     OSError : the disk is full ...
     """
-    one = contents.one
-    samples = one.lines.samples() if isinstance(one, Stream) else None
+    whole = contents.one
+    samples = whole.lines.samples() if isinstance(whole, Stream) else None
     if samples is not None:
-        header = {**samples.about, "sources": [], **_told(one)}
+        header = {**samples.about, "sources": [], **_told(whole)}
         writer = RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
-        writer.finish(json.dumps(counts[one.origin.label]))
+        writer.finish(json.dumps(counts[whole.origin.label]))
         return
-    if not isinstance(one, Board):
+    if not isinstance(whole, Board):
         every = {name: source for name, source in contents.sources.items() if isinstance(source, Pictures)}
         _write_pictures(part, every, compression, counts)
         return
-    wire, events = one.wire, one.table
+    wire, events = whole.wire, whole.table
     datagrams = wire.datagrams()
     assert datagrams is not None  # `stored` sets them
     # Host times before 1970 are not possible, so all board times are shifted together.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)
     header = {
-        **_header(one),
+        **_header(whole),
         "repaired": wire.unmarked,
         "difference": wire.differences,
         "origin_us": wire.origin_us,
@@ -77,18 +77,18 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     }
     writer = RecordingWriter(part, json.dumps(header), compression, True)
     # Written before all datagrams, as the recorder does, because a player reads it there.
-    if (held := one.settings.held()) is not None:
+    if (held := whole.settings.held()) is not None:
         writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(held).reshape(-1))
     done = 0
     # Commands of the host are written between the datagrams before and after them, an order that the decoder needs.
-    for change in one.marks.board_changes():
+    for change in whole.marks.board_changes():
         upto = int(np.searchsorted(datagrams.arrived_ns, change.at_ns, side="left"))
         _add_datagrams(writer, datagrams, arrived, done, max(done, upto))
         writer.board_change(max(0, change.at_ns), json.dumps(change._described()))
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
-    _add_remarks(writer, events, one)
-    writer.finish(json.dumps(counts[one.origin.label]))
+    _add_remarks(writer, events, whole)
+    writer.finish(json.dumps(counts[whole.origin.label]))
 
 
 def _header(of: Source) -> dict[str, Any]:
@@ -118,20 +118,20 @@ def _write_pictures(
     part: Path, sources: Mapping[str, Pictures], compression: str, counts: Mapping[str, dict[str, Any]]
 ) -> None:
     """Write sources of pictures, all by one clock; times in the file are those of the board, from 0 on."""
-    tables = {name: one.table for name, one in sources.items()}
-    origin_us = min([0, *(int(one.t[0]) for one in tables.values() if len(one))])
+    tables = {name: source.table for name, source in sources.items()}
+    origin_us = min([0, *(int(table.t[0]) for table in tables.values() if len(table))])
     headers = [
         {
-            **_header(one),
+            **_header(source),
             "name": name,
             "pictures": {
-                "unit": one.table.unit,
-                "clock": not one.untimed,
-                "columns": one.columns or (),
-                "turned": one.readings.turned,
+                "unit": source.table.unit,
+                "clock": not source.untimed,
+                "columns": source.columns or (),
+                "turned": source.readings.turned,
             },
         }
-        for name, one in sources.items()
+        for name, source in sources.items()
     ]
     header = {**headers[0], "sources": headers[1:], "started_ns": 0}
     writer = RecordingWriter(part, json.dumps(header), compression, True)
@@ -140,12 +140,12 @@ def _write_pictures(
     def at_ns(t: int) -> int:
         return max(0, (t - origin_us) * 1000)
 
-    shown = {name: _low_rate(one) for name, one in sources.items()}
+    shown = {name: _low_rate(source) for name, source in sources.items()}
     drawn = dict.fromkeys(shown, 0)
-    for name, one in sources.items():
-        if (held := one.settings.held()) is not None:
+    for name, source in sources.items():
+        if (held := source.settings.held()) is not None:
             tracks[name].held(0, None, np.ascontiguousarray(held).reshape(-1))
-        for change in one.marks.board_changes():
+        for change in source.marks.board_changes():
             tracks[name].board_change(max(0, change.at_ns), json.dumps(change._described()))
     for name, first, block, whole in _blocks(tables):
         t = np.ascontiguousarray(block.t)
@@ -157,8 +157,8 @@ def _write_pictures(
             above = np.ascontiguousarray(few.values[k]).reshape(-1)
             tracks[name].picture_above(at_ns(int(few.t[k])), int(few.t[k]), above, *about)
         drawn[name] = stop
-    for name, one in sources.items():
-        _add_small(tracks[name], one, at_ns)
+    for name, source in sources.items():
+        _add_small(tracks[name], source, at_ns)
     for name in [*sources][1:]:
         tracks[name].end(json.dumps(counts[name]))
     writer.finish(json.dumps(counts[next(iter(sources))]))
@@ -182,17 +182,19 @@ def _low_rate(of: Pictures) -> tuple[Frames, tuple[float, str, str]]:
 
 def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bool]]:
     """Yield name, number of the first picture, pictures, and whether 16 bits hold them, of all sources by time."""
-    whole = {name: _core.whole_pictures(np.ascontiguousarray(one.values).reshape(-1)) for name, one in tables.items()}
+    whole = {
+        name: _core.whole_pictures(np.ascontiguousarray(table.values).reshape(-1)) for name, table in tables.items()
+    }
     done = dict.fromkeys(tables, 0)
-    each = {name: max(1, _BLOCK // max(1, one.array.rows * one.array.columns)) for name, one in tables.items()}
-    while left := {name: one for name, one in tables.items() if done[name] < len(one)}:
+    each = {name: max(1, _BLOCK // max(1, table.array.rows * table.array.columns)) for name, table in tables.items()}
+    while left := {name: table for name, table in tables.items() if done[name] < len(table)}:
         # The block of the source that comes first, and what the others have until its end.
         first = min(left, key=lambda name: left[name].t[done[name]])
         end = left[first].t[min(done[first] + each[first], len(left[first])) - 1]
-        for name, one in left.items():
-            stop = min(int(np.searchsorted(one.t, end, side="right")), done[name] + each[name])
+        for name, frames in left.items():
+            stop = min(int(np.searchsorted(frames.t, end, side="right")), done[name] + each[name])
             if stop > done[name]:
-                yield name, done[name], one[done[name] : stop], whole[name]
+                yield name, done[name], frames[done[name] : stop], whole[name]
                 done[name] = stop
 
 

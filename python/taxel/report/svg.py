@@ -60,6 +60,6 @@ def _svg(figure: Figure) -> str:
         figure.savefig(text, format="svg", metadata={"Date": None}, transparent=True, dpi=_PIXELS)
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
-    for colour, own in ((INK, "--ink"), ("#000000", "--ink"), (_LINE, "--line"), (_GROUND, "--card")):
-        svg = svg.replace(f": {colour}", f": var({own})")
+    for colour, variable in ((INK, "--ink"), ("#000000", "--ink"), (_LINE, "--line"), (_GROUND, "--card")):
+        svg = svg.replace(f": {colour}", f": var({variable})")
     return svg

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import finite, flag, number, numbers, parameters, shown, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped, plain, warn
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -157,7 +158,7 @@ class Scene:
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         if not isinstance(parameters, Mapping):
-            raise ProblemError(f"parameters are {shown(parameters)}: must be a mapping, as Scene.draw(seed).parameters")
+            raise refused("parameters", f" are {shown(parameters)}: must be a mapping, as Scene.draw(seed).parameters")
         self.parameters = dict(parameters)
         self._warned = False
 
@@ -341,9 +342,9 @@ class Pictures:
     def __init__(self, values: ArrayLike, period_us: float) -> None:
         self.values: NDArray[np.float32] = numbers("values", values, np.float32)
         if self.values.ndim != 3 or not len(self.values):
-            raise ProblemError(f"values have shape {self.values.shape}: must be (n, rows, columns)")
+            raise refused("values", f" have shape {self.values.shape}: must be (n, rows, columns)")
         if not (np.all(self.values >= 0) and np.all(self.values <= 1)):
-            raise ProblemError("values: must be shares of the ramp, 0 to 1")
+            raise refused("values", ": must be shares of the ramp, 0 to 1")
         self.period_us = finite("period_us", period_us, "us", least=0.0)
 
     def _part(self) -> Any:

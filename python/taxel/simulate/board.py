@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._base.arguments import buffer_bytes, flag, instance, numbers, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped, plain
 from taxel._base.options import option
-from taxel._core import DeviceError, ProblemError
+from taxel._core import DeviceError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit
 from taxel.wire import Registers
@@ -64,8 +65,8 @@ class Version2:
     )
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            whole(one.name, getattr(self, one.name), one.metadata["min"], one.metadata["max"])
+        for field in fields(self):
+            whole(field.name, getattr(self, field.name), field.metadata["min"], field.metadata["max"])
 
 
 def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
@@ -77,7 +78,7 @@ def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
     """
     lines = None if circuit is None else instance("circuit", circuit, Circuit)._plain()
     if flag("asynchronous", asynchronous) and lines is not None:
-        raise ProblemError("asynchronous: taxels that compare by themselves share no lines: circuit must be left out")
+        raise refused("asynchronous", ": taxels that compare by themselves share no lines: circuit must be left out")
     return {"circuit": lines, "asynchronous": asynchronous}
 
 

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import finite_numbers, floats, number
+from taxel._base.errors import refused
 from taxel._base.parameters import Value, defaults
-from taxel._core import ProblemError
 
 __all__ = ["AdaptiveRamp", "Circuit", "Converted", "Converter", "Divider", "Fabric", "Trace", "VirtualGround"]
 
@@ -363,7 +363,7 @@ class Converter(Value):
         """
         checked = _pictures("volts", volts, "V")
         if (np.abs(checked) > _MOST_V).any():
-            raise ProblemError(f"volts: must be from -{_MOST_V:g} to {_MOST_V:g} V")
+            raise refused("volts", f": must be from -{_MOST_V:g} to {_MOST_V:g} V")
         shape: tuple[int, int] = checked.shape[-2:]
         return _core.converter_ticks(self._json(), shape, checked.ravel()).reshape(checked.shape)
 
@@ -578,5 +578,5 @@ class Circuit(Value):
 def _pictures(name: str, values: ArrayLike, unit: str) -> Values:
     checked = finite_numbers(name, values, unit)
     if checked.ndim not in (2, 3) or 0 in checked.shape[-2:]:
-        raise ProblemError(f"{name} has shape {checked.shape}: must be (rows, columns) or (n, rows, columns)")
+        raise refused(name, f" has shape {checked.shape}: must be (rows, columns) or (n, rows, columns)")
     return checked

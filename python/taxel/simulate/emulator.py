@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._base.options import with_options
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -269,7 +270,7 @@ def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
     try:
         return (_part(n, act, array) for n, act in enumerate(iter(acts)))
     except TypeError:
-        raise ProblemError(f"touch is {shown(acts)}: must be acts, a Replay or a Pipe") from None
+        raise refused("touch", f" is {shown(acts)}: must be acts, a Replay or a Pipe") from None
 
 
 def _parts(acts: Sequence[Act], array: Array) -> list[Any]:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import finite_numbers, mapping, number, parameters, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
-from taxel._core import ProblemError
 from taxel.array import Array
 
 __all__ = ["Layer", "Pressed"]
@@ -93,7 +93,7 @@ class Layer:
         self.array = Array._of(array)
         self.foam: dict[str, Any] = {} if foam is None else mapping("foam", foam)
         if not 0 < number("tolerance", tolerance) < 1:
-            raise ProblemError(f"tolerance is {tolerance:g}: must be above 0 and below 1")
+            raise refused("tolerance", f" is {tolerance:g}: must be above 0 and below 1")
         self.cells_per_pitch = whole("cells_per_pitch", cells_per_pitch, 1, 16)
         self._core = _core.Layer(
             self.array._parts(), parameters(self.foam), self.cells_per_pitch, number("tolerance", tolerance)
@@ -181,12 +181,12 @@ class Layer:
         sunk = finite_numbers("sunk_mm", sunk_mm)
         cells = (self.array.rows * self.cells_per_pitch, self.array.columns * self.cells_per_pitch)
         if sunk.shape != cells:
-            raise ProblemError(f"sunk_mm has shape {sunk.shape}: the array has {cells}")
+            raise refused("sunk_mm", f" has shape {sunk.shape}: the array has {cells}")
         pressure, base = self._core.press(sunk.reshape(-1))
-        on = _KPA * pressure.reshape(self.array.shape)
+        above = _KPA * pressure.reshape(self.array.shape)
         # MPa mm^2 is N.
         force = float(pressure.sum()) * self.array.row_mm * self.array.column_mm
-        return Pressed(on, _KPA * base.reshape(self.array.shape).astype(np.float64), force)
+        return Pressed(above, _KPA * base.reshape(self.array.shape).astype(np.float64), force)
 
     def forget(self) -> None:
         """Begin the next touch without the pressures of the last two."""
@@ -199,5 +199,5 @@ class Layer:
 def _waves(waves: ArrayLike) -> NDArray[np.float64]:
     checked = finite_numbers("waves", waves).reshape(-1)
     if not np.all(checked >= 0):
-        raise ProblemError("waves: must be 0 or more")
+        raise refused("waves", ": must be 0 or more")
     return checked

@@ -7,6 +7,7 @@ from typing import IO, Any
 
 from taxel._base.arguments import number, shown, whole
 from taxel._base.documents import of_json
+from taxel._base.errors import refused
 from taxel._core import DeviceError, FormatError, ProblemError
 from taxel.array import Array
 from taxel.wire import Registers
@@ -44,7 +45,7 @@ class Pipe:
         try:
             self._descriptor, self._ahead = source.fileno(), b""
         except AttributeError:
-            raise ProblemError(f"source is {shown(source)}: must be a pipe or a file, opened to read bytes") from None
+            raise refused("source", f" is {shown(source)}: must be a pipe or a file, opened to read bytes") from None
         line = self._line()
         try:
             header = of_json("standard input, line 1", line.decode())

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from taxel._base.arguments import number, shown
-from taxel._core import ProblemError
+from taxel._base.errors import refused
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -40,14 +40,14 @@ class Replay:
     def __init__(self, source: Recording | Events | Frames, speed: float = 1.0) -> None:
         self.speed = number("speed", speed)
         if not 0 < self.speed < np.inf:
-            raise ProblemError(f"speed is {shown(speed)}: must be above 0")
+            raise refused("speed", f" is {shown(speed)}: must be above 0")
         self.recording = source if isinstance(source, Recording) else None
         if isinstance(source, Recording):
             source = source.events if source.has_events else source.frames()
         if not isinstance(source, Events | Frames):
-            raise ProblemError(f"source is {shown(source)}: must be a Recording, Events or Frames")
+            raise refused("source", f" is {shown(source)}: must be a Recording, Events or Frames")
         if not len(source):
-            raise ProblemError("source: nothing to play in it")
+            raise refused("source", ": nothing to play in it")
         self.source: Events | Frames = source
 
     @property

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from taxel._base.arguments import finite, mapping, shown, whole
+from taxel._base.errors import refused
 from taxel._base.messages import escaped
 from taxel._core import ProblemError
 
@@ -65,7 +66,7 @@ class Flaws:
                 finite(name, getattr(self, name), least=0.0, most=1.0 if name in ("dead", "stuck") else math.inf)
         for name, seed in mapping("seeds", {} if self.seeds is None else self.seeds).items():
             if name not in self._names():
-                raise ProblemError(f"seeds: {shown(name)} is no flaw: there are {', '.join(self._names())}")
+                raise refused("seeds", f": {shown(name)} is no flaw: there are {', '.join(self._names())}")
             whole(f"seeds[{name}]", seed, 0, 2**63 - 1)
 
     @classmethod

@@ -153,15 +153,15 @@ def _bad(
         if not choice:
             raise ProblemError(f"{stuck} stuck, {flickering} flickering, {pairs} pairs: there are {len(known)} taxels")
         first = int(rng.choice(choice))
-        both = [first, first + 1] if n >= stuck + flickering else [first]
-        left -= set(both)
+        worn = [first, first + 1] if n >= stuck + flickering else [first]
+        left -= set(worn)
         t, up = np.array([since]), np.array([True])
         if n >= stuck:
             apart = rng.exponential(_FLICKER_US, 10 + 4 * (stop - since) // _FLICKER_US)
             later = since + np.cumsum(apart).astype(np.int64) // _STAMP_US * _STAMP_US
             t = np.concatenate([t, np.unique(later[(later > since) & (later <= stop)])])
             up = np.arange(len(t)) % 2 == 1
-        for place in both:
+        for place in worn:
             rest = int(held.at(place, np.array([since - 1]))[0])
             value = int(rng.integers(0, top + 1))
             values = np.where(up, value if n < stuck else rest + value, rest)
@@ -174,7 +174,7 @@ def _merged(
 ) -> Events:
     """Return the events that stay, with their new values, among those that were added; at one time these come first."""
     t, place, new, up = (
-        np.concatenate([np.empty(0, np.int64), *(one[k] for one in added)]) for k in range(len(_Added._fields))
+        np.concatenate([np.empty(0, np.int64), *(events[k] for events in added)]) for k in range(len(_Added._fields))
     )
     mine = np.flatnonzero(kept)
     every = np.concatenate([t, held.t[mine]])

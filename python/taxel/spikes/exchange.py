@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import number, shown, text
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import refused
 from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5
-from taxel._core import FormatError, ProblemError
+from taxel._core import FormatError
 
 __all__ = ["read_nwb", "write_nwb"]
 
@@ -41,13 +42,13 @@ def write_nwb(
     if begun is None:
         begun = datetime.now()
     if not isinstance(begun, datetime):
-        raise ProblemError(f"begun is {shown(begun)}: must be a datetime")
+        raise refused("begun", f" is {shown(begun)}: must be a datetime")
     try:
         begun = begun.astimezone()
     except (OverflowError, ValueError, OSError):
-        raise ProblemError(f"begun is {begun}: must be a date that this machine's clock knows") from None
+        raise refused("begun", f" is {begun}: must be a date that this machine's clock knows") from None
     if "\0" in text("description", description):
-        raise ProblemError(f"description is {shown(description)}: NWB takes no zero in a text")
+        raise refused("description", f" is {shown(description)}: NWB takes no zero in a text")
     told = (description, str(uuid4()), begun, times, values, kind, np.array([window_ms]) / 1000.0)
     write_h5(path, _write, lambda pipe: pickle.dump(told, pipe), overwrite=overwrite)
     return Path(path)

@@ -17,6 +17,7 @@ from taxel._base.arguments import bare, column, floats, instance, nth, number, s
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
+from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._base.limits import UNIT
 from taxel._base.messages import counted
@@ -128,7 +129,7 @@ class SpikeTrains(Columns):
         if values is not None:
             valued, lengths = _by_train("values", bare("values", values), np.float32)
             if lengths != counts:
-                raise ProblemError("values: must have the lengths of the trains, one value a spike")
+                raise refused("values", ": must have the lengths of the trains, one value a spike")
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # Values that are not finite are refused below, with their positions.
@@ -144,7 +145,7 @@ class SpikeTrains(Columns):
     def __getitem__(self, train: int) -> NDArray[np.float64]:
         """Return the times of one train, ms."""
         if isinstance(train, bool) or not isinstance(train, int | np.integer):
-            raise ProblemError(f"trains[{shown(train)}]: choose one train by its number, several by select")
+            raise refused("trains", f"[{shown(train)}]: choose one train by its number, several by select")
         n = nth("train", train, len(self))
         return self.times[self.offsets[n] : self.offsets[n + 1]]
 
@@ -215,17 +216,17 @@ class SpikeTrains(Columns):
         >>> both, both.values
         (SpikeTrains(3 trains, 3 spikes, graded, 0 to 9 ms), array([1. , 0.5, 2.5], dtype=float32))
         """
-        each = [instance(f"parts[{n}]", one, SpikeTrains) for n, one in enumerate(several("parts", parts))]
+        each = [instance(f"parts[{n}]", part, SpikeTrains) for n, part in enumerate(several("parts", parts))]
         if not each:
-            raise ProblemError("parts: there is none, one or more is needed")
-        each = [one.split_by_sign() if one.signed else one for one in each]
-        graded = any(one.kind == "graded" for one in each)
+            raise refused("parts", ": there is none, one or more is needed")
+        each = [trains.split_by_sign() if trains.signed else trains for trains in each]
+        graded = any(trains.kind == "graded" for trains in each)
         return cls._of_own(
-            np.concatenate([one.times for one in each]),
-            np.concatenate([[0], np.cumsum(np.concatenate([one.counts for one in each]))]).astype(np.int64),
-            min(one.start for one in each),
-            max(one.stop for one in each),
-            np.concatenate([one._ones_without() for one in each]) if graded else None,
+            np.concatenate([trains.times for trains in each]),
+            np.concatenate([[0], np.cumsum(np.concatenate([trains.counts for trains in each]))]).astype(np.int64),
+            min(trains.start for trains in each),
+            max(trains.stop for trains in each),
+            np.concatenate([trains._ones_without() for trains in each]) if graded else None,
             "graded" if graded else "unsigned",
         )
 
@@ -285,7 +286,7 @@ class SpikeTrains(Columns):
         try:
             chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
         except ValueError as error:
-            raise ProblemError(f"trains: {error}") from None
+            raise refused("trains", f": {error}") from None
         if chosen.dtype == bool:
             if chosen.shape != (len(self),):
                 raise ProblemError(f"mask has shape {chosen.shape}: must be ({len(self)},)")
@@ -326,9 +327,9 @@ class SpikeTrains(Columns):
         delays = floats("delays_ms", delays_ms, "ms")
         wrong = np.flatnonzero(~(np.isfinite(delays) & (delays >= 0)))
         if len(wrong):
-            raise ProblemError(f"delays_ms[{wrong[0]}] is {delays[wrong[0]]}: must be 0 or more and finite")
+            raise refused("delays_ms", f"[{wrong[0]}] is {delays[wrong[0]]}: must be 0 or more and finite")
         if not len(delays) or (np.diff(delays) <= 0).any():
-            raise ProblemError("delays_ms: must ascend, one delay or more")
+            raise refused("delays_ms", ": must ascend, one delay or more")
         times = np.add.outer(delays, self.times).reshape(-1)
         offsets = np.add.outer(np.arange(len(delays)) * len(self.times), self.offsets[:-1]).reshape(-1)
         values = None if self.values is None else np.tile(self.values, len(delays))
@@ -418,7 +419,7 @@ class SpikeTrains(Columns):
         except TypeError:
             foreign = [trains]
         if foreign:
-            raise ProblemError(f"trains: {shown(foreign[0])} must be a neo.SpikeTrain")
+            raise refused("trains", f": {shown(foreign[0])} must be a neo.SpikeTrain")
         if not len(trains):
             return cls.from_lists([])
         times = [np.asarray(t.rescale("ms").magnitude, np.float64) for t in trains]
@@ -641,5 +642,5 @@ def _kind(kind: object, values: NDArray[np.float32] | None) -> Kind:
     if kind is None:
         return "unsigned" if values is None else "signed"
     if not isinstance(kind, str) or kind not in _KINDS:
-        raise ProblemError(f"kind is {shown(kind)}: must be one of {', '.join(_KINDS)}")
+        raise refused("kind", f" is {shown(kind)}: must be one of {', '.join(_KINDS)}")
     return kind

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import finite, flag, instance, mapping, several
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
+from taxel._base.errors import helped, refused
 from taxel._base.messages import collected
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -119,9 +120,9 @@ class CalibrateOptions:
         if self.table is not None:
             checked_path("table", self.table)
         if self.law and self.table is not None:
-            raise ProblemError("--law and --table: one of the two")
+            raise refused("law", ": must be left out where table is given")
         if self.sensor and not self.law:
-            raise ProblemError("--set: values of the law; give --law with it")
+            raise helped(ProblemError("sensor holds values of the law"), "law", "give")
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +188,9 @@ def calibrate(
     table = isinstance(loads, str | os.PathLike)
     known = read_loads(checked_path("loads", loads)) if table else several("loads", loads)
     if not known and not asked.law and asked.table is None:
-        raise ProblemError("nothing to calibrate by: give --load, --loads, --table or --law")
+        raise helped(ProblemError("there is no law and no table to calibrate by"), "loads", "give")
     if not known and (asked.each or asked.exponent is not None):
-        raise ProblemError("--each and --exponent belong to a fit: give --load")
+        raise helped(ProblemError("each and exponent belong to a fit"), "loads", "give")
     with collected() as warnings:
         made = _calibrated(recording, [instance("loads", one, KnownLoad) for one in known], asked)
     return replace(Calibrated(made), warnings=tuple(warnings))
@@ -207,8 +208,8 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     calibration: Calibration | None = None
     if options.law:
         if read.frames.unit != "ticks":
-            raise ProblemError(
-                f"--law: turns ticks of a board into {options.unit}; {recording.path} holds {read.frames.unit}"
+            raise refused(
+                "law", f": turns ticks of a board into {options.unit}; {recording.path} holds {read.frames.unit}"
             )
         registers = recording.registers
         ramp = 150.0 if registers is None else float(registers.ramp)
@@ -238,7 +239,8 @@ def _read(recording: Recording, tare: GivenTare | None) -> _Read:
         raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
     frames, rest, floor = values
     if rest.source == "none" and recording.has_events:
-        raise ProblemError(f"{recording.path}: the rest of its taxels is not known, as no half second is quiet; --tare")
+        error = ProblemError(f"{recording.path}: the rest of its taxels is not known, as no half second is quiet")
+        raise helped(error, "tare", "give")
     known = rest.source not in ("unit", "none")
     return _Read(frames, rest.values.reshape(recording.array.shape) if known else None, floor)
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from taxel._base.arguments import finite, instance
+from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
-from taxel._base.progress import Progress, lines_to
+from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, score
 from taxel.detect.advice import drifted
@@ -199,15 +200,15 @@ def detect(
     """
     detector("readout", readout)
     asked = DetectOptions() if options is None else instance("options", options, DetectOptions)
-    update = lines_to(progress)
+    update = reporting(progress)
     opened = sensors_of(recordings)
     with collected() as warnings:
         events = [None] * len(opened) if truth is None else references(truth, opened, "truth")
         if truth is not None and not any(events):
-            raise ProblemError(f"truth is {truth}: names no event in {', '.join(one.title for one in opened)}")
+            raise refused("truth", f" is {truth}: names no event in {', '.join(one.title for one in opened)}")
         each = []
         for one, labelled in zip(opened, events, strict=True):
-            update(f"detecting in {one.title}")
+            update(f"detecting in {one.title}", 0, 0)
             each.append(_detected(readout, one, labelled, asked))
     outcomes = [one.outcome for one in each]
     truths = [one.example.labels for one in outcomes if one.score is not None]
@@ -251,8 +252,11 @@ def _naming(recording: str) -> Iterator[None]:
     try:
         yield
     except ProblemError as error:
-        said = str(error)
-        raise ProblemError(said if said.startswith(recording) else f"{recording}: {said}") from None
+        # A wrong argument is none of the recording.
+        is_of_argument = error.argument is not None and error.hint is None
+        if not is_of_argument and not str(error).startswith(recording):
+            error.args = (f"{recording}: {error.args[0]}", *error.args[1:])
+        raise
 
 
 def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:

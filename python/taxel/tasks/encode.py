@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import callback, instance, mapping, parameters, text
+from taxel._base.arguments import instance, mapping, parameters, text
 from taxel._base.messages import collected, counted
-from taxel._base.progress import Progress
+from taxel._base.progress import Progress, reporting
 from taxel.encode import Encoder
 from taxel.recording import Recording
 from taxel.spikes import SpikeTrains
@@ -121,7 +121,7 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
     >>> encode(taxel.open(place), EncodeOptions("level_crossing", {"levels": [5.0]})).trains.counts
     array([2])
     """
-    show = (lambda *_: None) if progress is None else callback("progress", progress)
+    show = reporting(progress)
     asked = instance("options", options, EncodeOptions)
     instance("recording", recording, Recording)
     with collected() as warnings:

@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from taxel._base.arguments import callback, instance, mapping, several, text, whole
+from taxel._base.arguments import instance, mapping, several, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted
-from taxel._base.progress import Progress
+from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.encode import Encoder
 from taxel.information import Answer, LabelledTrial, answer, folds, notes_as_trials, read_trials, recordings_as_trials
@@ -68,7 +69,7 @@ class InformationOptions:
     def _chosen(self) -> Encoder | None:
         """Return the encoder; None of that which the answer chooses by itself."""
         if text("encoder", self.encoder) not in ("change_events", "fa1"):
-            raise ProblemError(f"encoder is {self.encoder}: must be change_events or fa1, which have one train a taxel")
+            raise refused("encoder", f" is {self.encoder}: must be change_events or fa1, which have one train a taxel")
         mapping("parameters", self.parameters)
         if self.encoder == "change_events" and not self.parameters:
             return None
@@ -129,17 +130,17 @@ def information(
     FormatError : a table that is none
     """
     asked = InformationOptions() if options is None else instance("options", options, InformationOptions)
-    show = (lambda *_: None) if progress is None else callback("progress", progress)
+    show = reporting(progress)
     encoder, opened = asked._chosen(), sensors_of(recordings)
     labels = None if labels is None else checked_path("labels", labels)
     with collected() as warnings:
         trials = _trials(labels, opened, asked.window_ms)
         if labels is None and len({trial.label for trial in trials}) == 1:
-            raise ProblemError(
+            error = ProblemError(
                 f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, "
-                f"here {trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings "
-                "a folder"
+                f"here {trials[0].label!r} alone"
             )
+            raise helped(error, "labels", "give")
         _check_folds(trials, str(opened[0].path) if labels in (None, "notes") else str(labels), asked)
         show(counted(len(trials), "trial"), 0, 0)
         found = answer(
@@ -169,7 +170,7 @@ def _trials(
     if labels != "notes":
         return read_trials(labels, opened, window_ms=window_ms)
     if window_ms is None:
-        raise ProblemError("window_ms: must say how long the trials are that notes begin, as notes have no end")
+        raise refused("window_ms", ": must say how long the trials are that notes begin, as notes have no end")
     return notes_as_trials(opened, window_ms=window_ms)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import column, mapping, several
+from taxel._base.errors import refused
 from taxel._base.messages import counted, warn
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
@@ -49,8 +50,8 @@ def references(
     # The sources of one file are one recording.
     count = len({(one.path, trial_of(one.name, one.label)) for one in recordings})
     if count > 1 and any(not row.recording for row in table.rows):
-        raise ProblemError(
-            f"{argument} is {source}: names no recording, and there are {count}; must have the column recording"
+        raise refused(
+            argument, f" is {source}: names no recording, and there are {count}; must have the column recording"
         )
     _check_sources(table, argument, recordings)
     named = {one.title: table.named(one.path, trial_of(one.name, one.label), one.label) for one in recordings}
@@ -59,7 +60,7 @@ def references(
     others = [name for name in table.recordings if name not in known]
     if unnamed and (others or len(unnamed) == len(recordings)):
         names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
-        raise ProblemError(f"{argument} is {source}: names no event in {', '.join(unnamed)}; {names}")
+        raise refused(argument, f" is {source}: names no event in {', '.join(unnamed)}; {names}")
     _warn_of_strangers(table, recordings)
     return [_within(table, recording, argument) for recording in recordings]
 
@@ -71,7 +72,7 @@ def _mapped(
     each = several(argument, source)
     if len(each) != len(recordings):
         have = counted(len(recordings), "recording")
-        raise ProblemError(f"{argument} is {counted(len(each), 'mapping')}: must be one for each of {have}")
+        raise refused(argument, f" is {counted(len(each), 'mapping')}: must be one for each of {have}")
     named = [mapping(argument, one) for one in each]
     return [{label: column(f"{argument}[{label!r}]", t, np.int64, "us") for label, t in one.items()} for one in named]
 
@@ -129,8 +130,8 @@ def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]
         labels = {label for label, every in names if row.recording in every}
         if row.source and labels and row.source not in labels:
             there = ", ".join(sorted(labels))
-            raise ProblemError(
-                f"{argument} is {table.path}: {row.text} at {row.t} us is of source {row.source}; there is {there}"
+            raise refused(
+                argument, f" is {table.path}: {row.text} at {row.t} us is of source {row.source}; there is {there}"
             )
 
 
@@ -163,7 +164,7 @@ def _within(table: Labels, recording: Recording, argument: str) -> dict[str, NDA
 
 def _span(recording: Recording) -> str:
     first, last = span_us(recording)
-    more = "" if recording.timed else ", whose pictures are numbered: give --rate-hz"
+    more = "" if recording.timed else ", whose pictures are numbered (rate_hz gives them times)"
     begin = beginning_us(np.array([first]))
     if begin:
         more = f"; it begins {begun(begin)}, {begin} us since 1970, and labels must count from 1970 too"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, number
 from taxel._base.arguments import path as checked_path
+from taxel._base.errors import helped, refused
 from taxel._base.messages import warn
 from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us
@@ -22,7 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
-from taxel.recording.lain import free_of_what_lay, without_what_lay
+from taxel.recording.preload import free_of_preload, without_preload
 from taxel.recording.pressure import quiet_rest
 from taxel.recording.rest import NOISE_FLOOR, by_unit, of_quiet
 from taxel.spikes import to_ms
@@ -39,8 +40,6 @@ _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
 _LEAST_PICTURES = 20
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
-#: What to give where no rest is found.
-_GIVE = "give --tare SECONDS or --tare FILE"
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,16 +121,16 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return TakenRest("unit", zero, begin_us)
     found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
-    if found is not None and found.on:
-        span, said = free_of_what_lay(recording, found)
+    if found is not None and found.preload_at:
+        span, said = free_of_preload(recording, found)
         warn(said, stacklevel=2)
     else:
         span = None if found is None else found.quiet_us
     if span is None:
-        raise ProblemError(
-            f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it; "
-            f"{_GIVE}"
+        error = ProblemError(
+            f"{recording.path}: the rest of its taxels is not known, as no half second is quiet with nothing on it"
         )
+        raise helped(error, "tare", "give")
     return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
 
 
@@ -152,9 +151,10 @@ def given_tare(tare: GivenTare, recording: Recording) -> Tare:
         raise ProblemError(f"{recording.path}: holds nothing to take a tare from")
     first, last = int(source.t[0]), int(source.t[-1])
     if seconds * 2e6 > last - first:
-        raise ProblemError(
-            f"--tare {tare}: more than half of {recording.title}, which lasts {(last - first) / 1e6:g} s; "
-            "give the seconds at its beginning in which nothing was touched"
+        raise refused(
+            "tare",
+            f" is {tare}: more than half of {recording.title}, which lasts {(last - first) / 1e6:g} s; must be the "
+            "seconds at its beginning in which nothing was touched",
         )
     stop = first + int(seconds * 1e6)
     if isinstance(source, Events):
@@ -168,7 +168,7 @@ def check_tare(tare: GivenTare | None) -> None:
     """Refuse what is neither a tare nor a path nor seconds above 0."""
     seconds = None if tare is None else seconds_of(tare)
     if seconds is not None and not 0 < seconds < np.inf:
-        raise ProblemError(f"--tare {tare}: must be seconds above 0, or a file")
+        raise refused("tare", f" is {tare}: must be seconds above 0, or a file")
 
 
 def seconds_of(tare: GivenTare) -> float | None:
@@ -196,8 +196,8 @@ def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frame
     held = held_by_tare([Example(source, {}, measured)], NOISE_FLOOR)
     if held >= TOUCH:
         warn(
-            f"--tare {tare}: the beginning of {recording.title} is not quiet but holds a touch of {held} taxels; give "
-            "the seconds before it, or --tare FILE",
+            f"tare is {tare}: the beginning of {recording.title} is not quiet but holds a touch of {held} taxels; give "
+            "the seconds before it, or a file",
             stacklevel=3,
         )
 
@@ -214,7 +214,7 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return zero
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
-    tare, said = without_what_lay(recording, first)
+    tare, said = without_preload(recording, first)
     if said:
         warn(said, stacklevel=2)
     if tare is not None:
@@ -234,7 +234,8 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
         ends += [t for t, start in source.markers if start and t > first]
     if not ends or min(ends) - first < _LEAST_REST_US:
         what = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
-        raise ProblemError(f"{recording.path}: holds {what}, from which to take the taxels' rest; {_GIVE}")
+        error = ProblemError(f"{recording.path}: holds {what}, from which to take the taxels' rest")
+        raise helped(error, "tare", "give")
     return _measured(recording, source, min(ends))
 
 
@@ -260,7 +261,7 @@ def _measured(recording: Recording, source: Events | Frames, stop_us: int, start
             warn(
                 f"{recording.path}: the rest of {unknown} of {np.count_nonzero(present)} taxels is not known, as none "
                 f"of their changes lies in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are left "
-                "out; start the recording before the board, which then sends all values, or give --tare FILE",
+                "out; start the recording before the board, which then sends all values, or give a tare's file",
                 stacklevel=2,
             )
     return tare

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
+from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, warn
-from taxel._base.progress import Progress, lines_to
+from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, PlainScore, Recipe, choose, judge, recipes, score
 from taxel.detect.advice import advised, fallen
@@ -25,7 +26,7 @@ from taxel.detect.loads import clock_of
 from taxel.detect.plain_score import floor_of, plain_score
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import score_together
-from taxel.detect.training import UNFELT, Trained, trained
+from taxel.detect.training import Trained, trained
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.open_options import sensors_of
@@ -89,30 +90,29 @@ def train(
     ('contact',)
     """
     asked = TrainOptions() if options is None else instance("options", options, TrainOptions)
-    update = lines_to(progress)
+    update = reporting(progress)
     with collected() as warnings:
         training = _train(sensors_of(recordings), labels, asked, update)
     return replace(training, warned=tuple(warnings))
 
 
-def _train(
-    recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Callable[[str], object]
-) -> Training:
+def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Progress) -> Training:
     opened = labelled_trials(labels, recordings)
     labelled = references(labels, opened)
     if not any(labelled):
-        table = "; give --labels FILE, a table label,t_us" if labels == "notes" else ""
         titles = ", ".join(one.title for one in opened)
-        raise ProblemError(f"labels is {_named(labels)}: names no event in {titles}{table}")
+        if labels == "notes":
+            raise helped(ProblemError(f"notes: names no event in {titles}"), "labels", "give")
+        raise refused("labels", f" is {_named(labels)}: names no event in {titles}")
     names = sorted({label for events in labelled for label in events})
     if options.recipe is None and "encoder.name" not in options.changes:
         recipe, why = recipes.chosen(recorded(opened[0]), names)
-        update(f"recipe {recipe}, chosen for {why}")
+        update(f"recipe {recipe}, chosen for {why}", 0, 0)
         options = replace(options, recipe=recipe)
     plan = options._plan(names)
     assert plan is not None
     if options.search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
-        raise ProblemError("--search: the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
+        raise refused("search", ": the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
     examples = _examples(opened, labelled, options.tare, plan)
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
@@ -169,7 +169,7 @@ class _Work:
     opened: Sequence[Recording]
     examples: Sequence[Example]
     options: TrainOptions
-    update: Callable[[str], object]
+    update: Progress
 
     def training(self, plan: Recipe) -> Training:
         """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
@@ -181,8 +181,8 @@ class _Work:
         try:
             return self._training(plan)
         except ProblemError as error:
-            if fall and str(error).endswith(UNFELT):
-                raise ProblemError(f"{str(error).removesuffix(UNFELT)}: {fall}") from None
+            if fall and error.hint == "unfelt":
+                raise ProblemError(f"{error.args[0]}: {fall}") from None
             names = sorted({label for one in self.examples for label in one.labels})
             off = off_by(checked(self.examples), names, floor_of(plan.encoder))
             said = (f"{label}: {one}" for label, one in off.items())
@@ -190,7 +190,7 @@ class _Work:
 
     def _training(self, plan: Recipe) -> Training:
         folds, search, window_ms = self.options.folds, self.options.search, self.options.window_ms
-        count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "--folds 0")
+        count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "folds is 0")
         scored = None
         if count:
             registers = self.opened[0].registers
@@ -227,7 +227,7 @@ class _Work:
         """Return the outcomes of the readout on the recordings that it was trained on."""
         readout, outcomes = made.readout, []
         for one, example in zip(self.opened, self.examples, strict=True):
-            self.update(f"scoring on {one.title}")
+            self.update(f"scoring on {one.title}", 0, 0)
             truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
             detections, outside = run_counting(readout, one, tare=example.tare)
             own = score(detections, truth, self.options.window_ms)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from taxel._base.arguments import finite, flag, mapping, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.times import beginning_us
-from taxel._core import ProblemError
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained
 from taxel.detect.advice import Advice
 from taxel.detect.recipe import changed, with_floor
@@ -72,7 +72,7 @@ class TrainOptions:
         flag("search", self.search)
         finite("window_ms", self.window_ms, "ms", least=0.0)
         if self.folds is not None and whole("folds", self.folds, 0) == 1:
-            raise ProblemError("--folds 1: must be 2 or more, or 0 for none")
+            raise refused("folds", " is 1: must be 2 or more, or 0 for none")
         self._plan()
 
     def _plan(self, labels: Sequence[str] | None = None, noise_floor: float | None = None) -> Recipe | None:
@@ -166,6 +166,7 @@ class Training:
             "score": self.scored.together.to_dict(),
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
             "helps": {label: one.helps for label, one in self.advice.items()},
+            "options": sorted({one.option for one in self.advice.values() if one.option is not None}),
             "warnings": list(self.warnings),
         }
         if self.made.alignments:
@@ -214,7 +215,7 @@ class Training:
         said = f"of each of {len(lengths)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long"
         if len(lengths) == 1:
             said = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
-        yield f"tare: {said}; --tare gives another"
+        yield f"tare: {said}; another can be given"
 
     def _scores(self, label: str) -> Iterator[str]:
         """Yield how the neuron and the plain rule of a label scored on the same labels."""
@@ -248,7 +249,7 @@ class Training:
 
     def _advised(self) -> Iterator[str]:
         """Yield what may help each label of which many are missed or false."""
-        for label, (helps, because) in self.advice.items():
+        for label, (helps, because, _) in self.advice.items():
             one = self.scored.together[label]
             many = f"{one.missed / one.events:.0%} missed, {one.false / one.events:.0%} false"
             yield f"{label}: {many}; what may help is {helps}: {because}"

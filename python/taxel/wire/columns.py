@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, whole
 from taxel._base.columns import frozen
+from taxel._base.errors import refused
 from taxel._base.messages import counted
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 
@@ -64,7 +64,7 @@ class Columns:
             self.p: NDArray[np.bool_] = memory(n, np.bool_)
             self.present: NDArray[np.bool_] = memory(n, np.bool_)
         except MemoryError:
-            raise ProblemError(f"rows is {n}: there is no memory for so many") from None
+            raise refused("rows", f" is {n}: there is no memory for so many") from None
 
     def __len__(self) -> int:
         return len(self.t)

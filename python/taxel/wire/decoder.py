@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import buffer_bytes, column, flag, instance, text, whole
+from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -80,7 +81,7 @@ def decode(
     room, own = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
     if decoder.version == 2:
         if lengths is not None:
-            raise ProblemError("lengths: each datagram of version 2 has its own before it; leave them out")
+            raise refused("lengths", ": each datagram of version 2 has its own before it; leave them out")
         filled = _core.decode_datagrams(stream, decoder.array._parts(), room._parts())
     elif lengths is not None:
         filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())

@@ -10,6 +10,7 @@ import numpy as np
 
 from taxel import _core
 from taxel._base.arguments import finite, flag, instance, several, shown, text, whole
+from taxel._base.errors import refused
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.wire.command import Command
@@ -170,7 +171,7 @@ class Registers:
         """
         eight = [whole(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(several("words", words))]
         if len(eight) != 8:
-            raise ProblemError(f"words: {len(eight)}, must be 8")
+            raise refused("words", f": {len(eight)}, must be 8")
         held = _core.registers_of_words(eight, whole("channels", channels, 0, 255))
         return cls._of(held, Array._of(array))
 
@@ -332,7 +333,7 @@ def _raw(name: str, value: object) -> int:
         if not 0 <= units < 2**32:
             raise DeviceError(f"{name} {shown(value)} us does not fit its bits (rule 4)")
         if not abs(units - np.rint(units)) < 1e-6:
-            raise ProblemError(f"{name} is {shown(value)} us: must be a whole multiple of 0.01 us")
+            raise refused(name, f" is {shown(value)} us: must be a whole multiple of 0.01 us")
         return int(np.rint(units))
     if _MANUAL.get(name, name) in _FLAGS:
         return int(flag(name, bool(value) if isinstance(value, int) and value in (0, 1) else value))
@@ -344,7 +345,7 @@ def _raw(name: str, value: object) -> int:
         if field is None:
             raise
         least, most = (field[end] - (field["offset"] if name in _MANUAL else 0) for end in ("least", "greatest"))
-        raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {least} to {most}") from None
+        raise refused(name, f" is {shown(value)}: must be a whole number from {least} to {most}") from None
 
 
 #: The length of the board's frames at reset, us.

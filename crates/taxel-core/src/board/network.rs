@@ -80,7 +80,7 @@ impl Network {
         let shares = faults.shares();
         for (name, share) in shares {
             if !(0.0..=1.0).contains(&share) {
-                return Err(problem!("{name} is {share}: must be a share, 0 to 1"));
+                return Err(problem!(name; " is {share}: must be from 0 to 1"));
             }
         }
         let all: f64 = shares.iter().map(|(_, share)| share).sum();

@@ -31,7 +31,7 @@ pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(
 /// `Problem` if the tare is not between 0 and a minute.
 pub fn opening(registers: &Registers, tare_ms: f64) -> Result<Vec<(u64, Command)>> {
     if !(0.0..=60_000.0).contains(&tare_ms) {
-        return Err(problem!("tare of {tare_ms} ms: must be 0 to 60000"));
+        return Err(problem!("tare_ms"; " is {tare_ms} ms: must be from 0 to 60000"));
     }
     let start = 1 + (us(tare_ms) / registers.frame_us()).ceil() as u64;
     let mut commands = vec![];

@@ -56,7 +56,7 @@ impl Adaptive {
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.steepest > self.gentlest {
-            return Err(problem!("steepest is {}: must be at most gentlest, {}", self.steepest, self.gentlest));
+            return Err(problem!("steepest"; " is {}: must be at most gentlest, {}", self.steepest, self.gentlest));
         }
         self.converter.check()?;
         self.with(self.steepest).check()
@@ -102,10 +102,10 @@ impl Adaptive {
         self.check()?;
         let taxels = rows * columns;
         if taxels == 0 || !volts.len().is_multiple_of(taxels) {
-            return Err(problem!("volts: {} of them, must be whole frames of {rows} x {columns}", volts.len()));
+            return Err(problem!("volts"; ": {} of them, must be whole frames of {rows} x {columns}", volts.len()));
         }
         if !(period_us > 0.0 && period_us.is_finite()) {
-            return Err(problem!("period_us is {period_us} us: must be above 0"));
+            return Err(problem!("period_us"; " is {period_us} us: must be above 0"));
         }
         let frames = volts.len() / taxels;
         let end_us = frames.saturating_sub(1) as f64 * period_us;

@@ -61,12 +61,12 @@ impl Converter {
         let least = self.wait_us + f64::from(self.ramp) / TICKS_A_US;
         // The board's own times are whole numbers of 10 ns: sums of them may be off in the last place.
         if step_us < least - 1e-9 {
-            return Err(problem!("step_us is {step_us} us: must be {least:.4} or more, for wait_us and the ramp"));
+            return Err(problem!("step_us"; " is {step_us} us: must be {least:.4} or more, for wait_us and the ramp"));
         }
         let least = steps as f64 * step_us;
         if line_us < least - 1e-9 {
             return Err(problem!(
-                "line_us is {line_us} us: must be {least} or more, for {steps} steps of {step_us} us"
+                "line_us"; " is {line_us} us: must be {least} or more, for {steps} steps of {step_us} us"
             ));
         }
         Ok(())
@@ -147,13 +147,13 @@ impl Converter {
         }
         if !(every_us > 0.0 && every_us.is_finite() && stop_us / every_us <= MOST_POINTS) {
             return Err(problem!(
-                "every_us is {every_us} us: must be above 0 and finite, with at most {MOST_POINTS:e} points in {stop_us} us"
+                "every_us"; " is {every_us} us: must be above 0 and finite, with at most {MOST_POINTS:e} points in {stop_us} us"
             ));
         }
         let most_us = MOST_POINTS * self.step_us;
         if !(0.0..=most_us).contains(&stop_us) {
             return Err(problem!(
-                "stop_us is {stop_us} us: must be from 0 to {most_us}, which are {MOST_POINTS:e} steps"
+                "stop_us"; " is {stop_us} us: must be from 0 to {most_us}, which are {MOST_POINTS:e} steps"
             ));
         }
         let (ramp_us, half) = (f64::from(self.ramp) / TICKS_A_US, 0.5 * self.hysteresis_v);

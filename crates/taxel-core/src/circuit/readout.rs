@@ -16,7 +16,7 @@ const LINE: Range = Range::FROM_0.at_most(1e9);
 
 fn wire_is_sound(wire_ohm: f64) -> Result<()> {
     if wire_ohm > 0.0 && wire_ohm < LEAST_WIRE_OHM {
-        return Err(problem!("wire_ohm is {wire_ohm} ohm: must be 0, or from {LEAST_WIRE_OHM} to 1e9"));
+        return Err(problem!("wire_ohm"; " is {wire_ohm} ohm: must be 0, or from {LEAST_WIRE_OHM} to 1e9"));
     }
     Ok(())
 }

@@ -38,14 +38,14 @@ impl Pictures {
     pub(super) fn count(&self, size: usize, frame_us: f64) -> Result<usize> {
         let count = self.values.len() / size;
         if count == 0 || self.values.len() != count * size {
-            return Err(Error::Scene(format!("{} values: must be whole pictures of {size}", self.values.len())));
+            return Err(Error::scene(format!("{} values: must be whole pictures of {size}", self.values.len())));
         }
         if let Some(value) = self.values.iter().find(|v| !(0.0..=1.0).contains(*v)) {
-            return Err(Error::Scene(format!("picture value {value}: must be a share of the ramp, 0 to 1")));
+            return Err(Error::scene(format!("picture value {value}: must be a share of the ramp, 0 to 1")));
         }
         if !(self.period_us.is_finite() && self.period_us >= frame_us) {
             let period = self.period_us;
-            return Err(Error::Scene(format!("pictures each {period} us: must be {frame_us} (a frame) or more")));
+            return Err(Error::scene(format!("pictures each {period} us: must be {frame_us} (a frame) or more")));
         }
         Ok(count)
     }

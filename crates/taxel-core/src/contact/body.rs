@@ -229,7 +229,7 @@ impl Body {
             Move::Rolled(along) => {
                 along.check(&moves("rolled"))?;
                 if self.shape.turns().0 + self.shape.turns().1 == 0.0 {
-                    return Err(Error::Scene(format!("{place}: only a sphere or a cylinder rolls; let it be slid")));
+                    return Err(Error::scene(format!("{place}: only a sphere or a cylinder rolls; let it be slid")));
                 }
             }
             Move::Slid(along) => along.check(&moves("slid"))?,
@@ -240,7 +240,7 @@ impl Body {
             Move::Pressed(_) => false,
         };
         if free && self.mass_g().is_none() {
-            return Err(Error::Scene(format!(
+            return Err(Error::scene(format!(
                 "{place}: mass_g is missing: a body that moves freely needs one{}",
                 if self.shape.volume_mm3().is_some() { ", or a material" } else { "" }
             )));
@@ -258,7 +258,7 @@ impl Press {
         match (self.peak_n, self.depth_mm) {
             (Some(force), None) => within(place, "peak_n", force, "N", Range::ABOVE_0.at_most(2_000.0))?,
             (None, Some(depth)) => within(place, "depth_mm", depth, "mm", Range::ABOVE_0)?,
-            _ => return Err(Error::Scene(format!("{place}: must have peak_n or depth_mm, and not both"))),
+            _ => return Err(Error::scene(format!("{place}: must have peak_n or depth_mm, and not both"))),
         }
         within(place, "speed_mm_s", self.speed_mm_s, "mm/s", HAND)?;
         within(place, "hold_ms", self.hold_ms, "ms", WAIT)?;

@@ -60,10 +60,10 @@ impl Motion {
         for (n, body) in scene.bodies.iter().enumerate() {
             let push = Push::of(&scene.foam, body, layer.as_deref_mut(), stop)?;
             let mut trajectory = Trajectory::new(scene, body, push, step_us * 1e-3, stop);
-            trajectory.run().and_then(|()| trajectory.stays_on(array, step_us)).map_err(|error| match error {
-                Error::Scene(text) if scene.bodies.len() > 1 => Error::Scene(format!("bodies[{n}]: {text}")),
-                other => other,
-            })?;
+            trajectory
+                .run()
+                .and_then(|()| trajectory.stays_on(array, step_us))
+                .map_err(|error| if scene.bodies.len() > 1 { error.of(&format!("bodies[{n}]")) } else { error })?;
             trajectories.push(trajectory);
         }
         let over = trajectories.iter().map(Trajectory::steps).max().unwrap_or(0);
@@ -104,7 +104,7 @@ impl Motion {
 /// Refuses a step that is none, or in so many of which the scene would be played that it would not end.
 fn check_step(scene: &Scene, step_us: f64) -> Result<()> {
     if !(step_us.is_finite() && step_us > 0.0 && step_us <= 1000.0) {
-        return Err(Error::Scene(format!("step is {step_us} us: must be above 0, at most 1000")));
+        return Err(Error::scene(format!("step is {step_us} us: must be above 0, at most 1000")));
     }
     let least_us = us(scene.least_ms());
     if least_us / step_us > MOST_STEPS as f64 { Err(too_many(step_us)) } else { Ok(()) }

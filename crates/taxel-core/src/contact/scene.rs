@@ -69,7 +69,7 @@ fn is_one(value: &u16) -> bool {
 const WIDENS: f64 = 0.1;
 
 pub(super) fn columns_take_one_ball() -> Error {
-    Error::Scene(format!(
+    Error::scene(format!(
         "surface is \"columns\": must be \"layer\" for all but one sphere, thicker than the foam, that moves straight up and \
          down on foam with poisson up to {WIDENS}"
     ))
@@ -93,7 +93,7 @@ impl Scene {
         let width = f64::from(array.columns - 1) * pitch_mm - 2.0 * MARGIN_MM;
         let height = f64::from(array.rows - 1) * pitch_mm - 2.0 * MARGIN_MM;
         if width < 0.0 || height < 0.0 {
-            return Err(Error::Scene(format!(
+            return Err(Error::scene(format!(
                 "array of {} x {} taxels, {pitch_mm} mm apart: too small for scenes that keep {MARGIN_MM} mm from its edge",
                 array.rows, array.columns
             )));
@@ -161,19 +161,19 @@ impl Scene {
         within("scene", "slant_deg", self.slant_deg, "degrees", Range::within(0.0, 80.0))?;
         within("scene", "downhill_deg", self.downhill_deg, "degrees", Range::FINITE)?;
         if self.bodies.is_empty() {
-            return Err(Error::Scene("scene: bodies is empty: must be one or more".to_owned()));
+            return Err(Error::scene("scene: bodies is empty: must be one or more"));
         }
         for (n, body) in self.bodies.iter().enumerate() {
             let place = format!("bodies[{n}]");
             body.check(&place)?;
             let last = |count: u16| Range::within(0.0, f64::from(count - 1) * pitch_mm);
-            let off = |error: Error| Error::Scene(format!("{error} (the body is off the array)"));
+            let off = |error: Error| Error::scene(format!("{error} (the body is off the array)"));
             within(&place, "x_mm", body.x_mm, "mm", last(array.columns)).map_err(off)?;
             within(&place, "y_mm", body.y_mm, "mm", last(array.rows)).map_err(off)?;
         }
         if self.surface == Surface::Columns {
             if self.cells_per_pitch > 1 {
-                return Err(Error::Scene(format!(
+                return Err(Error::scene(format!(
                     "scene: cells_per_pitch is {}: must be 1 with surface \"columns\", which are no cells; take \"layer\"",
                     self.cells_per_pitch
                 )));

@@ -117,7 +117,7 @@ impl Taxels {
     pub fn new(sensor: &Sensor, count: usize, ramp: u16, seed: u64) -> Result<Self> {
         sensor.check()?;
         if ramp == 0 {
-            return Err(Error::Scene("ramp is 0 ticks: must be 1 or more".to_owned()));
+            return Err(Error::scene("ramp is 0 ticks: must be 1 or more"));
         }
         let mut draw = StdRng::seed_from_u64(seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut draw) };

@@ -71,7 +71,7 @@ impl Shape {
                 within(place, "pitch_mm", *pitch_mm, "mm", size)?;
                 let columns = heights_mm.first().map_or(0, Vec::len);
                 if columns < 2 || heights_mm.len() < 2 || heights_mm.iter().any(|row| row.len() != columns) {
-                    return Err(crate::Error::Scene(format!(
+                    return Err(crate::Error::scene(format!(
                         "{place}: heights_mm has {} rows, the first of {columns}: must be 2 or more rows of one length, 2 or more",
                         heights_mm.len()
                     )));

@@ -50,7 +50,7 @@ impl Prepared {
         match act {
             Act::Silence { ms } => {
                 if !(0.0..=86_400_000.0).contains(ms) {
-                    return Err(Error::Scene(format!("silence of {ms} ms: must be 0 to a day")));
+                    return Err(Error::scene(format!("silence of {ms} ms: must be 0 to a day")));
                 }
                 let part = Part { frames: (us(*ms) / frame_us).round() as usize, what: What::Silence };
                 Ok(Self { part, contacts: vec![], narrow: None })
@@ -60,7 +60,7 @@ impl Prepared {
                 let mut layer = Motion::layer(scene, array, stop)?;
                 let mut motion = Motion::on(scene, array, layer.as_mut(), frame_us / GROUPS as f64, stop)?;
                 if motion.len() < 2 {
-                    return Err(Error::Scene(format!("scene: shorter than a quarter of a frame, {frame_us} us")));
+                    return Err(Error::scene(format!("scene: shorter than a quarter of a frame, {frame_us} us")));
                 }
                 let (contacts, narrow) = (std::mem::take(&mut motion.contacts), motion.narrow.take());
                 let frames = motion.len().div_ceil(GROUPS);
@@ -104,19 +104,16 @@ impl Stage {
     /// `Scene` where an act cannot be played (it is numbered from 0), or taxels and array differ in size; `Interrupted`.
     pub fn new(array: &Array, taxels: Taxels, frame_us: f64, acts: &[Act], stop: Stop<'_>) -> Result<Self> {
         if taxels.len() != array.len() {
-            return Err(Error::Scene(format!("{} taxels: the array has {}", taxels.len(), array.len())));
+            return Err(Error::scene(format!("{} taxels: the array has {}", taxels.len(), array.len())));
         }
         if !(frame_us.is_finite() && frame_us > 0.0 && frame_us <= 4_000.0) {
-            return Err(Error::Scene(format!("frame is {frame_us} us: must be above 0, at most 4000")));
+            return Err(Error::scene(format!("frame is {frame_us} us: must be above 0, at most 4000")));
         }
         let clean = (0..taxels.len()).map(|k| taxels.ticks(k, 0.0)).collect();
         let (parts, contacts, narrow) = (vec![], vec![], vec![]);
         let mut stage = Self { taxels, frame_us, parts, contacts, narrow, part: 0, frame: 0, clean };
         for (n, act) in acts.iter().enumerate() {
-            stage.push(Prepared::of(array, frame_us, act, stop).map_err(|error| match error {
-                Error::Scene(text) => Error::Scene(format!("act {n}: {text}")),
-                other => other,
-            })?);
+            stage.push(Prepared::of(array, frame_us, act, stop).map_err(|error| error.of(&format!("act {n}")))?);
         }
         Ok(stage)
     }
@@ -165,7 +162,7 @@ impl Stage {
     pub fn force_n(&self) -> Result<Vec<f32>> {
         if self.frames() > MOST_FORCES {
             let frames = self.frames();
-            return Err(Error::Scene(format!("acts last {frames} frames: must be at most {MOST_FORCES}, split them")));
+            return Err(Error::scene(format!("acts last {frames} frames: must be at most {MOST_FORCES}, split them")));
         }
         let mut force = Vec::with_capacity(self.frames());
         for part in &self.parts {
@@ -185,7 +182,7 @@ impl Stage {
     /// `Scene` where `ticks` has another length than the array; `Interrupted`.
     pub fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool> {
         if ticks.len() != self.clean.len() {
-            return Err(Error::Scene(format!("room for {} ticks: must be {}", ticks.len(), self.clean.len())));
+            return Err(Error::scene(format!("room for {} ticks: must be {}", ticks.len(), self.clean.len())));
         }
         while self.parts.get(self.part).is_some_and(|p| self.frame == p.frames) {
             // The tables of a part that is over are freed; its number of frames is still needed.

@@ -40,7 +40,7 @@ pub struct Track {
 
 /// The error of a scene that has more than [`MOST_STEPS`].
 pub(super) fn too_many(step_us: f64) -> Error {
-    Error::Scene(format!("step is {step_us} us: must be longer, the scene has more than {MOST_STEPS} of them"))
+    Error::scene(format!("step is {step_us} us: must be longer, the scene has more than {MOST_STEPS} of them"))
 }
 
 /// A body's state, and what of it has been recorded since the scene's start.
@@ -111,7 +111,7 @@ impl<'a> Trajectory<'a> {
                         self.fall_for(*rest_ms)?;
                         if self.contacts.is_empty() {
                             let fall_ms = (2.0 * height_mm / GRAVITY).sqrt();
-                            return Err(Error::Scene(format!(
+                            return Err(Error::scene(format!(
                                 "the body is lifted {rest_ms} ms after it was let go, before it lands: it falls for {fall_ms:.0} ms; rest_ms must be more"
                             )));
                         }
@@ -185,7 +185,7 @@ impl<'a> Trajectory<'a> {
             .filter(touches)
             .find(|&k| !(on(track.x_mm[k], array.columns) && on(track.y_mm[k], array.rows)));
         match (off, self.contacts.first()) {
-            (Some(k), Some(first)) => Err(Error::Scene(format!(
+            (Some(k), Some(first)) => Err(Error::scene(format!(
                 "the body {does} off the array {:.0} ms after it was set down, at x {:.0} mm, y {:.0} mm; begin further in, or stop earlier (for_ms)",
                 1e-3 * (k as f64 * step_us - first.start_us),
                 track.x_mm[k],
@@ -199,7 +199,7 @@ impl<'a> Trajectory<'a> {
         if deep < self.push.floor_mm() {
             return Ok(());
         }
-        Err(Error::Scene(format!(
+        Err(Error::scene(format!(
             "the body is to be pressed through all of the {} mm of foam; press it less, or take stiffer foam",
             self.scene.foam.thickness_mm
         )))
@@ -262,7 +262,7 @@ impl<'a> Trajectory<'a> {
                 return Ok(());
             }
             if f64::from(self.now - began) * self.inner_ms > PATIENCE_MS {
-                return Err(Error::Scene(format!(
+                return Err(Error::scene(format!(
                     "the body comes to rest after {} impacts: it cannot be caught after {after}; drop it from higher or catch it earlier",
                     self.contacts.len()
                 )));
@@ -290,7 +290,7 @@ impl<'a> Trajectory<'a> {
         }
         let depth = self.depth + dt * speed;
         if depth >= self.push.floor_mm() {
-            return Err(Error::Scene(format!(
+            return Err(Error::scene(format!(
                 "the body bottoms out: {:?} g at {:.2} m/s crush {} mm of foam at {} kPa; drop it from lower, or take stiffer foam",
                 (10.0 * mass).round() / 10.0,
                 speed,

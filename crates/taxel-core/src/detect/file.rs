@@ -14,9 +14,9 @@ const VERSION: u64 = 1;
 ///
 /// `Format`, beginning with `what`, if the text is not JSON, or if its format or version is another.
 pub(super) fn parts(what: &str, text: &str, formats: &[&'static str]) -> Result<(&'static str, Value)> {
-    let format = |said: String| Error::Format(format!("{what}: {said}"));
+    let format = |message: String| Error::format(format!("{what}: {message}"));
     let names = formats.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
-    let mut value: Value = reading::from_text(text).map_err(|unfit| Error::Format(unfit.of(what)))?;
+    let mut value: Value = reading::from_text(text).map_err(|unfit| Error::format(unfit.of(what)))?;
     let Some(object) = value.as_object_mut() else {
         return Err(format("not a JSON object".to_owned()));
     };
@@ -41,7 +41,7 @@ pub(super) fn parts(what: &str, text: &str, formats: &[&'static str]) -> Result<
 /// `Problem` if it has no name.
 pub(super) fn check_unit(unit: Option<&str>) -> Result<()> {
     match unit {
-        Some(name) if name.trim().is_empty() => Err(problem!("unit is empty: must be a name, or left out")),
+        Some(name) if name.trim().is_empty() => Err(problem!("unit"; " is empty: must be a name, or left out")),
         _ => Ok(()),
     }
 }

@@ -59,7 +59,7 @@ impl FrameClock {
     pub fn new(frames: impl Into<FrameTime>) -> Result<Self> {
         let FrameTime { period_us, stamp_us } = frames.into();
         if !(1.0..=3.6e9).contains(&period_us) {
-            return Err(problem!("frame_us is {period_us}: must lie between 1 us and one hour, 3600000000"));
+            return Err(problem!("frame_us"; " is {period_us}: must be from 1 to 3600000000 us"));
         }
         let stamp_ns = i128::from(stamp_us) * 1000;
         Ok(Self { period_ns: (period_us * 1000.0).round() as i128, stamp_ns, picture: None })

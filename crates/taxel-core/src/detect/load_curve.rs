@@ -109,7 +109,7 @@ impl LoadCurve {
     /// `Problem` for another quantity.
     pub fn at_age(&self, age_ms: f64) -> Result<Vec<Decision>> {
         if self.quantity != Quantity::Area {
-            return Err(problem!("ages are those of touches, which begin by area: this is another quantity"));
+            return Err(problem!("ages"; " are those of touches, which begin by area: this is another quantity"));
         }
         Ok(self.run(Limits::at_age(0, f64::INFINITY, age_ms), self.changes.iter()))
     }

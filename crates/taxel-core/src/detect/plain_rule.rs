@@ -66,14 +66,14 @@ impl PlainRule {
     pub fn check(&self) -> Result<()> {
         above_0("threshold", self.threshold, "")?;
         if !(self.release > 0.0 && self.release <= 1.0) {
-            return Err(problem!("release is {}: must be above 0 and at most 1", self.release));
+            return Err(problem!("release"; " is {}: must be above 0 and at most 1", self.release));
         }
         if !(1..=MOST_FRAMES).contains(&self.frames) {
-            return Err(problem!("frames is {}: must lie between 1 and {MOST_FRAMES}", self.frames));
+            return Err(problem!("frames"; " is {}: must be from 1 to {MOST_FRAMES}", self.frames));
         }
         if let Some(age) = self.age_ms {
             if !(0.0..=LATEST_AGE_MS).contains(&age) {
-                return Err(problem!("age_ms is {age}: must lie between 0 and {LATEST_AGE_MS}"));
+                return Err(problem!("age_ms"; " is {age}: must be from 0 to {LATEST_AGE_MS}"));
             }
             if self.release < 1.0 || self.frames > 1 {
                 return Err(problem!(
@@ -84,16 +84,16 @@ impl PlainRule {
             }
         }
         if !(self.noise_floor >= 0.0 && self.noise_floor.is_finite()) {
-            return Err(problem!("noise_floor is {}: must be 0 or more, and finite", self.noise_floor));
+            return Err(problem!("noise_floor"; " is {}: must be 0 or more, and finite", self.noise_floor));
         }
         file::check_unit(self.unit.as_deref())?;
         match &self.labels {
-            [None, None] => return Err(problem!("labels are both left out: give one or both")),
+            [None, None] => return Err(problem!("labels"; " are both left out: give one or both")),
             [first, second] if first == second => {
-                return Err(problem!("labels are both {}: must differ", first.as_deref().unwrap_or_default()));
+                return Err(problem!("labels"; " are both {}: must differ", first.as_deref().unwrap_or_default()));
             }
             labels if labels.iter().flatten().any(|label| label.trim().is_empty()) => {
-                return Err(problem!("labels: one is empty: must be a name, or left out"));
+                return Err(problem!("labels"; ": one is empty: must be a name, or left out"));
             }
             _ => {}
         }
@@ -153,8 +153,8 @@ impl PlainRule {
 
     /// As [`PlainRule::from_json`], from the contents of the file without format and version.
     pub(super) fn from_parts(parts: Value) -> Result<Self> {
-        let rule: Self = reading::from_value(parts).map_err(|unfit| Error::Format(unfit.of("plain rule")))?;
-        rule.check().map_err(|e| Error::Format(format!("plain rule: {e}")))?;
+        let rule: Self = reading::from_value(parts).map_err(|unfit| Error::format(unfit.of("plain rule")))?;
+        rule.check().map_err(|e| Error::format(format!("plain rule: {e}")))?;
         Ok(rule)
     }
 

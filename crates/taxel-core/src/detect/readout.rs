@@ -11,7 +11,7 @@ use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeu
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
-use crate::{Array, Result, SpikeKind, problem};
+use crate::{Array, Hint, Result, SpikeKind, problem};
 
 mod file;
 #[cfg(test)]
@@ -76,34 +76,31 @@ impl Readout {
         if self.neurons.is_empty() {
             return Err(problem!("readout without a neuron: needs one or more"));
         }
-        for (label, one) in &self.neurons {
+        for (label, cell) in &self.neurons {
             if label.trim().is_empty() {
                 return Err(problem!("a neuron without a name: must have a label"));
             }
-            one.neuron.check().map_err(|error| error.of(label))?;
-            self.encoder_of(one).map_err(|error| error.of(label))?;
-            if one.neuron.time != self.time {
-                let (its, mine) = (word(&one.neuron.time), word(&self.time));
+            cell.neuron.check().map_err(|error| error.of(label))?;
+            self.encoder_of(cell).map_err(|error| error.of(label))?;
+            if cell.neuron.time != self.time {
+                let (its, mine) = (word(&cell.neuron.time), word(&self.time));
                 return Err(problem!("{label}: trained for time {its}, this readout is for time {mine}"));
             }
-            if one.neuron.after_spike != self.after_spike {
-                let (its, mine) = (word(&one.neuron.after_spike), word(&self.after_spike));
+            if cell.neuron.after_spike != self.after_spike {
+                let (its, mine) = (word(&cell.neuron.after_spike), word(&self.after_spike));
                 return Err(problem!("{label}: trained for after_spike {its}, this readout is for after_spike {mine}"));
             }
-            if !(0.0..=LONGEST_DELAY_MS).contains(&one.delay_ms) {
-                return Err(problem!(
-                    "{label}: delay_ms is {}: must lie between 0 and {LONGEST_DELAY_MS}",
-                    one.delay_ms
-                ));
+            if !(0.0..=LONGEST_DELAY_MS).contains(&cell.delay_ms) {
+                return Err(problem!("{label}: delay_ms is {}: must be from 0 to {LONGEST_DELAY_MS}", cell.delay_ms));
             }
-            if let Some(n) = one.weights.iter().position(|&w| !is_weight(w)) {
-                return Err(no_weight(&format!("{label}: weights[{n}]"), one.weights[n]));
+            if let Some(n) = cell.weights.iter().position(|&w| !is_weight(w)) {
+                return Err(no_weight(&format!("{label}: weights[{n}]"), cell.weights[n]));
             }
             if let Some(array) = &self.array {
-                self.check_weights(label, one, array)?;
+                self.check_weights(label, cell, array)?;
             }
             match self.seen.get(label) {
-                Some(seen) => seen.check(one.weights.len()).map_err(|error| error.of(label))?,
+                Some(seen) => seen.check(cell.weights.len()).map_err(|error| error.of(label))?,
                 None if self.seen.is_empty() => {}
                 None => return Err(problem!("{label}: seen has no ranges of its inputs, as other neurons have")),
             }
@@ -116,42 +113,44 @@ impl Readout {
 
     fn check_delays(&self) -> Result<()> {
         if self.delays_ms.is_empty() {
-            return Err(problem!("delays_ms is empty: must hold one delay or more"));
+            return Err(problem!("delays_ms"; " is empty: must hold one delay or more"));
         }
         for (k, &delay) in self.delays_ms.iter().enumerate() {
             if !(0.0..=LONGEST_DELAY_MS).contains(&delay) {
-                return Err(problem!("delays_ms[{k}] is {delay}: must lie between 0 and {LONGEST_DELAY_MS}"));
+                return Err(problem!("delays_ms"; "[{k}] is {delay}: must be from 0 to {LONGEST_DELAY_MS}"));
             }
             if k > 0 && delay <= self.delays_ms[k - 1] {
-                return Err(problem!("delays_ms[{k}] is {delay}, after {}: must ascend", self.delays_ms[k - 1]));
+                return Err(problem!("delays_ms"; "[{k}] is {delay}, after {}: must ascend", self.delays_ms[k - 1]));
             }
         }
         Ok(())
     }
 
     /// The encoder whose trains a neuron receives: the readout's own, or some of its parts.
-    fn encoder_of(&self, one: &TrainedNeuron) -> Result<Cow<'_, Encoder>> {
-        match (&self.encoder, &*one.inputs) {
+    fn encoder_of(&self, cell: &TrainedNeuron) -> Result<Cow<'_, Encoder>> {
+        match (&self.encoder, &*cell.inputs) {
             (own, []) => Ok(Cow::Borrowed(own)),
             (Encoder::Composite(own), names) => {
                 let parts = own.named(names)?.into_iter().map(|(name, part)| (name.to_owned(), part.clone()));
                 Ok(Cow::Owned(Encoder::Composite(Composite { parts: parts.collect() })))
             }
-            (_, names) => Err(problem!("inputs are {names:?}: the encoder is no composite, so there are no others")),
+            (_, names) => {
+                Err(problem!("inputs"; " are {names:?}: the encoder is no composite, so there are no others"))
+            }
         }
     }
 
-    fn check_weights(&self, label: &str, one: &TrainedNeuron, array: &Array) -> Result<()> {
+    fn check_weights(&self, label: &str, cell: &TrainedNeuron, array: &Array) -> Result<()> {
         let copies = self.delays_ms.len();
-        let encoder = self.encoder_of(one)?;
+        let encoder = self.encoder_of(cell)?;
         let inputs = encoder.trains(array) * encoder.kind().inputs_per_train() * copies;
-        if one.weights.len() == inputs {
+        if cell.weights.len() == inputs {
             return Ok(());
         }
         let (rows, columns, signed) = (array.rows, array.columns, encoder.kind() == SpikeKind::Signed);
         Err(problem!(
             "{label}: {} weights, the encoder makes {inputs} trains{}{} of {rows} x {columns} taxels: must be one each",
-            one.weights.len(),
+            cell.weights.len(),
             if signed { ", ON and OFF," } else { "" },
             if copies > 1 { format!(" at {copies} delays") } else { String::new() }
         ))
@@ -170,25 +169,31 @@ impl Readout {
         {
             let others = (mine.rows, mine.columns) == (array.rows, array.columns);
             let which = if others { ", of which others exist" } else { "" };
-            return Err(problem!(
+            let error = problem!(
                 "an array of {} x {} taxels: the readout was trained on {} x {}{which}",
                 array.rows,
                 array.columns,
                 mine.rows,
                 mine.columns
-            ));
+            );
+            let row = array.rows == 1 && array.len() == mine.len();
+            return Err(match row {
+                true if mine.rows == 1 => error.helped_by("array", Hint::Pitch),
+                true => error.helped_by("array", Hint::LayOut),
+                false => error,
+            });
         }
-        for (label, one) in &self.neurons {
-            self.check_weights(label, one, array)?;
+        for (label, cell) in &self.neurons {
+            self.check_weights(label, cell, array)?;
         }
         let encoder = tare.map_or_else(|| self.encoder.clone(), |tare| self.encoder.with_tare(tare));
-        let neurons = self.neurons.iter().map(|(label, one)| {
+        let neurons = self.neurons.iter().map(|(label, cell)| {
             let received = match &self.encoder {
-                Encoder::Composite(own) if !one.inputs.is_empty() => Some(own.of_parts(&one.inputs, array)?),
+                Encoder::Composite(own) if !cell.inputs.is_empty() => Some(own.of_parts(&cell.inputs, array)?),
                 _ => None,
             };
-            let (encoder, inputs) = (self.encoder_of(one)?, Inputs::new(received, self.delays_ms.len()));
-            let named = NamedNeuron::new(label, one, self.run_threshold, encoder.latency_ms(), inputs);
+            let (encoder, inputs) = (self.encoder_of(cell)?, Inputs::new(received, self.delays_ms.len()));
+            let named = NamedNeuron::new(label, cell, self.run_threshold, encoder.latency_ms(), inputs);
             Ok(named.with_ranges(Ranges::new(self.seen.get(label).cloned(), encoder.kind())))
         });
         let neurons = Neurons::new(neurons.collect::<Result<_>>()?, self.delays_ms.clone());

@@ -125,19 +125,19 @@ impl RunningRule {
         }
         if repaired {
             self.repaired = true;
-            self.waiting.iter_mut().for_each(|one| one.repaired = true);
+            self.waiting.iter_mut().for_each(|due| due.repaired = true);
         }
     }
 
     /// Decides on all frames that are complete, because no change before `t` us follows.
     pub(super) fn advance(&mut self, t: i64, clock: &FrameClock, out: &mut Vec<Decision>) {
         self.close_before(clock.open_at(t), clock, out);
-        while let Some(one) = self.waiting.front().filter(|one| clock.is_over(one.at, t)) {
+        while let Some(due) = self.waiting.front().filter(|due| clock.is_over(due.at, t)) {
             out.push(Decision {
                 which: usize::from(self.quantity >= self.limits.threshold),
-                t: one.t,
-                known: clock.end_of(ms(one.at)),
-                repaired: one.repaired,
+                t: due.t,
+                known: clock.end_of(ms(due.at)),
+                repaired: due.repaired,
                 value: self.quantity,
             });
             self.waiting.pop_front();

@@ -89,7 +89,7 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
         return Err(problem!("{} windows for {} reference events: must be one each", windows.len(), truth.len()));
     }
     if let Some(window) = windows.iter().find(|w| !(0..=WIDEST_WINDOW_US).contains(*w)) {
-        return Err(problem!("window of {window} us: must lie between 0 and one hour, {WIDEST_WINDOW_US} us"));
+        return Err(problem!("window_us"; " is {window} us: must be from 0 to {WIDEST_WINDOW_US}"));
     }
     let mut labels: BTreeMap<&str, (Vec<usize>, Vec<usize>)> = BTreeMap::new();
     for (k, detection) in found.iter().enumerate() {
@@ -99,29 +99,27 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
         labels.entry(&reference.label).or_default().1.push(k);
     }
     let mut tallies = Vec::with_capacity(labels.len());
-    for (label, (mut said, mut events)) in labels {
-        said.sort_by_key(|&k| found[k].t);
+    for (label, (mut detected, mut events)) in labels {
+        detected.sort_by_key(|&k| found[k].t);
         events.sort_by_key(|&k| truth[k].t);
-        let said_t: Vec<i64> = said.iter().map(|&k| found[k].t).collect();
+        let detected_t: Vec<i64> = detected.iter().map(|&k| found[k].t).collect();
         let events_t: Vec<i64> = events.iter().map(|&k| truth[k].t).collect();
         let reach: Vec<i64> = events.iter().map(|&k| windows[k]).collect();
-        let pairs = in_order(&said_t, &events_t, &reach, stop).map_err(|error| {
-            if let crate::Error::Problem(text) = error { problem!("{label}: {text}") } else { error }
-        })?;
+        let pairs = in_order(&detected_t, &events_t, &reach, stop).map_err(|error| error.of(label))?;
 
         let mut tally = Tally { label: label.to_owned(), ..Tally::default() };
-        let (mut matched, mut met) = (vec![false; said.len()], vec![false; events.len()]);
+        let (mut matched, mut met) = (vec![false; detected.len()], vec![false; events.len()]);
         for (j, i) in pairs {
             (matched[j], met[i]) = (true, true);
-            let (detection, reference) = (&found[said[j]], &truth[events[i]]);
-            tally.pairs.push((said[j], events[i]));
+            let (detection, reference) = (&found[detected[j]], &truth[events[i]]);
+            tally.pairs.push((detected[j], events[i]));
             tally.errors_ms.push(ms_between(reference.t, detection.t));
             tally.delays_ms.push(ms_between(reference.t, detection.known));
         }
-        let near = near_any(&said_t, &events_t, &reach);
+        let near = near_any(&detected_t, &events_t, &reach);
         tally.missed = (0..events.len()).filter(|&i| !met[i]).map(|i| events[i]).collect();
-        tally.false_ = (0..said.len()).filter(|&j| !matched[j]).map(|j| said[j]).collect();
-        tally.false_near = (0..said.len()).filter(|&j| !matched[j] && near[j]).count();
+        tally.false_ = (0..detected.len()).filter(|&j| !matched[j]).map(|j| detected[j]).collect();
+        tally.false_near = (0..detected.len()).filter(|&j| !matched[j] && near[j]).count();
         tallies.push(tally);
     }
     Ok(tallies)
@@ -155,10 +153,15 @@ mod tests {
 
     #[test]
     fn every_further_spike_is_false_inside_the_window_too() {
-        let said =
+        let detected =
             |label: &str, t| Detection { label: label.to_owned(), t, known: t + 300, slope: 1.0, repaired: false };
         let event = |label: &str, t| Reference { label: label.to_owned(), t };
-        let found = [said("lift", 9_000), said("contact", 1_000), said("contact", 2_000), said("contact", 900_000)];
+        let found = [
+            detected("lift", 9_000),
+            detected("contact", 1_000),
+            detected("contact", 2_000),
+            detected("contact", 900_000),
+        ];
         let truth = [event("contact", 500_000), event("contact", 0), event("lift", 10_000)];
         let tallies = score(&found, &truth, &[50_000; 3], Stop::never()).unwrap();
         let [contact, lift] = &tallies[..] else { panic!("two labels") };
@@ -184,7 +187,7 @@ mod tests {
     fn windows_that_make_no_sense_are_refused() {
         let never = Stop::never();
         let one = [Reference { label: "a".into(), t: 0 }];
-        assert!(score(&[], &one, &[-1], never).unwrap_err().to_string().contains("window of -1 us"));
+        assert!(score(&[], &one, &[-1], never).unwrap_err().to_string().contains("window_us is -1 us"));
         assert!(score(&[], &one, &[i64::MAX], never).is_err());
         assert!(score(&[], &[Reference { label: "a".into(), t: 0 }], &[], never).is_err());
     }

@@ -53,7 +53,7 @@ impl Encoding for ChangeEvents {
         // Changes are compared in f32.
         if !(self.noise_floor as f32).is_normal() {
             return Err(problem!(
-                "noise_floor is {}: must be above 0 and finite in single precision",
+                "noise_floor"; " is {}: must be above 0 and finite in single precision",
                 self.noise_floor
             ));
         }

@@ -105,14 +105,14 @@ impl Encoding for LevelCrossing {
             && self.levels[0] <= 0.0
         {
             let level = self.levels[0];
-            return Err(problem!("release_share is {share}, but level {level} is not above 0: use release_by"));
+            return Err(problem!("release_share"; " is {share}, but level {level} is not above 0: use release_by"));
         }
         if let Some(level) = self.tonic_level {
             if self.tonic_ms.is_none() {
                 return Err(problem!("tonic_level without tonic_ms: must come with the period tonic_ms"));
             }
             if !self.levels.contains(&level) {
-                return Err(problem!("tonic_level is {level}: must be one of the levels {:?}", self.levels));
+                return Err(problem!("tonic_level"; " is {level}: must be one of the levels {:?}", self.levels));
             }
         }
         self.running_range.as_ref().map_or(Ok(()), RunningRange::check)

@@ -4,7 +4,7 @@ use super::blocks::{BLOCK, Block, blocks};
 use super::tare::Tare;
 use crate::rest::{Rest, touched_from};
 use crate::vectors::wide;
-use crate::{Array, Result, problem};
+use crate::{Array, Hint, Result, problem};
 
 /// The smallest f32 that is not below `x`.
 fn round_up(x: f64) -> f32 {
@@ -229,5 +229,5 @@ impl std::ops::Deref for Loaded {
 
 /// The tare of an encoder that needs one; `what` names the encoder in an error.
 pub(super) fn given<'a>(what: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
-    tare.ok_or_else(|| problem!("{what} without a tare: take one at rest and give it as tare"))
+    tare.ok_or_else(|| problem!("{what} without a tare").helped_by("tare", Hint::Give))
 }

@@ -134,20 +134,20 @@ impl Encoding for Moments {
             if let Some([least, most]) = range
                 && most <= least
             {
-                return Err(problem!("{name} is {least} to {most}: must ascend"));
+                return Err(problem!(name; " is {least} to {most}: must ascend"));
             }
         }
         if self.ages_ms.as_ref().is_some_and(Vec::is_empty) {
-            return Err(problem!("ages_ms is empty: must hold one age or more, or be left out"));
+            return Err(problem!("ages_ms"; " is empty: must hold one age or more, or be left out"));
         }
         if let Some(k) = ages.windows(2).position(|pair| pair[0] >= pair[1]) {
-            return Err(problem!("ages_ms[{}]: must be a us or more above the one before", k + 1));
+            return Err(problem!("ages_ms"; "[{}]: must be a us or more above the one before", k + 1));
         }
         if self.levels == 0 && !self.graded && ages.is_empty() {
-            return Err(problem!("levels is 0, and neither graded nor ages_ms is given: choose one or more of them"));
+            return Err(problem!("levels"; " is 0, and neither graded nor ages_ms is given: choose one or more of them"));
         }
         if self.centre && !self.graded {
-            return Err(problem!("centre is given without graded: its place has graded spikes alone"));
+            return Err(problem!("centre"; " is given without graded: its place has graded spikes alone"));
         }
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
@@ -232,7 +232,7 @@ impl Way {
             Some(Places { x, y, unit: Some(PlaceUnit::Mm), .. }) => {
                 Ok(Self::Places(x.iter().zip(y).map(|(&x, &y)| [x, y]).collect()))
             }
-            Some(_) => Err(problem!("moments: displacement_mm needs places in mm; those of {} are not", array.name)),
+            Some(_) => Err(problem!("displacement_mm"; " needs places in mm; those of {} are not", array.name)),
             None => array.pitch("moments: displacement_mm").map(Self::Pitch),
         }
     }

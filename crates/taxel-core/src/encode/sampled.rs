@@ -14,7 +14,7 @@ use crate::held::Held;
 use crate::rest::Rest;
 use crate::spikes::{ms, us};
 use crate::vectors::wide;
-use crate::{Array, EventsView, Result, Spike, SpikeKind, problem};
+use crate::{Array, EventsView, Hint, Result, Spike, SpikeKind, problem};
 
 /// How an encoder processes samples; `sample` and `pass` are `#[inline(always)]`, so that they are compiled for wider
 /// vectors.
@@ -330,7 +330,8 @@ impl<R: Rule> Stream for Sampled<R> {
         self.source.frame(t)?;
         if self.steady && self.begun && 2 * (t - self.last - self.period).abs() > self.period {
             let (since, period) = (ms(t - self.last), ms(self.period));
-            return Err(problem!("frame at {t} us, {since} ms after the last: must come every period_ms, {period}"));
+            return Err(problem!("frame at {t} us, {since} ms after the last: must come every {period} ms")
+                .helped_by("period_ms", Hint::Give));
         }
         let (now, later) = (NextPicture::after(values), NextPicture::unknown());
         let (mut now, later) = if R::ASKS { (later, now) } else { (now, later) };

@@ -123,7 +123,7 @@ impl Tare {
     ///
     /// `Format` if the JSON is not a tare, `Problem` if its parts do not match.
     pub fn from_json(json: &str) -> Result<Self> {
-        let tare: Self = reading::from_text(json).map_err(|unfit| crate::Error::Format(unfit.of("tare")))?;
+        let tare: Self = reading::from_text(json).map_err(|unfit| crate::Error::format(unfit.of("tare")))?;
         tare.check()?;
         Ok(tare)
     }

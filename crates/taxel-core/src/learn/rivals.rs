@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::neuron::Neuron;
 use crate::parameters::Described;
-use crate::{Error, Result, SpikeTrains, Stop, problem, reading};
+use crate::{Result, SpikeTrains, Stop, problem, reading};
 use batch::BatchRule;
 use epochs::{Examples, change_of};
 use source::Source;
@@ -59,7 +59,7 @@ macro_rules! batches {
             ///
             /// `Problem`, naming the parameter.
             pub fn from_json(name: &str, json: &str) -> Result<Self> {
-                let read = |unfit: reading::Unfit| Error::Problem(unfit.of(name));
+                let read = |unfit: reading::Unfit| unfit.problem(name);
                 $(if name == stringify!($module) {
                     let rule = reading::from_text::<$Kind>(json).map_err(read)?;
                     BatchRule::check(&rule)?;

@@ -56,7 +56,7 @@ impl Stdp {
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.tau_s >= self.tau_m {
-            return Err(problem!("tau_s is {} ms: must be below tau_m, {} ms", self.tau_s, self.tau_m));
+            return Err(problem!("tau_s"; " is {} ms: must be below tau_m, {} ms", self.tau_s, self.tau_m));
         }
         Ok(())
     }
@@ -123,7 +123,7 @@ impl StdpNeuron {
     pub fn set_weights(&mut self, weights: &[f64]) -> Result<()> {
         one_weight_a_train(weights, self.weights.len())?;
         if let Some(n) = weights.iter().position(|w| !(0.0..=1.0).contains(w)) {
-            return Err(problem!("weights[{n}] is {}: must be from 0 to 1", weights[n]));
+            return Err(problem!("weights"; "[{n}] is {}: must be from 0 to 1", weights[n]));
         }
         self.weights.copy_from_slice(weights);
         self.rest();

@@ -1,4 +1,5 @@
-//! The window of the ISI and SPIKE distances, and the intervals before the first and after the last spike.
+//! What the ISI and SPIKE distances share: their window, the walk over the spikes of two trains, and the intervals before
+//! the first and after the last one.
 
 use super::distance::{Pattern, Ready, summed};
 use super::patterns::Patterns;
@@ -32,7 +33,7 @@ pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Pat
         })
     };
     let Some((start, stop)) = asked.or_else(widest) else {
-        return Err(problem!("window: must be given, (start, stop) in ms, as lists of times do not say it"));
+        return Err(problem!("window"; ": must be given, (start, stop) in ms, as lists of times do not say it"));
     };
     for side in sides() {
         for (p, n) in (0..side.count).flat_map(|p| (0..side.trains).map(move |n| (p, n))) {
@@ -49,6 +50,85 @@ pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Pat
     Ok(Window { start, stop })
 }
 
+/// Declares a distance that is the mean of a profile over the window, which the function `between` of its file computes.
+macro_rules! averaged {
+    ($(#[$about:meta])* $Kind:ident) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $Kind {
+            /// Start and end of the window, ms; by default the patterns' own window.
+            #[serde(default)]
+            pub window: Option<(f64, f64)>,
+        }
+
+        impl Distance for $Kind {
+            fn described() -> Described {
+                Described::by(&Self { window: None }, &[], &[])
+            }
+
+            fn check(&self) -> Result<()> {
+                Exposure::check(self.window)
+            }
+
+            fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
+                Ok(Box::new(Within { window: super::edges::window(self.window, a, b)?, between }))
+            }
+        }
+    };
+}
+pub(super) use averaged;
+
+/// A train with at least one spike, walked interval by interval.
+pub(super) struct Walk<'s> {
+    pub(super) spikes: &'s [f64],
+    pub(super) window: Window,
+    /// The number of spikes already passed.
+    pub(super) k: usize,
+    /// The length of the present interval, ms.
+    pub(super) interval: f64,
+}
+
+impl<'s> Walk<'s> {
+    fn new(spikes: &'s [f64], window: Window) -> Self {
+        let k = begun(spikes, window);
+        Self { spikes, window, k, interval: interval(spikes, k, window) }
+    }
+
+    fn next(&self) -> Option<f64> {
+        self.spikes.get(self.k).copied()
+    }
+
+    fn pass(&mut self, t: f64) {
+        if self.next() == Some(t) {
+            self.k += 1;
+            self.interval = interval(self.spikes, self.k, self.window);
+        }
+    }
+}
+
+/// The mean over the window, 0 if it has no duration, of a profile whose integral over each piece without a spike in it
+/// is `piece`, of both trains and the piece's start and end.
+pub(super) fn mean(a: &[f64], b: &[f64], window: Window, piece: impl Fn(&Walk<'_>, &Walk<'_>, f64, f64) -> f64) -> f64 {
+    let (mut a, mut b) = (Walk::new(a, window), Walk::new(b, window));
+    let (mut sum, mut last) = (0.0, window.start);
+    loop {
+        let (next_a, next_b) = (a.next(), b.next());
+        let next = next_a.unwrap_or(window.stop).min(next_b.unwrap_or(window.stop));
+        // At the window's end both intervals can have length 0, but then no time is left to integrate.
+        if next > last {
+            sum += piece(&a, &b, last, next);
+            last = next;
+        }
+        if next_a.is_none() && next_b.is_none() {
+            break;
+        }
+        a.pass(next);
+        b.pass(next);
+    }
+    if window.stop > window.start { sum / (window.stop - window.start) } else { 0.0 }
+}
+
 /// The spikes as these distances use them: without duplicates; an empty train gets a spike at each end of the window.
 pub(super) fn distinct(train: &[f64], window: Window) -> Vec<f64> {
     if train.is_empty() {
@@ -63,7 +143,7 @@ pub(super) fn distinct(train: &[f64], window: Window) -> Vec<f64> {
 ///
 /// Before the first and after the last spike the interval extends to the window's edge, or is as long as the
 /// neighbouring interval if that is longer.
-pub(super) fn interval(spikes: &[f64], k: usize, window: Window) -> f64 {
+fn interval(spikes: &[f64], k: usize, window: Window) -> f64 {
     let n = spikes.len();
     let beside = |j: usize| if n > 1 { spikes[j + 1] - spikes[j] } else { 0.0 };
     if k == 0 {

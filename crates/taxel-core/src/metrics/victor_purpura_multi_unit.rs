@@ -9,6 +9,7 @@ use super::distance::{Distance, Pattern, Ready, number_or_name};
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
+use crate::spikes::Ordered;
 use crate::{Result, Stop};
 
 /// The least cost of turning one pattern into the other: 1 for each spike removed or added, `q |dt|` for each spike
@@ -105,24 +106,6 @@ struct Matching<'m> {
     depth: Vec<f64>,
 }
 
-/// A column with its distance to the row to be matched.
-#[derive(PartialEq)]
-struct At(f64, usize);
-
-impl Eq for At {}
-
-impl Ord for At {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0).then(self.1.cmp(&other.1))
-    }
-}
-
-impl PartialOrd for At {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
 impl<'m> Matching<'m> {
     fn new(costs: &'m VictorPurpuraMultiUnit, rows: Vec<Labelled>, columns: Vec<Labelled>) -> Self {
         let (n, m) = (rows.len(), columns.len());
@@ -166,12 +149,12 @@ impl<'m> Matching<'m> {
                             if self.of_column[column].is_none() {
                                 (least, end) = (there, End::Column(column));
                             } else {
-                                next.push(Reverse(At(there, column)));
+                                next.push(Reverse(Ordered(there, column)));
                             }
                         }
                     }
                 }
-                let Some(Reverse(At(there, column))) = next.pop() else { break };
+                let Some(Reverse(Ordered(there, column))) = next.pop() else { break };
                 if there >= least {
                     break;
                 }

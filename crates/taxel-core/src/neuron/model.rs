@@ -109,23 +109,23 @@ impl Neuron {
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
-            return Err(problem!("tau_s is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
+            return Err(problem!("tau_s"; " is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
         }
         if self.kernel == Kernel::Exponential && self.time == Time::Continuous {
             return Err(problem!(
-                "kernel is \"exponential\" and time \"continuous\": its potential only jumps, at inputs, so it never crosses \
+                "kernel"; " is \"exponential\" and time \"continuous\": its potential only jumps, at inputs, so it never crosses \
                  the threshold at a time of its own; take time \"grid\" or another kernel"
             ));
         }
         if let (Some(rearm), Time::Continuous) = (self.rearm, self.time) {
             return Err(problem!(
-                "rearm is {rearm} and time \"continuous\": the potential is compared with it at grid points only; take time \
+                "rearm"; " is {rearm} and time \"continuous\": the potential is compared with it at grid points only; take time \
                  \"grid\""
             ));
         }
         if self.refractory == 0.0 && self.after_spike != AfterSpike::Reset {
             return Err(problem!(
-                "refractory is 0 ms: must be above 0 unless after_spike is \"reset\", else the neuron fires without end"
+                "refractory"; " is 0 ms: must be above 0 unless after_spike is \"reset\", else the neuron fires without end"
             ));
         }
         Ok(())

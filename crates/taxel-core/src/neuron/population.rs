@@ -44,7 +44,7 @@ impl Neuron {
         self.stream(&[], threshold, trains.start)?;
         if neurons.checked_mul(trains.len()) != Some(weights.len()) {
             let (given, inputs) = (weights.len(), trains.len());
-            return Err(problem!("weights: {given} for {neurons} neurons of {inputs} trains, must be one each"));
+            return Err(problem!("weights"; ": {given} for {neurons} neurons of {inputs} trains, must be one each"));
         }
         if self.time == Time::Grid {
             self.check_rows(self.points(trains.start, trains.stop))?;

@@ -95,11 +95,11 @@ impl Neuron {
         self.check_inputs(weights, trains)?;
         for (name, list) in [("times", times), ("spikes", spikes)] {
             if let Some(k) = list.iter().position(|t| !t.is_finite()) {
-                return Err(problem!("{name}[{k}] is {}: must be finite", list[k]));
+                return Err(problem!(name; "[{k}] is {}: must be finite", list[k]));
             }
             if let Some(k) = list.windows(2).position(|w| w[1] < w[0]) {
                 return Err(problem!(
-                    "{name}[{}] is {} ms, after {} ms: times must ascend",
+                    name; "[{}] is {} ms, after {} ms: times must ascend",
                     k + 1,
                     list[k + 1],
                     list[k]
@@ -112,7 +112,7 @@ impl Neuron {
     pub(super) fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
         trains.check()?;
         if trains.kind == SpikeKind::Signed {
-            return Err(problem!("trains: spikes are signed, split them into ON and OFF trains first"));
+            return Err(problem!("trains"; ": spikes are signed, split them into ON and OFF trains first"));
         }
         one_weight_a_train(weights, trains.len())
     }

@@ -30,7 +30,7 @@ impl NeuronStream {
         one_weight_a_train(weights, weights.len())?;
         above_0("threshold factor", threshold, "")?;
         if !start.is_finite() {
-            return Err(problem!("start is {start} ms: must be finite"));
+            return Err(problem!("start"; " is {start} ms: must be finite"));
         }
         let clock = match neuron.time {
             Time::Continuous => Clock::Continuous(ContinuousStream::new(neuron, threshold, start)),

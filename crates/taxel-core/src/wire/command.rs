@@ -41,7 +41,7 @@ impl Command {
     pub fn from_bytes(b: [u8; 5]) -> Result<Self> {
         if let Some(k) = (0..5).find(|&k| (b[k] >= 0x80) != (k == 0)) {
             let right = if k == 0 { "80 or above" } else { "below 80" };
-            return Err(Error::Format(format!("command, byte {k} is {:02X}: must be {right}", b[k])));
+            return Err(Error::format(format!("command, byte {k} is {:02X}: must be {right}", b[k])));
         }
         let byte = |k: usize| b[k] | (b[0] >> (4 - k) & 1) << 7;
         Ok(Self { register: b[0] >> 4 & 7, value: u32::from_be_bytes([byte(1), byte(2), byte(3), byte(4)]) })

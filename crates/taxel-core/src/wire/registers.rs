@@ -46,7 +46,7 @@ pub struct Refusal {
 
 impl From<Refusal> for Error {
     fn from(refusal: Refusal) -> Self {
-        Self::Device(refusal.text)
+        Self::device(refusal.text)
     }
 }
 
@@ -144,7 +144,7 @@ impl Registers {
     pub fn of_source(array: &Array, rate_hz: f64, bits: u32) -> Result<(Self, u32)> {
         const CHANNELS: u8 = 64;
         if !(1..=16).contains(&bits) {
-            return Err(problem!("bits is {bits}: must be 1 to 16"));
+            return Err(problem!("bits"; " is {bits}: must be from 1 to 16"));
         }
         let line = 1e8 / (rate_hz * f64::from(array.columns));
         let steps = u32::from(sense_lines(array)).div_ceil(CHANNELS.into());
@@ -155,7 +155,7 @@ impl Registers {
             let (slowest, most) = ((slowest * 1e6).ceil() / 1e6, most.floor());
             let (rows, columns) = (array.rows, array.columns);
             return Err(problem!(
-                "rate is {rate_hz} frames/s: of {rows} x {columns} taxels it must be {slowest} to {most}"
+                "rate_hz"; " is {rate_hz}: must be from {slowest} to {most} for {rows} x {columns} taxels"
             ));
         }
         let line_period = line.round() as u32;
@@ -224,7 +224,7 @@ impl Registers {
     /// `Device`, with the first rule that is broken and the numbers.
     pub fn check(&self, array: &Array) -> Result<()> {
         if !matches!(self.channels, 16 | 64) {
-            return Err(Error::Device(format!("{} channels: the converter has 16 or 64", self.channels)));
+            return Err(Error::device(format!("{} channels: the converter has 16 or 64", self.channels)));
         }
         self.rules(0, array).map_err(Error::from)
     }
@@ -278,7 +278,7 @@ impl Registers {
         self.check(array)?;
         target.check(array)?;
         if self.channels != target.channels {
-            return Err(Error::Device(format!(
+            return Err(Error::device(format!(
                 "the board has {} channels, the registers are for {}",
                 self.channels, target.channels
             )));
@@ -298,7 +298,7 @@ impl Registers {
             });
             match allowed {
                 Some(place) => left.remove(place),
-                None => return Err(Error::Device("no order of writes leads there without a refusal".to_owned())),
+                None => return Err(Error::device("no order of writes leads there without a refusal")),
             };
         }
         Ok(commands)
@@ -336,7 +336,7 @@ impl Registers {
             let offset = if name == field.name { field.offset } else { 0 };
             let (least, greatest) = (field.least - field.offset + offset, field.greatest - field.offset + offset);
             if value < least || value > greatest {
-                return Err(Error::Device(format!(
+                return Err(Error::device(format!(
                     "{name} {value} does not fit: must be {least} to {greatest} (rule 4)"
                 )));
             }

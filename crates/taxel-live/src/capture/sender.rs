@@ -134,7 +134,7 @@ impl Sender {
         }
         for (name, value) in [("period_us", period_us), ("seconds", seconds)] {
             if !(0.0..=1e9).contains(&value) {
-                return Err(problem!("{name} is {value}: must lie between 0 and 1e9").into());
+                return Err(problem!(name; " is {value}: must be from 0 to 1e9").into());
             }
         }
         let begun = Instant::now();

@@ -71,7 +71,7 @@ impl Touch for Feed {
                 return Ok(false);
             }
             let reason = format!("frame {frame}: ends after {n} bytes, must be {wanted}");
-            return Err(taxel_core::Error::Format(format!("standard input, {reason}")).into());
+            return Err(taxel_core::Error::format(format!("standard input, {reason}")).into());
         }
         for (value, bytes) in ticks.iter_mut().zip(self.bytes.chunks_exact(2)) {
             *value = (u16::from_le_bytes([bytes[0], bytes[1]]) >> self.shift).min(self.most);

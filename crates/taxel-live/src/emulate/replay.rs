@@ -74,7 +74,7 @@ impl Replay {
 
     fn new(mut times: Vec<i64>, what: What, held: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
         if !(speed > 0.0 && speed.is_finite()) {
-            return Err(problem!("speed is {speed}: must be above 0").into());
+            return Err(problem!("speed"; " is {speed}: must be above 0").into());
         }
         if let Some(&first) = times.first() {
             times.iter_mut().for_each(|t| *t -= first);

@@ -43,10 +43,8 @@ impl Scenes {
         let work = move || {
             for (n, act) in acts.enumerate() {
                 let prepared = act.and_then(|act| {
-                    Prepared::of(&array, frame_us, &act, Stop::never()).map_err(|error| match error {
-                        taxel_core::Error::Scene(text) => taxel_core::Error::Scene(format!("act {n}: {text}")).into(),
-                        other => other.into(),
-                    })
+                    Prepared::of(&array, frame_us, &act, Stop::never())
+                        .map_err(|error| error.of(&format!("act {n}")).into())
                 });
                 let last = prepared.is_err();
                 if ready.send(prepared).is_err() || last {

@@ -38,8 +38,7 @@ pub struct Counters {
     /// Latency from the kernel's stamp to the end of decoding, per datagram.
     pub decode_latency: Quantiles,
     /// Latency from `known` to the output, by the board's clock.
-    #[serde(rename = "said_latency")]
-    pub output_latency: Quantiles,
+    pub report_latency: Quantiles,
     /// What is known of the board's clock and of its signs of life.
     #[serde(flatten)]
     pub board: BoardState,

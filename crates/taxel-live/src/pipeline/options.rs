@@ -1,71 +1,179 @@
-//! The options of the pipeline.
+//! The options of the pipeline. They are described here alone: `tools/messages.py` makes of them the arguments of Python's
+//! `Live`, from which come the options of `taxel live`, and the panel shows those of the running session.
+//!
+//! The first paragraph of a description is the help of the command line; Python's reference has all of it. `commands` names
+//! the commands that have an option (`taxel live` where it is left out), `flag` its name there, `metavar` its value, `typed`
+//! what only the command line adds, and `python` the type in Python where it is not plain.
 
 use std::path::PathBuf;
 
+use serde::{Deserialize, Serialize, Serializer};
 use taxel_core::Array;
 use taxel_core::detect::FrameTime;
 use taxel_core::wire::Registers;
 
-use super::sending::Destination;
-use super::source::Source;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
 
-/// The options of a [`Live`](super::Live).
-#[derive(Debug, Clone)]
-pub struct LiveOptions {
-    /// The sensor.
-    pub array: Array,
-    /// The board's registers, as far as they are known: they define the length of a frame.
-    pub registers: Registers,
-    /// Whether the board sends differences for intensities (the panel's "delta intensity").
-    pub differences: bool,
-    /// During silence the readout's time follows the host's clock from the latest datagram on, this number of frames behind it.
-    pub guard_frames: f64,
-    /// Number of frames for which time waits at a gap in the sequence of version 2: the missing datagrams may only be
-    /// late.
-    pub gap_frames: f64,
-    /// Capacity of the queue before the readout, events.
-    pub readout_events: usize,
-    /// The socket and the queue behind it.
-    pub capture: ReceiverOptions,
-    /// The recording from the beginning, if any.
-    pub record: Option<Record>,
-    /// Whether recordings start and end while the pipeline runs ([`Live::record`](super::Live::record)); then none
-    /// starts with it.
-    pub record_later: bool,
-    /// Destinations to which detections are sent as lines, in addition to the sinks.
-    pub send: Vec<Destination>,
-    /// The board's name in a recording.
-    pub name: String,
-    /// The other sources of the recording.
-    pub sources: Vec<Source>,
+/// Declares the options with their defaults; `KEY = VALUE` after one is what its schema says beside.
+macro_rules! options {
+    ($(#[$about:meta])* pub struct $name:ident {
+        $($(#[$of:meta])* $field:ident: $kind:ty = $default:expr $(, $key:literal = $value:literal)*;)*
+    }) => {
+        $(#[$about])*
+        pub struct $name {
+            $($(#[$of])* $(#[cfg_attr(feature = "schema", schemars(extend($key = $value)))])* pub $field: $kind,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+    };
+}
+
+options! {
+    /// The options of a [`Live`](super::Live).
+    #[derive(Debug, Clone, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+    pub struct LiveOptions {
+        /// The UDP port that the board sends to.
+        ///
+        /// 0 finds a free one, see `address`.
+        port: u16 = 5208, "commands" = "live record bridge";
+        /// The address of this machine to listen on; 0.0.0.0: all.
+        host: String = "0.0.0.0".to_owned(), "commands" = "live record bridge";
+        /// Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.
+        ///
+        /// Stop the `Live` before the `Remote`.
+        remote: Option<String> = None, "commands" = "live record", "flag" = "--from", "metavar" = "ADDRESS",
+            "python" = "Remote | None";
+        /// Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
+        #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
+        #[serde(skip_serializing)]
+        array: Array = Array::thesis(), "commands" = "live record bridge", "metavar" = "ROWSxCOLUMNS[xMM]",
+            "python" = "Array | None", "typed" = "As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.";
+        /// The board's registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its own.
+        ///
+        /// The contents of the registers, or the name of a preset, of which a smaller array drives fewer lines. Default: those
+        /// of a board of this array at reset.
+        #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
+        #[serde(skip_serializing)]
+        registers: Registers = Registers::default(), "commands" = "live record bridge", "flag" = "--preset",
+            "python" = "str | Registers | None";
+        /// The board sends intensity differences.
+        ///
+        /// The panel's "delta intensity".
+        differences: bool = false, "commands" = "live record bridge";
+        /// A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.
+        ///
+        /// Without one nothing is detected.
+        #[serde(skip_serializing)]
+        readout: Option<String> = None, "commands" = "live bridge", "metavar" = "FILE",
+            "python" = "Readout | PlainRule | None";
+        /// Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).
+        ///
+        /// For a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event
+        /// on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
+        #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
+        #[serde(skip_serializing)]
+        tare: Option<StatedTare> = None, "commands" = "live bridge", "python" = "Tare | float | None";
+        /// Record in a new file (.mcap or .lsa).
+        ///
+        /// `.mcap` holds all data, `.lsa` the raw bytes of the manual.
+        #[serde(serialize_with = "shown")]
+        record: Option<PathBuf> = None, "commands" = "live bridge", "python" = "str | os.PathLike[str] | None";
+        /// Recordings begin and end while it runs (`record`, `end_recording`).
+        ///
+        /// Then none begins here, and `sources` are recorded while one runs.
+        record_later: bool = false, "commands" = "";
+        /// The board's name among the sources of the recording.
+        name: String = "board".to_owned(), "commands" = "record";
+        /// Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU
+        /// (serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.
+        ///
+        /// By name, in a `.mcap`, each with its own clock: "udp:HOST:PORT,array=16x16,preset=2 kHz" is another board, which
+        /// sends to that address of this machine; "serial:PATH@BAUD" and "pipe:PATH" are lines of numbers ("-" is the standard
+        /// input); "given" are numbers that a program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of
+        /// a line (default: those of the first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called
+        /// `t_us`, `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its
+        /// arrival.
+        sources: Vec<(String, String)> = vec![], "commands" = "record", "flag" = "--source", "metavar" = "NAME=WHAT",
+            "python" = "Mapping[str, str] | None";
+        /// Compression of a .mcap: none, lz4 or zstd.
+        compression: String = "none".to_owned(), "commands" = "record";
+        /// Replace the file if it exists.
+        overwrite: bool = false, "commands" = "record";
+        /// How far, in frames, a readout stays behind the host's clock while no events arrive.
+        guard_frames: f64 = 5.0, "minimum" = 0;
+        /// At a gap in the sequence of version 2, frames to wait for what may only be late.
+        gap_frames: f64 = 1.0, "commands" = "", "minimum" = 0;
+        /// Print one line of JSON for each detection, and nothing else.
+        lines: bool = false, "flag" = "--json";
+        /// Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.
+        ///
+        /// UDP sends a datagram each; the named pipe must exist; "lsl:NAME" sends the label in a stream of markers of the lab
+        /// streaming layer. Up to 1024 lines wait for a slow reader; lines without room, or without a reader, are lost and
+        /// counted.
+        send: Vec<String> = vec![], "metavar" = "WHERE", "python" = "str | Sequence[str]";
+        /// How much may wait in the kernel, bytes.
+        kernel_buffer_bytes: usize = ReceiverOptions::default().kernel_buffer_bytes, "commands" = "",
+            "maximum" = 2_147_483_647;
+        /// How much may wait for the decoder, bytes.
+        queue_bytes: usize = ReceiverOptions::default().queue_bytes, "commands" = "", "maximum" = 2_147_483_647;
+        /// How many events may wait for the readout.
+        readout_events: usize = 1 << 20, "commands" = "", "maximum" = 2_147_483_647;
+        /// Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`).
+        ///
+        /// It then counts its drops in trains.
+        gro: bool = ReceiverOptions::default().gro, "commands" = "";
+    }
+}
+
+fn shown<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
+    path.as_ref().map(|path| path.display().to_string()).serialize(to)
+}
+
+/// What a user states of the taxels' rest.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum StatedTare {
+    /// How long a fresh tare is taken, s.
+    Seconds(f64),
+    /// The contents of a tare's file.
+    Saved(String),
 }
 
 impl LiveOptions {
-    /// The default options for an array: the first preset's registers, 5 frames' guard, no recording.
+    /// The default options for an array.
     #[must_use]
     pub fn new(array: Array) -> Self {
-        Self {
-            array,
-            registers: Registers::default(),
-            differences: false,
-            guard_frames: 5.0,
-            gap_frames: 1.0,
-            readout_events: 1 << 20,
-            capture: ReceiverOptions::default(),
-            record: None,
-            record_later: false,
-            send: vec![],
-            name: "board".to_owned(),
-            sources: vec![],
-        }
+        Self { array, ..Self::default() }
     }
 
     /// The length of the board's frames, and the unit of their stamps, by its registers.
     #[must_use]
     pub fn frames(&self) -> FrameTime {
         FrameTime::on_wire(self.registers.frame_us(), self.registers.wire_version)
+    }
+
+    /// The socket and the queue behind it.
+    #[must_use]
+    pub fn capture(&self) -> ReceiverOptions {
+        let &Self { kernel_buffer_bytes, queue_bytes, gro, .. } = self;
+        ReceiverOptions { kernel_buffer_bytes, queue_bytes, gro }
+    }
+
+    /// The recording from the beginning, if any.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if there is no such compression.
+    pub fn recording(&self) -> taxel_core::Result<Option<Record>> {
+        let compression = self.compression.parse()?;
+        Ok(self.record.clone().map(|path| Record { path, compression, overwrite: self.overwrite }))
     }
 }
 

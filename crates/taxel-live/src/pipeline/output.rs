@@ -76,12 +76,12 @@ impl DetectionOutput {
 impl Targets {
     /// Passes a detection to the sinks first, then to the recording and the receivers.
     fn output(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
-        let output_ns = now_ns();
+        let reported_ns = now_ns();
         let offset = shared.published().counters.board.offset;
         let output = OutputDetection {
-            output_us: offset.map_or(detection.known, |o| o.board_us(output_ns)),
+            reported_us: offset.map_or(detection.known, |o| o.board_us(reported_ns)),
             detection,
-            output_ns,
+            reported_ns,
         };
         self.sinks.iter_mut().try_for_each(|sink| sink.output(&output)).map_err(Error::Sink)?;
         if let Some(recorder) = &*lock(&shared.recording.recorder) {
@@ -94,12 +94,12 @@ impl Targets {
         lock(&shared.subscribers).retain(|subscriber| {
             !matches!(subscriber.try_send(output.clone()), Err(crossbeam_channel::TrySendError::Disconnected(_)))
         });
-        let late_ns = (output.output_us - output.detection.known) * 1000;
+        let late_ns = (output.reported_us - output.detection.known) * 1000;
         let dropped = self.queue.try_send(output).is_err();
         let mut published = shared.published();
         published.counters.readout.detections += 1;
         published.counters.readout.detections_dropped += u64::from(dropped);
-        published.output_latency.note(late_ns);
+        published.report_latency.note(late_ns);
         Ok(())
     }
 }

@@ -141,8 +141,8 @@ impl Recorder {
     }
 
     /// A recording from the pipeline's beginning: a new file is begun at once.
-    pub(super) fn create(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
-        let (recorder, file) = Self::open(record, options, place)?;
+    pub(super) fn create(record: &Record, options: &LiveOptions, sources: &[Source], place: &Origin) -> Result<Self> {
+        let (recorder, file) = Self::open(record, options, sources, place)?;
         let new = file.is_new();
         *lock(&recorder.reserved) = Some(file);
         if new {
@@ -152,8 +152,8 @@ impl Recorder {
     }
 
     /// A recording that begins while the pipeline runs: the file is reserved now, and written later.
-    pub(super) fn reserve(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
-        let (recorder, file) = Self::open(record, options, place)?;
+    pub(super) fn reserve(record: &Record, options: &LiveOptions, sources: &[Source], place: &Origin) -> Result<Self> {
+        let (recorder, file) = Self::open(record, options, sources, place)?;
         let recorder = Self { since: Some(Box::default()), ..recorder };
         if kind_of_name(&record.path)? == "lsa" {
             *lock(&recorder.reserved) = Some(file);
@@ -167,9 +167,9 @@ impl Recorder {
     }
 
     /// A recording whose file is opened and locked, but not changed.
-    fn open(record: &Record, options: &LiveOptions, place: &Origin) -> Result<(Self, OutputFile)> {
+    fn open(record: &Record, options: &LiveOptions, sources: &[Source], place: &Origin) -> Result<(Self, OutputFile)> {
         let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
-        let sources = options.sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
+        let sources = sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
         let decoding = Decoding { difference: options.differences, ..Decoding::default() };
         let header = Header { decoding, name: options.name.clone(), sources, ..board };
         let (path, kind) = (&record.path, kind_of_name(&record.path)?);
@@ -319,7 +319,7 @@ impl Recorder {
     pub(super) fn detection(&self, output: &OutputDetection) -> Result<()> {
         let found = &output.detection;
         let (Some(t), Some(known)) = (self.timed(found.t), self.timed(found.known)) else { return Ok(()) };
-        self.with_track(|track| track.detection(output.output_ns, &Detection { t, known, ..found.clone() }))
+        self.with_track(|track| track.detection(output.reported_ns, &Detection { t, known, ..found.clone() }))
     }
 
     /// Sets the rest that is subtracted from the pictures from now on.

@@ -44,7 +44,7 @@ impl Recordings {
         }
         let options = &self.shared.options;
         let header = LiveOptions { registers: *lock(&self.shared.registers), ..options.clone() };
-        let next = Recorder::reserve(record, &header, self.shared.receiver.place())?;
+        let next = Recorder::reserve(record, &header, &self.shared.sources, self.shared.receiver.place())?;
         self.replace(Some(next))
     }
 

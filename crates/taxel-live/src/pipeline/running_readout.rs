@@ -3,9 +3,10 @@
 use taxel_core::Events;
 use taxel_core::detect::{Detection, Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, Zeroing};
+use taxel_core::problem;
 
 use super::ahead::Ahead;
-use super::options::LiveOptions;
+use super::options::{LiveOptions, StatedTare};
 use super::output::DetectionOutput;
 use super::readout_queue::{BatchEnd, Quiet};
 use super::rest::Rest;
@@ -23,24 +24,31 @@ pub enum ReadoutSetup {
 }
 
 impl ReadoutSetup {
-    /// The setup of a readout, where there is one: it measures a fresh tare of `tare_us` where that is given, else it reads at
-    /// once, with `tare` where its encoder needs one.
+    /// The setup of the options' readout, where there is one: it measures a fresh tare where they say for how long, else it
+    /// reads at once, with the saved tare where its encoder needs one.
     ///
     /// # Errors
     ///
-    /// As [`Detector::stream`].
-    pub fn of(
-        readout: Option<Detector>,
-        tare: Option<&Tare>,
-        tare_us: Option<i64>,
-        options: &LiveOptions,
-    ) -> taxel_core::Result<Self> {
-        Ok(match (readout, tare_us) {
-            (None, _) => Self::None,
-            (Some(readout), Some(us)) => Self::Taring(us, Box::new(readout)),
-            (Some(readout), None) => Self::Reading(Box::new(readout.stream(&options.array, options.frames(), tare)?)),
-        })
+    /// `Format` for a text that is no readout or no tare, `Problem` for a time that no tare takes; as [`Detector::stream`].
+    pub fn of(options: &LiveOptions) -> taxel_core::Result<Self> {
+        let Some(readout) = &options.readout else { return Ok(Self::None) };
+        let readout = Detector::from_json(readout)?;
+        let tare = match &options.tare {
+            Some(StatedTare::Seconds(seconds)) => return Ok(Self::Taring(tare_us(*seconds)?, Box::new(readout))),
+            Some(StatedTare::Saved(text)) => Some(Tare::from_json(text)?),
+            None => None,
+        };
+        Ok(Self::Reading(Box::new(readout.stream(&options.array, options.frames(), tare.as_ref())?)))
     }
+}
+
+/// How long a fresh tare takes, us.
+#[allow(clippy::cast_possible_truncation)]
+fn tare_us(seconds: f64) -> taxel_core::Result<i64> {
+    if !(1e-6..=3600.0).contains(&seconds) {
+        return Err(problem!("tare"; " is {seconds} s: must lie between 1 us and an hour, or be a taxel.Tare"));
+    }
+    Ok((seconds * 1e6).round_ties_even() as i64)
 }
 
 pub(super) struct RunningReadout {

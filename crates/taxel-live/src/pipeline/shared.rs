@@ -16,6 +16,7 @@ use super::readout_queue::ReadoutQueue;
 use super::recorder::{Host, Recorder};
 use super::sending::Line;
 use super::sink::OutputDetection;
+use super::source::Source;
 use super::viewer_queue::ViewerEvents;
 use crate::capture::Receiver;
 use crate::latency::Latencies;
@@ -31,7 +32,7 @@ const ANSWER_EVERY: Duration = Duration::from_millis(50);
 pub(super) struct Published {
     pub(super) counters: Counters,
     pub(super) decode_latency: Latencies,
-    pub(super) output_latency: Latencies,
+    pub(super) report_latency: Latencies,
     pub(super) markers: Vec<Marker>,
     pub(super) picture: Vec<u16>,
     pub(super) tare: Option<Tare>,
@@ -59,6 +60,8 @@ pub(super) struct RecordingSlot {
 /// State shared by all threads.
 pub(super) struct Shared {
     pub(super) options: LiveOptions,
+    /// The other sources of the recording.
+    pub(super) sources: Vec<Source>,
     pub(super) begun: Instant,
     pub(super) receiver: Receiver,
     pub(super) readout_queue: ReadoutQueue,
@@ -141,7 +144,7 @@ impl Shared {
             capture: self.receiver.counts(),
             bridged: self.receiver.bridged(),
             decode_latency: published.decode_latency.quantiles(),
-            output_latency: published.output_latency.quantiles(),
+            report_latency: published.report_latency.quantiles(),
             sent: self.sending.iter().map(|line| line.counts()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),
             ..published.counters.clone()

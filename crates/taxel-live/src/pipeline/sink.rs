@@ -10,9 +10,9 @@ pub struct OutputDetection {
     /// The detection.
     pub detection: Detection,
     /// Time of the output by the host's clock, ns since 1970.
-    pub output_ns: i64,
-    /// Time of the output by the board's clock: `output_ns` converted with the estimated offset; us.
-    pub output_us: i64,
+    pub reported_ns: i64,
+    /// Time of the output by the board's clock: `reported_ns` converted with the estimated offset; us.
+    pub reported_us: i64,
 }
 
 impl OutputDetection {
@@ -23,15 +23,15 @@ impl OutputDetection {
     ///
     /// If the detection cannot be written as JSON.
     pub fn line(&self) -> std::io::Result<Vec<u8>> {
-        let Self { detection, output_ns, output_us } = self;
+        let Self { detection, reported_ns, reported_us } = self;
         let text = serde_json::to_string(&serde_json::json!({
             "label": detection.label,
             "t_us": detection.t,
             "known_us": detection.known,
             "slope_mv_per_ms": detection.slope,
             "repaired": detection.repaired,
-            "said_us": output_us,
-            "said_ns": output_ns,
+            "reported_us": reported_us,
+            "reported_ns": reported_ns,
         }))?;
         let mut line = String::with_capacity(text.len() + 1);
         for unit in text.encode_utf16() {
@@ -80,7 +80,7 @@ mod tests {
     fn a_line_is_ascii_and_keeps_the_label() {
         let label = "ä\u{1b}[2J\n\u{7f}\u{9b}31m\u{202e}\u{2028}\"\\\u{1f590}";
         let detection = Detection { label: label.into(), t: 5, known: 7, slope: 1.5, repaired: false };
-        let line = OutputDetection { detection, output_ns: 9, output_us: 8 }.line().unwrap();
+        let line = OutputDetection { detection, reported_ns: 9, reported_us: 8 }.line().unwrap();
         assert!(line[..line.len() - 1].iter().all(|byte| (b' '..=b'~').contains(byte)) && line.ends_with(b"\n"));
         let read: serde_json::Value = serde_json::from_slice(&line).unwrap();
         assert_eq!((read["label"].as_str(), read["t_us"].as_i64()), (Some(label), Some(5)));

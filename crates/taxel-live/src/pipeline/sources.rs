@@ -223,15 +223,19 @@ impl<Board> Others<Board> {
         begin: impl Fn(SocketAddr, LiveOptions, Part) -> Result<Board>,
     ) -> Result<Self> {
         let (mut others, options) = (Self { boards: vec![], numbers: vec![], threads: vec![] }, &shared.options);
-        for Source { name, kind } in &options.sources {
+        for Source { name, kind } in &shared.sources {
             let host: Weak<dyn Host> = Arc::<Shared>::downgrade(shared);
             let part = Part { host, name: name.clone() };
             let stream = match kind {
                 SourceKind::Board(address, array, registers) => {
                     let own = LiveOptions {
                         registers: *registers,
-                        capture: options.capture,
                         record: options.record.clone(),
+                        compression: options.compression.clone(),
+                        overwrite: options.overwrite,
+                        kernel_buffer_bytes: options.kernel_buffer_bytes,
+                        queue_bytes: options.queue_bytes,
+                        gro: options.gro,
                         ..LiveOptions::new((**array).clone())
                     };
                     let board = begin(*address, own, part)?;

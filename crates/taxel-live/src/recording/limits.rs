@@ -6,6 +6,8 @@ use std::path::Path;
 
 use mcap::records::op;
 
+use taxel_core::Hint;
+
 use crate::{Error, Result};
 
 /// Largest size of what is read of a file into memory where the caller says no other, bytes: 4 GiB.
@@ -48,11 +50,15 @@ pub(super) fn datagrams(length: u64) -> u64 {
     length.saturating_mul(100).saturating_add(1 << 26)
 }
 
+/// The error of more bytes than are read unless the caller allows them.
+pub(super) fn too_large(path: &Path, text: &str) -> Error {
+    taxel_core::Error::format(format!("{}: {text}", path.display())).helped_by("limit", Hint::Larger).into()
+}
+
 /// Refuses more bytes in memory than a caller allows.
 pub(super) fn in_memory(path: &Path, what: &str, size: u64, most: u64) -> Result<()> {
     if size > most {
-        let reason = format!("{what} of {size} bytes or more, unpacked; at most {most} are read");
-        return Err(Error::format(path, &format!("{reason}: --limit BYTES (limit=) says how many may be")));
+        return Err(too_large(path, &format!("{what} of {size} bytes or more, unpacked; at most {most} are read")));
     }
     Ok(())
 }

@@ -168,7 +168,7 @@ pub fn decode_lsa(
     if wire::v2::begins(&bytes) {
         let name = path.display();
         let reason = "begins with a datagram of wire version 2; a .lsa holds version 1";
-        return Err(taxel_core::Error::Format(format!("{name}: {reason}: record version 2 to a .mcap file")).into());
+        return Err(taxel_core::Error::format(format!("{name}: {reason}: record version 2 to a .mcap file")).into());
     }
     let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(differences);
     let mut events = Events::empty(array);

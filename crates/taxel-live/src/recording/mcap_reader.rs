@@ -40,7 +40,7 @@ pub struct Reader {
     rebuilt: Rebuilt,
     /// How many bytes of a source may be in memory at once.
     memory: u64,
-    /// Whether a user said so.
+    /// Whether a user stated it.
     allowed: bool,
 }
 
@@ -376,11 +376,11 @@ impl Reader {
                             *last = number;
                             *in_datagrams += data.len() as u64;
                             if *in_datagrams > most {
-                                wrong = Some(Error::format(
+                                wrong = Some(limits::too_large(
                                     &self.blocks.path,
                                     &format!(
                                         "the datagrams up to byte {} unpack to {in_datagrams} bytes; at most {most} are read \
-                                         (100 times the file and 64 MiB): --limit BYTES (limit=) says how many may be",
+                                         (100 times the file and 64 MiB)",
                                         block.offset
                                     ),
                                 ));

@@ -485,8 +485,8 @@ impl Verdict {
     /// What the text ends with: the texts of all parts, and the steps back and the time after which times are doubtful unless a
     /// part says them.
     fn end(&self) -> String {
-        let said = self.parts.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
-        let own = self.doubtful_after_us.filter(|_| self.doubtful_after_us != said);
+        let stated = self.parts.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
+        let own = self.doubtful_after_us.filter(|_| self.doubtful_after_us != stated);
         let parts = self.parts.iter().map(|(name, part)| format!("{name}: {}", part.text));
         let all = self.parts.is_empty() && self.damaged.contains_key(JUMPED_BEFORE);
         let doubt = own.map(|after| match all {

@@ -68,7 +68,7 @@ pub struct PictureRest {
     /// The cells that flicker: no value of theirs counts as above rest.
     pub flickering: Vec<usize>,
     /// Where something lay in the quiet stretch, for people; empty where nothing did.
-    pub on: String,
+    pub preload_at: String,
 }
 
 /// The pictures of a source as they are given.
@@ -134,7 +134,7 @@ struct Source {
     rest_source: RestSource,
     falls: bool,
     flickering: Vec<usize>,
-    on: String,
+    preload_at: String,
     /// The rest of its cells, each from the picture of this number on; there is one at least.
     rests: Vec<(usize, Vec<u16>)>,
 }
@@ -142,12 +142,12 @@ struct Source {
 impl Source {
     fn new(from: PictureSource<'_>, steps: Steps) -> Self {
         let (ticks, mut rests) = (steps.ticks(from.values), from.rests(steps));
-        let PictureRest { source: rest_source, falls, flickering, on, .. } = from.rest;
+        let PictureRest { source: rest_source, falls, flickering, preload_at, .. } = from.rest;
         for (_, rest) in &mut rests {
             // No value is above the greatest; a taxel without a rest would get that of its first value.
             flickering.iter().for_each(|&cell| rest[cell] = UNKNOWN - 1);
         }
-        Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, on, rests }
+        Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, preload_at, rests }
     }
 
     /// The rest of its cells at a picture; before the first one, that of the first.
@@ -296,7 +296,7 @@ impl PictureIndex {
 
     /// The places of its sources, where the rest of each comes from, whether its values fall from it, and where something lay then.
     pub fn places(&self) -> impl Iterator<Item = (&PicturePlace, RestSource, bool, &str)> {
-        self.sources.iter().map(|source| (&source.place, source.rest_source, source.falls, source.on.as_str()))
+        self.sources.iter().map(|source| (&source.place, source.rest_source, source.falls, source.preload_at.as_str()))
     }
 
     /// Column and row of the taxels that flicker, which never count as above rest.
@@ -636,7 +636,7 @@ mod tests {
             loaded_from: 0.0,
             falls: false,
             flickering: vec![],
-            on: String::new(),
+            preload_at: String::new(),
         };
         let source = |place, (t, values): &'_ (Vec<i64>, Vec<f32>)| (place, t.clone(), values.clone());
         let all = [source(place("left", 0), left), source(place("right", 4), right)];
@@ -760,7 +760,7 @@ mod tests {
                 loaded_from: 7.0,
                 falls: false,
                 flickering: vec![],
-                on: String::new(),
+                preload_at: String::new(),
             };
             let sources = values.iter().zip([("left", 0), ("right", 5)]).map(|(values, (name, left))| PictureSource {
                 place: PicturePlace { name: name.to_owned(), left, rows: 4, columns: 4 },

@@ -17,7 +17,7 @@ use super::{Activity, ChangeReader, KeyframeIndex, Read};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
-use taxel_core::lain::{LOADED_TICKS, lain, place};
+use taxel_core::preload::{LOADED_TICKS, place, preload};
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::Change;
 use taxel_live::recording::{
@@ -81,7 +81,7 @@ pub struct RecordingIndex {
     /// The drift and the delays that its datagrams' arrivals show; `None` of raw bytes.
     pub pace: Option<Pace>,
     /// Where something lay in the quiet stretch that the rest is first taken from, for people; empty where nothing did.
-    pub on: String,
+    pub preload_at: String,
     /// One line that states what was lost.
     pub verdict: String,
     /// Whether the end of the file is missing.
@@ -125,7 +125,7 @@ impl RecordingIndex {
             activity: Activity::new(&header_array),
             remarks: Remarks::default(),
             pace: None,
-            on: String::new(),
+            preload_at: String::new(),
             verdict: String::new(),
             unfinished,
         };
@@ -285,7 +285,7 @@ impl RecordingIndex {
         self.verdict = contents.verdict;
         self.pace = contents.clock.pace();
         let columns = usize::from(self.header.array.columns);
-        self.on = place(&lain(&state.rests_less(), columns, LOADED_TICKS), columns, (0, 0));
+        self.preload_at = place(&preload(&state.rests_less(), columns, LOADED_TICKS), columns, (0, 0));
         state.update_curve();
         let columns = state.time_columns().clone();
         let whole =

@@ -16,7 +16,7 @@ use taxel_panel::{
     Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, LabelConflict, LabelEdit,
     LabelRequests, LabelRow, LabelTable, Opening, PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource,
     PicturesRead, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers, RestSource, TrainingRequests,
-    UnhealthyTaxels, UserPreset, UserPresets,
+    TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 
 use crate::convert::{ArrayParts, array, from_array, slice, to_array};
@@ -90,14 +90,14 @@ impl FileRequests for PythonHandler {
             _ => (least.into(), greatest.into()),
         };
         let (least, greatest): (Vec<_>, Vec<_>) = activity.range.iter().map(range).unzip();
-        let (dead, stuck, noisy, untold) = self.call(|handler| {
+        let (dead, stuck, noisy, untested) = self.call(|handler| {
             let py = handler.py();
             let values = known.then(|| (array(py, activity.values.clone()), array(py, least), array(py, greatest)));
             let counts = (array(py, activity.events.clone()), array(py, activity.moved.clone()));
             let touches = from_touches(py, &activity.touches);
             handler.call_method1("health", (from_array(sensor), counts.0, counts.1, touches, values))?.extract()
         })?;
-        Ok(UnhealthyTaxels { dead, stuck, noisy, untold })
+        Ok(UnhealthyTaxels { dead, stuck, noisy, untested })
     }
 
     fn recordings(&self, folder: &Path) -> Reply<Vec<String>> {
@@ -120,9 +120,9 @@ impl FileRequests for PythonHandler {
     }
 
     fn health_of_pictures(&self, path: &Path, trial: Option<&str>) -> Reply<UnhealthyTaxels> {
-        let (dead, stuck, noisy, untold) =
+        let (dead, stuck, noisy, untested) =
             self.call(|handler| handler.call_method1("health_of_pictures", (path, trial))?.extract())?;
-        Ok(UnhealthyTaxels { dead, stuck, noisy, untold })
+        Ok(UnhealthyTaxels { dead, stuck, noisy, untested })
     }
 
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>> {
@@ -167,8 +167,9 @@ impl LabelRequests for PythonHandler {
 }
 
 impl TrainingRequests for PythonHandler {
-    fn train(&self, recording: &Path, out: &Path) -> Reply<String> {
-        self.call(|handler| handler.call_method1("train", (recording, out))?.extract())
+    fn train(&self, recording: &Path, out: &Path) -> Reply<TrainingResult> {
+        let (text, next, options) = self.call(|handler| handler.call_method1("train", (recording, out))?.extract())?;
+        Ok(TrainingResult { text, next, options })
     }
 
     fn command(&self, recording: &Path, out: &Path) -> Reply<String> {
@@ -288,8 +289,15 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
     };
     let file = PictureFile { unit, picture_us, remarks, note_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
-    for (name, left, rows, columns, t, values, (rest, rests, ticks_by_unit, loaded_from, falls, flickering, on)) in
-        &sources
+    for (
+        name,
+        left,
+        rows,
+        columns,
+        t,
+        values,
+        (rest, rests, ticks_by_unit, loaded_from, falls, flickering, preload_at),
+    ) in &sources
     {
         let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", rests)?);
         let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
@@ -307,7 +315,7 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
             loaded_from: *loaded_from,
             falls: *falls,
             flickering: flickering.clone(),
-            on: on.clone(),
+            preload_at: preload_at.clone(),
         };
         let place = PicturePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
         placed.push(PictureSource { place, t: t.to_vec(), values, rest });

@@ -147,19 +147,19 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     """
     if not {"fits", "other"} & set(values):
         return values
-    own = values.get("neurons", {})
-    other = values.get("other")
-    if other is not None and not isinstance(other, Mapping):
-        other = own[text("recipe: other", other, own)]
+    listed = values.get("neurons", {})
+    rest = values.get("other")
+    if rest is not None and not isinstance(rest, Mapping):
+        rest = listed[text("recipe: other", rest, listed)]
     owns = {label: _own(values, text("label", label)) for label in labels}
     last = {label: _own(values, _plain(label).rpartition("_")[2]) for label in labels}
     neurons = {}
     for label in labels:
-        alone = sum(last[label] in (owns[one], last[one]) for one in labels) == 1
-        neuron = own.get(label, own.get(owns[label] or (last[label] if alone else None), other))
+        alone = sum(last[label] in (owns[kind], last[kind]) for kind in labels) == 1
+        neuron = listed.get(label, listed.get(owns[label] or (last[label] if alone else None), rest))
         if neuron is None:
             raise ProblemError(
-                f"recipe: it is for {' and '.join(own)}, not for {shown(label)}: leave that label out, or choose "
+                f"recipe: it is for {' and '.join(listed)}, not for {shown(label)}: leave that label out, or choose "
                 f"another recipe: there are {', '.join(names())}"
             )
         neurons[label] = dict(neuron)

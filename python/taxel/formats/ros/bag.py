@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taxel._base.documents import read_text
+from taxel._base.errors import helped, refused
 from taxel._base.files import open_file
 from taxel._base.limits import CHUNK
 from taxel._base.messages import escaped, first_line, installing
@@ -66,8 +67,8 @@ class Bag:
         ------
         FormatError : no such topic, messages of several types, or a type without a definition
         """
-        found = [one for one in self.reader.connections if one.topic == topic]
-        types = sorted({one.msgtype for one in found})
+        found = [connection for connection in self.reader.connections if connection.topic == topic]
+        types = sorted({connection.msgtype for connection in found})
         if not found:
             there = ", ".join(sorted(self.topics())) or "none"
             raise FormatError(f"{self.path}: has no topic {topic}; its topics are {there}")
@@ -75,17 +76,18 @@ class Bag:
             raise FormatError(f"{self.path}: topic {topic} has messages of several types ({', '.join(types)})")
         undefined = self.undefined(types[0])
         if undefined:
-            raise FormatError(
-                f"{self.path}: holds no definition of {undefined} (topic {topic}); give it by --types DIR (types=), a "
-                f"folder of .msg or .idl files, or by --ros NAME (ros=), one of {', '.join(_stores())}"
+            error = FormatError(
+                f"{self.path}: holds no definition of {undefined} (topic {topic}); a folder of .msg or .idl files may, "
+                f"or a release of ROS, one of {', '.join(_stores())}"
             )
-        for one in found:
-            self._check_digest(one)
+            raise helped(error, "types", "give")
+        for connection in found:
+            self._check_digest(connection)
         return found
 
     def topics(self) -> set[str]:
         """Return the names of all topics."""
-        return {one.topic for one in self.reader.connections}
+        return {connection.topic for connection in self.reader.connections}
 
     def undefined(self, name: str) -> str:
         """Return the name of a type that is not defined: this one, or one that it is made of; "" if none."""
@@ -112,15 +114,15 @@ class Bag:
         decode = self.store.deserialize_ros1 if self.is_ros1 else self.store.deserialize_cdr
         return decode(data, connection.msgtype)
 
-    def _check_digest(self, one: Connection) -> None:
+    def _check_digest(self, sent: Connection) -> None:
         """Refuse a definition that was given for messages of another one, if the bag holds the digest of its own."""
-        if one.msgdef.data or not one.digest:
+        if sent.msgdef.data or not sent.digest:
             return
-        given = self.store.generate_msgdef(one.msgtype)[1] if self.is_ros1 else self.store.hash_rihs01(one.msgtype)
-        if given != one.digest:
+        given = self.store.generate_msgdef(sent.msgtype)[1] if self.is_ros1 else self.store.hash_rihs01(sent.msgtype)
+        if given != sent.digest:
             raise FormatError(
-                f"{self.path}: was recorded with another definition of {one.msgtype} than the one given; its digest is "
-                f"{one.digest}"
+                f"{self.path}: was recorded with another definition of {sent.msgtype} than the one given; its digest "
+                f"is {sent.digest}"
             )
 
 
@@ -218,15 +220,15 @@ def _store(connections: Sequence[Connection], types: Path | None, ros: str | Non
 
     stores = _stores()
     if ros is not None and ros not in stores:
-        raise ProblemError(f"ros is {ros}: must be one of {', '.join(stores)}")
+        raise refused("ros", f" is {ros}: must be one of {', '.join(stores)}")
     defined: dict[str, Any] = {} if ros is None else dict(get_typestore(stores[ros]).fielddefs)
     if types is not None:
-        defined |= _of_folder(types, [one.msgtype for one in connections])
-    for one in connections:
-        if one.msgdef.format == MessageDefinitionFormat.MSG:
-            defined |= get_types_from_msg(one.msgdef.data, one.msgtype)
-        elif one.msgdef.format == MessageDefinitionFormat.IDL:
-            defined |= _of_idl(one.msgdef.data)
+        defined |= _of_folder(types, [connection.msgtype for connection in connections])
+    for connection in connections:
+        if connection.msgdef.format == MessageDefinitionFormat.MSG:
+            defined |= get_types_from_msg(connection.msgdef.data, connection.msgtype)
+        elif connection.msgdef.format == MessageDefinitionFormat.IDL:
+            defined |= _of_idl(connection.msgdef.data)
     store = get_typestore(Stores.EMPTY)
     store.register(defined)
     return store
@@ -236,7 +238,7 @@ def _stores() -> dict[str, Any]:
     """Return the releases of ROS whose types rosbags knows, by name."""
     from rosbags.typesys import Stores  # noqa: PLC0415  an extra
 
-    return {one.value.partition("_")[2]: one for one in Stores if "_" in one.value}
+    return {store.value.partition("_")[2]: store for store in Stores if "_" in store.value}
 
 
 def _of_folder(folder: Path, needed: Iterable[str]) -> dict[str, Any]:
@@ -263,7 +265,7 @@ def _package(file: Path, needed: Iterable[str]) -> str:
     """Return the package of a .msg file: of PACKAGE/msg/NAME.msg, or else the one that the bag's types name."""
     if file.parent.name == "msg":
         return file.resolve().parent.parent.name
-    beside = {other.stem for other in file.parent.glob("*.msg")}
+    beside = {message.stem for message in file.parent.glob("*.msg")}
     packages = {name.split("/")[0] for name in needed if name.split("/")[-1] in beside}
     return packages.pop() if len(packages) == 1 else file.resolve().parent.name
 

@@ -52,8 +52,8 @@ def leaves(message: Any, path: str = "", *, listed: bool = False) -> Iterator[tu
         for inner, _ in leaves(message[0], listed=True) if message and is_dataclass(message[0]) else ():
             yield f"{path}.{inner}", values(message, inner)
     elif is_dataclass(message):
-        for one in fields(message) if _type(message) not in _WITHOUT_READINGS else ():
-            yield from leaves(getattr(message, one.name), f"{path}.{one.name}".lstrip("."), listed=listed)
+        for field in fields(message) if _type(message) not in _WITHOUT_READINGS else ():
+            yield from leaves(getattr(message, field.name), f"{path}.{field.name}".lstrip("."), listed=listed)
     elif listed and isinstance(message, int | float | np.number):
         yield path, values(message, "")
 
@@ -74,7 +74,7 @@ def values(message: Any, path: str) -> NDArray[Any]:
     if isinstance(message, list):
         if step.isascii() and step.isdigit():
             return values(message[int(step)], rest)
-        each = [values(one, path).reshape(-1) for one in message]
+        each = [values(part, path).reshape(-1) for part in message]
         return np.concatenate(each) if each else np.empty(0)
     if step:
         if not is_dataclass(message) or not hasattr(message, step):

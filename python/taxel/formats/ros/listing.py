@@ -66,16 +66,16 @@ def topics(path: Path, types: Path | None = None, ros: str | None = None) -> lis
     ProblemError : an unknown release, or a folder without definitions
     """
     with opened(path, types, ros) as bag:
-        return [one for topic in sorted({c.topic for c in bag.reader.connections}) for one in _of_topic(bag, topic)]
+        return [each for topic in sorted({c.topic for c in bag.reader.connections}) for each in _of_topic(bag, topic)]
 
 
 def _of_topic(bag: Bag, topic: str) -> list[Topic]:
     """Return the fields of a topic by the first message of the most frequent length that has numbers; count all."""
-    connections = [one for one in bag.reader.connections if one.topic == topic]
+    connections = [connection for connection in bag.reader.connections if connection.topic == topic]
     kind = connections[0].msgtype
     undefined = bag.undefined(kind)
     if undefined:
-        count = sum(one.msgcount for one in connections)
+        count = sum(connection.msgcount for connection in connections)
         return [Topic(topic, kind, "", (), "", count, None, f"no definition of {undefined}")]
     lengths: Counter[int] = Counter()
     firsts: dict[int, tuple[Any, bytes]] = {}
@@ -86,7 +86,7 @@ def _of_topic(bag: Bag, topic: str) -> list[Topic]:
             firsts.setdefault(len(data), (connection, data))
         times.append(at)
     found: list[tuple[str, NDArray[Any]]] = []
-    for length in sorted(firsts, key=lambda one: -lengths[one]):
+    for length in sorted(firsts, key=lambda size: -lengths[size]):
         first = bag.decoded(*firsts[length])
         try:
             found = list(leaves(first))

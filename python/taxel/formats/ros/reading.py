@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.columns import Growing
+from taxel._base.errors import helped
 from taxel._base.limits import TIME_US, VALUE
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
@@ -106,18 +107,18 @@ def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: s
     ProblemError : an unknown release, or a folder without definitions
     """
     with opened(path, types, ros) as bag:
-        connections = {one.topic: bag.of_topic(one.topic) for one in chosen}
-        held = [_Held(bag, one) for one in chosen]
+        connections = {choice.topic: bag.of_topic(choice.topic) for choice in chosen}
+        held = [_Held(bag, choice) for choice in chosen]
         for connection, at, data in bag.messages([c for each in connections.values() for c in each]):
             try:
                 message = bag.decoded(connection, data)
             except Exception as error:  # rosbags' own, and those of bytes that it does not expect
                 raise FormatError(f"{path}: a message of topic {connection.topic} at {at} ns: {error}") from None
-            for one in held:
-                if one.topic == connection.topic:
-                    one.add(message, at)
+            for held_topic in held:
+                if held_topic.topic == connection.topic:
+                    held_topic.add(message, at)
         unread = tuple(sorted(bag.topics() - connections.keys()))
-        return [one.read(connections[one.topic][0].msgtype, unread) for one in held]
+        return [topic.read(connections[topic.topic][0].msgtype, unread) for topic in held]
 
 
 class _Shape(NamedTuple):
@@ -175,7 +176,7 @@ class _Held:
         found = list(leaves(message))
         there = [path for path, numbers in found if numbers.size > 1]
         if len(there) > 1:
-            raise FormatError(f"say which field (--field NAME, field=); there are {_there(message)}")
+            raise helped(FormatError(f"has several fields with numbers, {_there(message)}"), "field", "give")
         if not there and not is_empty(found):
             self.trouble = "no field with more numbers than one; taxel info lists topics that have one"
         return there[0] if there else None
@@ -191,12 +192,12 @@ class _Held:
         """Return the pictures of the messages."""
         if not self.values:
             raise FormatError(f"{self.place}: holds no message")
-        if self.trouble and not any(one.size for one in self.values):
+        if self.trouble and not any(value.size for value in self.values):
             raise FormatError(f"{self.place}: {self.trouble}")
         array = sensor(self.place, self.array or self._stated())
-        fits = np.array([_fits(one, array) for one in self.values])
+        fits = np.array([_fits(value, array) for value in self.values])
         if not fits.any():
-            some = next((one for one in self.values if one.size), self.values[0])
+            some = next((value for value in self.values if value.size), self.values[0])
             size = " x ".join(map(str, some.shape)) if some.ndim == 2 else f"{some.size}"
             raise FormatError(
                 f"{self.place}: its messages hold {size} values; the array has {array.rows} x {array.columns}"
@@ -215,7 +216,7 @@ class _Held:
             kind,
             array,
             pictures,
-            "counts" if all(one for one, fit in zip(self.are_whole, fits, strict=True) if fit) else "as sent",
+            "counts" if all(is_whole for is_whole, fit in zip(self.are_whole, fits, strict=True) if fit) else "as sent",
             t // 1000,
             has_stamps,
             by_the_bag,
@@ -225,7 +226,7 @@ class _Held:
 
     def _pictures(self, chosen: NDArray[np.int64], array: Array) -> NDArray[np.float32]:
         """Return the numbers of messages as pictures; those that are read in their order are moved, not copied."""
-        begins = np.concatenate([[0], np.cumsum([one.size for one in self.values])])
+        begins = np.concatenate([[0], np.cumsum([value.size for value in self.values])])
         numbers, size = self.numbers.column("numbers"), array.rows * array.columns
         if (np.diff(chosen) > 0).all():
             numbers.setflags(write=True)
@@ -239,11 +240,11 @@ class _Held:
 
     def _stated(self) -> Array:
         """Return the most frequent length: in rows and columns as most of its messages state them, else in one row."""
-        lengths = Counter(one.shape for one in self.values if one.size)
+        lengths = Counter(value.shape for value in self.values if value.size)
         if not lengths:
             raise FormatError(f"{self.place}: its messages hold no values")
         ((most, _),) = lengths.most_common(1)
-        stated = Counter(g for one, g in zip(self.values, self.grids, strict=True) if g and one.shape == most)
+        stated = Counter(g for value, g in zip(self.values, self.grids, strict=True) if g and value.shape == most)
         rows, columns = stated.most_common(1)[0][0] if stated else (1, most[0])
         try:
             return Array(rows, columns, name=self.topic)
@@ -287,7 +288,7 @@ def _times(stamps: NDArray[np.int64], bag: NDArray[np.int64]) -> tuple[NDArray[n
     for run in np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1) if len(wrong) else ():
         before, after = t[: run[0]][-1:], stamps[run[-1] + 1 :][:1]
         held = [np.concatenate([before, bag[run] - less, after]) for less in (0, late)]
-        fits = next((one for one in held if (np.diff(one) > 0).all()), None)
+        fits = next((stamps for stamps in held if (np.diff(stamps) > 0).all()), None)
         low, high = before[0] if len(before) else None, after[0] if len(after) else None
         t[run] = np.clip(bag[run] - late, low, high) if fits is None else fits[len(before) :][: len(run)]
     return t, len(wrong)

@@ -71,7 +71,7 @@ class BoardRequests:
     def board_lines(self) -> tuple[list[str], int]:
         """Return the board's lines since the last call, and how often it was reset."""
         with reasons(), self._lock:
-            return ([], 0) if self._cable is None else (self._cable.said(), self._cable.resets)
+            return ([], 0) if self._cable is None else (self._cable.take_lines(), self._cable.resets)
 
     def connect(self, place: str | None) -> None:
         """Connect the serial line to another place, or disconnect it."""

@@ -61,7 +61,7 @@ class FileRequests:
         )
         result = judged(sensor, TaxelStatistics(activity, on, Touches.of(*touches), *known))
         taxels = result.named()
-        return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untold))
+        return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untested))
 
     def recordings(self, folder: Path) -> list[str]:
         """Return the names of what is a recording in a folder."""

@@ -58,8 +58,15 @@ class TrainingRequests:
             self._closed = True
         self.end()
 
-    def train(self, recording: Path, out: Path) -> str:
-        """Train on the labels of a recording; return the result as lines for people, and its warnings."""
+    def train(self, recording: Path, out: Path) -> tuple[str, str, list[str]]:
+        """Train on the labels of a recording.
+
+        Returns
+        -------
+        tuple of str, str and list of str
+            The result and its warnings as lines for people; the command that detects by the readout; which options of
+            ``taxel train`` may help.
+        """
         request = {"recordings": [str(recording)], "open": self._opening.options_of(recording).given()}
         with self._lock:
             if self._closed:
@@ -70,18 +77,18 @@ class TrainingRequests:
             # A process of its own, so that it takes no time from what arrives.
             self._training = ChildProcess("taxel.tasks", ["train"], stdin=PIPE, stdout=PIPE, text=True)
         try:
-            said = self._answer(self._training, request | {"out": str(out), "overwrite": True})
+            answer = self._answer(self._training, request | {"out": str(out), "overwrite": True})
             code = self._training.returncode
         finally:
             self._training = None
-        if said["type"] == "error":
-            raise ProblemError(said["text"])
-        if said["type"] != "result":
+        if answer["type"] == "error":
+            raise ProblemError(answer["text"])
+        if answer["type"] != "result":
             stopped = code < 0 or code == _INTERRUPTED
             raise ProblemError(_STOPPED if stopped else f"the training ended with code {code}")
         following = shlex.join(["taxel", "detect", "RECORDING", "--readout", _typed(out)])
-        lines = [*said["lines"], "", f"written to {out.name}; next: {following}"]
-        return "\n".join([*lines, *(f"warning: {text}" for text in said["result"]["warnings"])])
+        lines = [*answer["lines"], *(f"warning: {text}" for text in answer["result"]["warnings"])]
+        return "\n".join(lines), following, answer["result"]["options"]
 
     def _answer(self, training: ChildProcess, request: dict[str, Any]) -> dict[str, Any]:
         """Ask for a training, wait until it has ended, and return the last line that it wrote."""

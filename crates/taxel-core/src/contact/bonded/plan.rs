@@ -53,7 +53,7 @@ pub fn check_cells(foam: &Foam, array: &Array, cells_per_pitch: u16) -> Result<(
     within("scene", "cells_per_pitch", cells, "", Range::within(1.0, f64::from(MOST_PER_PITCH)))?;
     let most = most_cells(foam, array)?;
     if cells_per_pitch > most {
-        return Err(Error::Scene(format!(
+        return Err(Error::scene(format!(
             "scene: cells_per_pitch is {cells_per_pitch}: must be {most} or less on {} x {} taxels and {} mm of foam, where \
              more would make more than {LARGEST} cells",
             array.rows, array.columns, foam.thickness_mm

@@ -22,7 +22,7 @@ impl Readout {
 
     /// As [`Readout::from_json`], from the contents of the file without format and version.
     pub(in crate::detect) fn from_parts(parts: Value) -> Result<Self> {
-        let format = |said: String| Error::Format(said);
+        let format = |message: String| Error::format(message);
         // An encoder nested in another value would lose the parameter names from its errors, so it is read by itself
         // first.
         if let Some(encoder) = parts.get("encoder") {

@@ -68,13 +68,13 @@ pub(in crate::detect) struct Crossing {
 
 impl NamedNeuron {
     /// A trained neuron before its first spike.
-    pub fn new(label: &str, one: &TrainedNeuron, threshold: f64, latency_ms: f64, inputs: Inputs) -> Self {
+    pub fn new(label: &str, cell: &TrainedNeuron, threshold: f64, latency_ms: f64, inputs: Inputs) -> Self {
         Self {
             label: label.to_owned(),
             inputs,
-            offset_ms: latency_ms + one.delay_ms,
-            neuron: one.neuron.clone(),
-            weights: one.weights.clone(),
+            offset_ms: latency_ms + cell.delay_ms,
+            neuron: cell.neuron.clone(),
+            weights: cell.weights.clone(),
             threshold,
             stream: None,
             crossings: vec![],

@@ -25,12 +25,14 @@ impl Neurons {
 
     /// The label and present potential of each neuron, mV.
     pub fn potentials(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.neurons.iter().map(|one| (one.label.as_str(), one.stream.as_ref().map_or(0.0, NeuronStream::potential)))
+        self.neurons
+            .iter()
+            .map(|neuron| (neuron.label.as_str(), neuron.stream.as_ref().map_or(0.0, NeuronStream::potential)))
     }
 
     /// The number of detections with an input outside its range in training; `None` if a range is not known.
     pub fn outside(&self) -> Option<u64> {
-        self.neurons.iter().all(|one| one.ranges.are_known()).then_some(self.outside)
+        self.neurons.iter().all(|neuron| neuron.ranges.are_known()).then_some(self.outside)
     }
 
     /// Assigns the encoder's spikes to the neurons' inputs, each with whether it may rest on a repaired event.
@@ -56,11 +58,11 @@ impl Neurons {
         self.waiting.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         let certain = self.waiting.partition_point(|(spike, _)| spike.t < until_ms);
         let mut crossings: Vec<Crossing> = Vec::new();
-        for (k, one) in self.neurons.iter_mut().enumerate() {
+        for (k, neuron) in self.neurons.iter_mut().enumerate() {
             for (spike, repaired) in &self.waiting[..certain] {
-                one.push(*spike, *repaired, k, &mut crossings)?;
+                neuron.push(*spike, *repaired, k, &mut crossings)?;
             }
-            one.advance(until_ms, k, &mut crossings);
+            neuron.advance(until_ms, k, &mut crossings);
         }
         self.waiting.drain(..certain);
         let t_of = |crossing: &Crossing| us(crossing.spike.t - self.neurons[crossing.neuron].offset_ms).round() as i64;

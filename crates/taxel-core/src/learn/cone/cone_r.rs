@@ -65,11 +65,11 @@ impl ConeR {
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
         if self.neuron.time != Time::Grid {
-            return Err(problem!("time is \"continuous\": 6.13 is a sum over grid points, must be \"grid\""));
+            return Err(problem!("time"; " is \"continuous\": 6.13 is a sum over grid points, must be \"grid\""));
         }
         self.check_ranges()?;
         if self.lambdas.iter().sum::<f64>() == 0.0 {
-            return Err(problem!("lambdas are all 0: at least one must be above 0"));
+            return Err(problem!("lambdas"; " are all 0: at least one must be above 0"));
         }
         check_bounds(&self.lb, &self.ub)
     }
@@ -179,7 +179,7 @@ impl ConeRProblem {
         check_examples(neuron, patterns, targets)?;
         if silence.len() != patterns.len() {
             let (given, there) = (silence.len(), patterns.len());
-            return Err(problem!("silence: {given} lists for {there} patterns, must be one a pattern"));
+            return Err(problem!("silence"; ": {given} lists for {there} patterns, must be one a pattern"));
         }
         for (p, windows) in silence.iter().enumerate() {
             check_silence(p, windows.as_deref())?;
@@ -372,12 +372,12 @@ impl ConeRProblem {
         let mut shares = vec![0.0; all];
         for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
             let Some(place) = shares.get_mut(row) else {
-                return Err(problem!("start: a multiplier of row {row}, there are {all} rows"));
+                return Err(problem!("start"; ": a multiplier of row {row}, there are {all} rows"));
             };
             let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
             if !(low <= share && share <= low + 1.0) {
                 return Err(problem!(
-                    "start: the multiplier of row {row} is {share}, must lie from {low} to {}",
+                    "start"; ": the multiplier of row {row} is {share}, must lie from {low} to {}",
                     low + 1.0
                 ));
             }

@@ -97,7 +97,7 @@ impl Horizon {
     fn check(&self, patterns: usize) -> Result<()> {
         match self {
             Self::Each(values) if values.len() != patterns => {
-                Err(problem!("horizon: {} values, must be one, or one a pattern, {patterns}", values.len()))
+                Err(problem!("horizon"; ": {} values, must be one, or one a pattern, {patterns}", values.len()))
             }
             _ => Ok(()),
         }
@@ -114,7 +114,7 @@ impl ConeX {
         self.neuron.check()?;
         if let Some(rearm) = self.neuron.rearm {
             return Err(problem!(
-                "rearm is {rearm}: CONE-X asks for silence at every point, whether the neuron is armed or not; must be None"
+                "rearm"; " is {rearm}: CONE-X asks for silence at every point, whether the neuron is armed or not; must be None"
             ));
         }
         self.check_ranges()?;
@@ -122,11 +122,13 @@ impl ConeX {
         let Margin { height, slope } = self.margin();
         for (name, value, unit) in [("margin", height, "mV"), ("slope", slope, "mV/ms")] {
             if value == 0.0 && self.neuron.time == Time::Continuous {
-                return Err(problem!("{name} is 0 {unit}: must be above 0 in continuous time (1e-6 will do)"));
+                return Err(problem!(name; " is 0 {unit}: must be above 0 in continuous time (1e-6 will do)"));
             }
         }
         if slope > 0.0 && self.neuron.time == Time::Grid {
-            return Err(problem!("slope is {slope} mV/ms: belongs to time \"continuous\", on the grid nothing tapers"));
+            return Err(
+                problem!("slope"; " is {slope} mV/ms: belongs to time \"continuous\", on the grid nothing tapers"),
+            );
         }
         Ok(())
     }

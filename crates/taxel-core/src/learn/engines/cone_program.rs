@@ -16,7 +16,7 @@ use clarabel::solver::{
 
 use crate::learn::statement::Norm;
 use crate::vectors::dot;
-use crate::{Error, Result, Stop};
+use crate::{Result, Stop, problem};
 
 /// A sum of hinges, `weight_i max(r_i.w - limit_i, 0)`; the rows are stored one after the other.
 #[derive(Debug, Default)]
@@ -299,10 +299,8 @@ fn solve_stoppable(
     stop.check()?;
     match solved {
         Ok(Ok((x, z))) if x.iter().chain(&z).all(|v| v.is_finite()) => Ok((x, z)),
-        Ok(Ok(_)) => {
-            Err(Error::Problem("the cone solver gave no finite answer: are the parameters of a sane size?".into()))
-        }
-        Ok(Err(text)) => Err(Error::Problem(format!("the cone solver refuses the problem: {text}"))),
+        Ok(Ok(_)) => Err(problem!("the cone solver gave no finite answer: are the parameters of a sane size?")),
+        Ok(Err(text)) => Err(problem!("the cone solver refuses the problem: {text}")),
         Err(panic) => std::panic::resume_unwind(panic),
     }
 }

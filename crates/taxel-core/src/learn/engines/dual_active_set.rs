@@ -194,7 +194,7 @@ impl DualActiveSet {
     pub fn start(&mut self, from: &Multipliers) -> Result<()> {
         if from.equalities.len() != self.equalities.len() {
             return Err(problem!(
-                "start: {} multipliers of equalities, there are {}",
+                "start"; ": {} multipliers of equalities, there are {}",
                 from.equalities.len(),
                 self.equalities.len()
             ));
@@ -208,10 +208,10 @@ impl DualActiveSet {
         }
         for &(id, z) in &from.inequalities {
             let Some(slot) = slots.get(id.0).copied().flatten() else {
-                return Err(problem!("start: inequality {} is not in the working set", id.0));
+                return Err(problem!("start"; ": inequality {} is not in the working set", id.0));
             };
             if z.is_nan() || z < 0.0 {
-                return Err(problem!("start: multiplier of inequality {} is {z}, must be 0 or more", id.0));
+                return Err(problem!("start"; ": multiplier of inequality {} is {z}, must be 0 or more", id.0));
             }
             if z > 0.0 {
                 wanted.push(slot);

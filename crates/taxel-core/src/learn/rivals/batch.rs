@@ -10,7 +10,7 @@ pub struct Learnt {
     /// One an input of the output neuron.
     pub weights: Vec<f64>,
     /// Further results by name, with all that output spikes depend on.
-    pub said: Map<String, Value>,
+    pub results: Map<String, Value>,
 }
 
 /// The interface of a learner that is fitted to all examples at once.

@@ -37,10 +37,10 @@ pub(super) const SOURCE: Source = Source {
         let i_learning = match given["rule"].as_str() {
             Some("E") => false,
             Some("I") => true,
-            _ => return Err(problem!("rule is {}: must be \"E\" or \"I\"", given["rule"])),
+            _ => return Err(problem!("rule"; " is {}: must be \"E\" or \"I\"", given["rule"])),
         };
         let Some(tau) = given["tau"].as_f64() else {
-            return Err(problem!("tau is {}: must be a number", given["tau"]));
+            return Err(problem!("tau"; " is {}: must be a number", given["tau"]));
         };
         let mut fill = |name: &str, value: Value| {
             if given[name].is_null() {

@@ -83,12 +83,12 @@ impl Rival {
         let (mut all, required) = source.split();
         for key in given.keys() {
             if !all.contains_key(key) && !required.contains(&key.as_str()) {
-                return Err(problem!("{name}: no parameter {key}"));
+                return Err(problem!(key.as_str(); " is not known: {name} has no such parameter"));
             }
         }
         all.extend(given);
         if let Some(missing) = required.iter().find(|name| !all.contains_key(**name)) {
-            return Err(problem!("{missing}: its source does not give it, so it must be given"));
+            return Err(problem!(*missing; ": its source does not give it, so it must be given"));
         }
         (source.arrange)(&mut all)?;
         let take = |all: &Map<String, Value>, names: &[&str]| -> Value {

@@ -327,14 +327,14 @@ impl BatchRule for Skim {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
-            return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
+            return Err(problem!("tau_s"; " is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
         }
         if self.thresholds.is_empty() {
-            return Err(problem!("thresholds: must hold at least one"));
+            return Err(problem!("thresholds"; ": must hold at least one"));
         }
         for (name, value) in [("spread", self.spread), ("delay_ms", self.delay_ms)] {
             if self.branches.is_some() && value.is_none() {
-                return Err(problem!("{name}: none was published for a layer of branches, give one"));
+                return Err(problem!(name; ": none was published for a layer of branches, give one"));
             }
         }
         Ok(())
@@ -359,18 +359,18 @@ impl BatchRule for Skim {
         let scored = || self.thresholds.iter().zip(&counts);
         let best = scored().min_by(|a, b| (a.1.1 + a.1.2).cmp(&(b.1.1 + b.1.2)).then(a.0.total_cmp(b.0)));
         let scores: Vec<Value> = scored().map(|(t, (f, m, x))| json!([t, f, m, x])).collect();
-        let said = json!({
+        let results = json!({
             "threshold": best.map(|(threshold, _)| threshold),
             "scores": scores,
             "residual": residual,
             "rows": normal.rows,
         });
-        Ok(Learnt { weights, said: said.as_object().cloned().unwrap_or_default() })
+        Ok(Learnt { weights, results: results.as_object().cloned().unwrap_or_default() })
     }
 
     fn run(&self, learnt: &Learnt, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
-        let Some(threshold) = learnt.said.get("threshold").and_then(Value::as_f64) else {
-            return Err(problem!("threshold is missing"));
+        let Some(threshold) = learnt.results.get("threshold").and_then(Value::as_f64) else {
+            return Err(problem!("threshold"; " is missing"));
         };
         let output = self.output(&learnt.weights, pattern, stop)?;
         Ok(crossings(&output, threshold, Grid::new(pattern.start, self.step_ms)))

@@ -169,10 +169,12 @@ impl SteppedNeuron {
             Parameter { name, ..Self::TIME_CONSTANT }.check(&value)?;
         }
         if values[1] >= values[0] {
-            return Err(problem!("{} is {} ms: must lie below {}, {} ms", names[1], values[1], names[0], values[0]));
+            return Err(problem!(names[1]; " is {} ms: must lie below {}, {} ms", values[1], names[0], values[0]));
         }
         if self.refractory > 0.0 && self.after_spike != Reset::Membrane {
-            return Err(problem!("refractory is {} ms: must be 0 unless after_spike is \"membrane\"", self.refractory));
+            return Err(
+                problem!("refractory"; " is {} ms: must be 0 unless after_spike is \"membrane\"", self.refractory),
+            );
         }
         Ok(())
     }
@@ -181,7 +183,7 @@ impl SteppedNeuron {
     pub(super) fn check_linear(&self, rule: &str) -> Result<()> {
         if self.after_spike == Reset::Membrane {
             return Err(problem!(
-                "after_spike is \"membrane\": {rule} needs a potential linear in the weights, \"reset\" or \"subtract\""
+                "after_spike"; " is \"membrane\": {rule} needs a potential linear in the weights, \"reset\" or \"subtract\""
             ));
         }
         Ok(())

@@ -73,7 +73,7 @@ impl Tempotron {
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.tau_s() >= self.tau {
-            return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
+            return Err(problem!("tau_s"; " is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
         }
         Ok(())
     }
@@ -242,7 +242,7 @@ impl Tempotron {
                 }
             }
             if weights.iter().any(|w| !w.is_finite()) {
-                return Err(problem!("eta is {eta}: the weights grew beyond all bounds, take a smaller one"));
+                return Err(problem!("eta"; " is {eta}: the weights grew beyond all bounds, take a smaller one"));
             }
             let share = 1.0 - errors as f64 / patterns.len() as f64;
             if trained.right.iter().all(|&r| r <= share) {
@@ -283,10 +283,10 @@ fn crossing(shape: &Shape, state: KernelSum, end: f64, threshold: f64) -> f64 {
 
 fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
     if patterns.is_empty() {
-        return Err(problem!("patterns: there is none, at least one is needed"));
+        return Err(problem!("patterns"; ": there is none, at least one is needed"));
     }
     if patterns.len() != labels.len() {
-        return Err(problem!("labels: {} for {} patterns, must be one a pattern", labels.len(), patterns.len()));
+        return Err(problem!("labels"; ": {} for {} patterns, must be one a pattern", labels.len(), patterns.len()));
     }
     for (p, pattern) in patterns.iter().enumerate() {
         crate::learn::statement::check_pattern(p, pattern)?;

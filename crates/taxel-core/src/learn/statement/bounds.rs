@@ -77,7 +77,7 @@ pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
     if let (Some(a), Some(b)) = (lb.len(), ub.len())
         && a != b
     {
-        return Err(problem!("lb holds {a} bounds, ub {b}: must be one a synapse, or one for all"));
+        return Err(problem!("lb"; " holds {a} bounds, ub {b}: must be one a synapse, or one for all"));
     }
     let each = lb.len().or(ub.len());
     if each == Some(0) {

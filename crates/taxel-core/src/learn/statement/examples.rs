@@ -11,11 +11,11 @@ use crate::{Result, SpikeKind, SpikeTrains, problem};
 /// `Problem`, naming pattern and target.
 pub(crate) fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>]) -> Result<()> {
     if patterns.is_empty() {
-        return Err(problem!("patterns: there is none, at least one is needed"));
+        return Err(problem!("patterns"; ": there is none, at least one is needed"));
     }
     if patterns.len() != targets.len() {
         return Err(problem!(
-            "targets: {} lists for {} patterns, must be one a pattern (an empty one teaches silence)",
+            "targets"; ": {} lists for {} patterns, must be one a pattern (an empty one teaches silence)",
             targets.len(),
             patterns.len()
         ));
@@ -30,7 +30,7 @@ pub(crate) fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets:
 /// Checks that some pattern has a target, for learners that learn nothing from silence alone.
 pub(crate) fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
     if targets.iter().all(Vec::is_empty) {
-        return Err(problem!("targets: no pattern has one, so nothing is to be learnt"));
+        return Err(problem!("targets"; ": no pattern has one, so nothing is to be learnt"));
     }
     Ok(())
 }

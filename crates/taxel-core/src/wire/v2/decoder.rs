@@ -188,8 +188,8 @@ impl Decoder {
     /// `Problem` if a column has fewer entries than [`stream_rows`] returns; nothing is read then.
     pub fn fill(&mut self, datagram: &[u8], arrived: Option<i64>, room: Room<'_>) -> Result<(Columns, Outcome)> {
         let mut laid = Laid::new(check_room(room, datagram.len())?);
-        let heard = self.push_table(datagram, arrived, &mut laid);
-        Ok((laid.end(), heard))
+        let received = self.push_table(datagram, arrived, &mut laid);
+        Ok((laid.end(), received))
     }
 
     #[inline]

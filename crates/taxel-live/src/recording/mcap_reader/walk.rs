@@ -195,11 +195,11 @@ impl<'a> Walk<'a> {
                     self.unpacked += size;
                     let most = limits::unpacked(self.length, self.memory);
                     if self.unpacked > most {
-                        let said = format!("the chunks up to byte {at} say that they unpack to {}", self.unpacked);
-                        let right = "(1000 times the file and 256 MiB): --limit BYTES (limit=) says how many may be";
-                        return Err(Error::format(
+                        let claim = format!("the chunks up to byte {at} say that they unpack to {}", self.unpacked);
+                        let right = "(1000 times the file and 256 MiB)";
+                        return Err(limits::too_large(
                             self.path,
-                            &format!("{said} bytes; at most {most} are read {right}"),
+                            &format!("{claim} bytes; at most {most} are read {right}"),
                         ));
                     }
                     self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: false });

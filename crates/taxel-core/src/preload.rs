@@ -1,14 +1,14 @@
-//! What lay on a sensor in the quiet stretch that its rest was first taken from, and was taken away later.
+//! The preload of a sensor: a load during the quiet stretch that its rest was first taken from, which was removed later.
 
 use crate::tracked_rest::TOUCHED_TOGETHER;
 
 /// A taxel lay under a load if its rest was later less by more than so many ticks.
 pub const LOADED_TICKS: f64 = 8.0;
 
-/// Of how much less each taxel rested later (not a number where it had no rest), what lay on it: what is above a bound,
-/// with neighbours; 0 elsewhere, of channels, and where so many taxels rested less that it is drift.
+/// Returns the preload of each taxel, given by how much less it rested later (NaN where it had no rest): the values above a
+/// bound that have neighbours; 0 elsewhere, for channels, and where so many taxels rested less that it is drift.
 #[must_use]
-pub fn lain(less: &[f64], columns: usize, above: f64) -> Vec<f64> {
+pub fn preload(less: &[f64], columns: usize, above: f64) -> Vec<f64> {
     let rows = less.len() / columns.max(1);
     let loaded = |y: usize, x: usize| less[y * columns + x] > above;
     let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
@@ -16,31 +16,31 @@ pub fn lain(less: &[f64], columns: usize, above: f64) -> Vec<f64> {
         let near = around(y, rows).flat_map(|y| around(x, columns).map(move |x| (y, x)));
         near.filter(|&(y, x)| loaded(y, x)).count() >= TOUCHED_TOGETHER
     };
-    let mut lay = vec![0.0; less.len()];
+    let mut found = vec![0.0; less.len()];
     if rows.min(columns) >= TOUCHED_TOGETHER {
         for (y, x) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))) {
             if loaded(y, x) && together(y, x) {
-                lay[y * columns + x] = less[y * columns + x];
+                found[y * columns + x] = less[y * columns + x];
             }
         }
     }
     let known = less.iter().filter(|less| !less.is_nan()).count();
-    if 2 * lay.iter().filter(|&&load| load > 0.0).count() > known {
-        lay.fill(0.0);
+    if 2 * found.iter().filter(|&&load| load > 0.0).count() > known {
+        found.fill(0.0);
     }
-    lay
+    found
 }
 
-/// Rows and columns of what lay on a sensor whose first taxel is in this row and column, for people, and how much it
-/// was at most; empty where nothing lay.
+/// Describes the rows and columns of the preload of a sensor whose first taxel is in this row and column, and its maximum;
+/// empty without a preload.
 #[must_use]
-pub fn place(lay: &[f64], columns: usize, corner: (usize, usize)) -> String {
-    let on = || (0..lay.len()).filter(|&k| lay[k] > 0.0);
+pub fn place(preload: &[f64], columns: usize, corner: (usize, usize)) -> String {
+    let on = || (0..preload.len()).filter(|&k| preload[k] > 0.0);
     let span = |name: &str, places: &mut dyn Iterator<Item = usize>| {
         let (least, most) = places.fold((usize::MAX, 0), |(least, most), at| (least.min(at), most.max(at)));
         if least == most { format!("{name} {least}") } else { format!("{name}s {least} to {most}") }
     };
-    let most = lay.iter().copied().fold(0.0, f64::max);
+    let most = preload.iter().copied().fold(0.0, f64::max);
     if most == 0.0 {
         return String::new();
     }
@@ -57,12 +57,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn taxels_that_rested_higher_together_are_said_and_bad_ones_and_drift_are_not() {
-        let said = |less: &[f64], columns| place(&lain(less, columns, LOADED_TICKS), columns, (0, 0));
+    fn taxels_that_rested_higher_together_are_found_and_bad_ones_and_drift_are_not() {
+        let place_of = |less: &[f64], columns| place(&preload(less, columns, LOADED_TICKS), columns, (0, 0));
         let with = |places: &[(usize, usize)], load: f64| {
             let mut all = vec![0.0; 48];
             places.iter().for_each(|&(y, x)| all[y * 8 + x] = load);
-            said(&all, 8)
+            place_of(&all, 8)
         };
         assert_eq!(
             with(&[(2, 5), (3, 5), (3, 6), (0, 0)], 41.23),
@@ -71,15 +71,15 @@ mod tests {
         assert_eq!(with(&[(1, 5), (1, 6), (1, 7)], 9.0), "row 1, column 6 (up to 9 above rest)");
         assert_eq!(with(&[(1, 5), (1, 6)], 90.0), "", "a pair is bad");
         assert_eq!(with(&[(2, 5), (3, 5), (3, 6)], 8.0), "", "no more than noise and drift");
-        assert_eq!(said(&[20.0; 48], 8), "", "all drift");
-        assert_eq!(said(&[f64::NAN; 48], 8), "");
-        assert_eq!(said(&[20.0; 4], 4), "");
+        assert_eq!(place_of(&[20.0; 48], 8), "", "all drift");
+        assert_eq!(place_of(&[f64::NAN; 48], 8), "");
+        assert_eq!(place_of(&[20.0; 4], 4), "");
     }
 
     #[test]
     fn places_count_from_the_corner_and_loads_have_three_digits() {
-        let lay = [0.0, 0.0, 0.0, 0.0, 0.012_345, 0.0];
-        assert_eq!(place(&lay, 3, (10, 20)), "row 11, column 21 (up to 0.0123 above rest)");
-        assert_eq!(place(&lay.map(|load| load * 1e5), 3, (0, 0)), "row 1, column 1 (up to 1234 above rest)");
+        let preload = [0.0, 0.0, 0.0, 0.0, 0.012_345, 0.0];
+        assert_eq!(place(&preload, 3, (10, 20)), "row 11, column 21 (up to 0.0123 above rest)");
+        assert_eq!(place(&preload.map(|load| load * 1e5), 3, (0, 0)), "row 1, column 1 (up to 1234 above rest)");
     }
 }

@@ -16,6 +16,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
+from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._base.messages import escaped
 from taxel._base.times import begun
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["write_listening"]
+__all__ = ["write_detections"]
 
 #: How many moments are drawn a label, and how much around each in time constants of the neuron.
 _MOMENTS, _AROUND = 4, 6.0
@@ -64,7 +65,7 @@ class _Moment(NamedTuple):
     badness: float
 
 
-def write_listening(
+def write_detections(
     folder: str | os.PathLike[str],
     readout: Readout | PlainRule,
     listened: Sequence[Outcome],
@@ -105,7 +106,7 @@ def write_listening(
     """
     detector("readout", readout)
     if not listened:
-        raise ProblemError("listened is empty: there is nothing to report")
+        raise refused("listened", " is empty: there is nothing to report")
     place = Path(folder)
     moments = {label: _moments(listened, label) for label in readout.labels}
     aligned = {} if alignments is None else alignments
@@ -128,10 +129,10 @@ def write_listening(
         labels=readout.labels,
         drawn=drawn,
         aligned={label: aligned.get(label) for label in readout.labels},
-        rows=[_row(one, label, one.score) for one in listened for label in readout.labels],
+        rows=[_row(outcome, label, outcome.score) for outcome in listened for label in readout.labels],
         held_out=[
-            _row(one, label, own)
-            for one, own in zip(listened, held_out, strict=bool(held_out))
+            _row(outcome, label, score)
+            for outcome, score in zip(listened, held_out, strict=bool(held_out))
             for label in readout.labels
         ],
         worst=[
@@ -140,11 +141,11 @@ def write_listening(
             for m in moments[label]
             if m.badness > 0
         ],
-        begun=[(one.name, begun(one.begin_us)) for one in listened if one.begin_us],
-        viewed=[quote(one.name) for one in listened if one.name.endswith(_VIEWED)][:_MOST_VIEWED],
+        begun=[(outcome.name, begun(outcome.begin_us)) for outcome in listened if outcome.begin_us],
+        viewed=[quote(outcome.name) for outcome in listened if outcome.name.endswith(_VIEWED)][:_MOST_VIEWED],
         beside=_beside(readout.labels, scored),
-        outside=[one for one in listened if isinstance(readout, Readout)],
-        scored=any(one.score is not None for one in listened),
+        outside=[outcome for outcome in listened if isinstance(readout, Readout)],
+        scored=any(outcome.score is not None for outcome in listened),
     )
     place.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended
     return write_whole(place / "report.html", lambda file: file.write(text.encode()))
@@ -189,22 +190,22 @@ def _drawn(figure: Figure | None) -> Markup | None:
 
 def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
     """Draw the sum of each recording of pictures over time, so of each foot, and what was detected."""
-    pictures = [(one, recorded(one.example.source, hold=False)) for one in listened]
-    shown = [(one, of) for one, of in pictures if isinstance(of, Frames) and len(of)][:_MOST_SUMS]
+    pictures = [(outcome, recorded(outcome.example.source, hold=False)) for outcome in listened]
+    shown = [(outcome, of) for outcome, of in pictures if isinstance(of, Frames) and len(of)][:_MOST_SUMS]
     if not shown:
         return None
     figure, axes = plt.subplots(
         len(shown), 1, figsize=(9.0, 0.6 + 1.4 * len(shown)), layout="constrained", squeeze=False
     )
-    for axis, (one, frames) in zip(axes[:, 0], shown, strict=True):
-        of = series(Recording(Contents.of(source_from(frames, Origin(Path(one.name))))), one.example.tare)
+    for axis, (outcome, frames) in zip(axes[:, 0], shown, strict=True):
+        of = series(Recording(Contents.of(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare)
         assert of is not None  # pictures have values
         total, unit = (of.total, of.unit) if of.force is None else (of.force, "N")
         begins = np.arange(0, len(total), 1 + len(total) // _STRETCHES)
-        seconds, most = (of.t[begins] - one.begin_us) / 1e6, np.fmax.reduceat(total, begins)
+        seconds, most = (of.t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total, begins)
         axis.plot(seconds, most, color=INK, linewidth=0.9, label=escaped(f"sum, {unit}"))
         for k, label in enumerate(labels):
-            at = (one.found[label].t - one.begin_us) / 1e6
+            at = (outcome.found[label].t - outcome.begin_us) / 1e6
             axis.plot(
                 at,
                 np.interp(at, seconds, most),
@@ -212,36 +213,36 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
                 color=_DETECTED if k % 2 == 0 else _TRUE,
                 label=escaped(label),
             )
-        axis.set_title(escaped(one.name), fontsize=9)
+        axis.set_title(escaped(outcome.name), fontsize=9)
         axis.set_ylabel(escaped(unit))
         axis.legend()
     axes[-1][0].set_xlabel("s")
     return figure
 
 
-def _row(one: Outcome, label: str, score: Score | None) -> dict[str, Any]:
-    own = None if score is None else score.by_label.get(label)
-    count = len(one.found[label]) if own is None else own.found + own.false
-    return {"recording": one.name, "label": label, "detections": count, "score": own}
+def _row(outcome: Outcome, label: str, score: Score | None) -> dict[str, Any]:
+    counted = None if score is None else score.by_label.get(label)
+    count = len(outcome.found[label]) if counted is None else counted.found + counted.false
+    return {"recording": outcome.name, "label": label, "detections": count, "score": counted}
 
 
 def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
     """Return the worst of a label's events and detections, the worst first; without truth its first detections."""
     moments = []
-    for k, one in enumerate(listened):
-        if one.score is None:
-            moments += [_Moment(k, label, float(t), "detected", 0.0) for t in one.found[label].t]
+    for k, outcome in enumerate(listened):
+        if outcome.score is None:
+            moments += [_Moment(k, label, float(t), "detected", 0.0) for t in outcome.found[label].t]
             continue
-        if label not in one.score.by_label:
+        if label not in outcome.score.by_label:
             continue
-        own, times = one.score[label], one.found.t
-        happened = times[own.pairs[:, 0]] - np.rint(to_us(own.errors_ms)).astype(np.int64)
-        true = np.asarray(one.example.labels.get(label, ()), np.int64)
+        score, times = outcome.score[label], outcome.found.t
+        happened = times[score.pairs[:, 0]] - np.rint(to_us(score.errors_ms)).astype(np.int64)
+        true = np.asarray(outcome.example.labels.get(label, ()), np.int64)
         moments += [_Moment(k, label, float(t), "missed", np.inf) for t in np.setdiff1d(true, happened)]
-        moments += [_Moment(k, label, float(t), "false", np.inf) for t in times[own.false_detections]]
+        moments += [_Moment(k, label, float(t), "false", np.inf) for t in times[score.false_detections]]
         moments += [
             _Moment(k, label, float(t), f"{error:+.2f} ms", abs(float(error)))
-            for t, error in zip(happened, own.errors_ms, strict=True)
+            for t, error in zip(happened, score.errors_ms, strict=True)
         ]
     return sorted(moments, key=lambda moment: -moment.badness)[:_MOMENTS]
 
@@ -252,23 +253,23 @@ def _potential(
     """Draw potential and threshold around moments, with detections, and labels as given and as learnt."""
     if not moments:
         return None
-    one = readout.neurons[label]
+    cell = readout.neurons[label]
     figure, axes = plt.subplots(
         1, len(moments), figsize=(2.9 * len(moments), 2.6), layout="constrained", squeeze=False, sharey=True
     )
     for axis, moment in zip(axes[0], moments, strict=True):
         # Wide enough for the label and its detection, or for what was felt late of one that has none.
         apart = moment.badness if np.isfinite(moment.badness) else _MISSED_MS
-        reach = _AROUND * one.neuron.tau + one.delay_ms + apart
+        reach = _AROUND * cell.neuron.tau + cell.delay_ms + apart
         outcome = listened[moment.recording]
         trains = readout.trains_of(label, _trains(readout, outcome))
         detected_ms = to_ms(outcome.found[label].t)
         at = to_ms(moment.t)
         times = np.linspace(at - reach, at + reach, 600)
-        crossings = detected_ms + readout.encoder_of(label).latency_ms + one.delay_ms
-        potential = one.neuron.potential(one.weights, trains, times, spikes=crossings)
+        crossings = detected_ms + readout.encoder_of(label).latency_ms + cell.delay_ms
+        potential = cell.neuron.potential(cell.weights, trains, times, spikes=crossings)
         axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1, label="potential")
-        threshold = readout.run_threshold * one.neuron.theta_0
+        threshold = readout.run_threshold * cell.neuron.theta_0
         axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
         for k, t in enumerate(detected_ms[np.abs(detected_ms - at) < reach]):
             axis.axvline(t - at, color=_DETECTED, linewidth=1.2, label="detected" * (k == 0))
@@ -322,7 +323,7 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
         _name_inputs(axis, readout.encoder_of(label), array, len(readout.delays_ms))
         axis.set_ylabel("weight, mV")
         return figure
-    planes = sorted(planes, key=lambda one: -float(np.abs(one[1]).max()))[:_MAPS]
+    planes = sorted(planes, key=lambda plane: -float(np.abs(plane[1]).max()))[:_MAPS]
     columns = min(4, len(planes))
     rows = -(-len(planes) // columns)
     figure, axes = plt.subplots(rows, columns, figsize=(2.4 * columns, 2.4 * rows), layout="constrained", squeeze=False)
@@ -387,8 +388,8 @@ def _nth(what: str, count: int, n: int) -> str:
 
 def _errors(listened: Sequence[Outcome], label: str) -> Figure | None:
     """Draw how far detections lay from their events."""
-    scores = [one.score.by_label.get(label) for one in listened if one.score is not None]
-    errors = [own.errors_ms for own in scores if own is not None]
+    scores = [outcome.score.by_label.get(label) for outcome in listened if outcome.score is not None]
+    errors = [score.errors_ms for score in scores if score is not None]
     if not errors or not sum(map(len, errors)):
         return None
     figure, axis = plt.subplots(figsize=(4.2, 2.2), layout="constrained")

@@ -12,13 +12,13 @@ from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, of_quiet
 from taxel.tare import Tare
 
-__all__ = ["free_of_what_lay", "without_what_lay"]
+__all__ = ["free_of_preload", "without_preload"]
 
 #: A tare lasts so long at least, us, and so many pictures.
 _LEAST_US, _LEAST_PICTURES = 10_000, 20
 
 
-def without_what_lay(recording: Recording, first_us: int) -> tuple[Tare | None, str]:
+def without_preload(recording: Recording, first_us: int) -> tuple[Tare | None, str]:
     """Return the tare of a time without what lay on the array before a time, us, and the line that says so.
 
     The time is the longest one before that time, else that of a later quiet stretch. None and "" where nothing lay;
@@ -26,16 +26,16 @@ def without_what_lay(recording: Recording, first_us: int) -> tuple[Tare | None, 
     """
     source = recorded(recording)
     read = (source, of_quiet(source)) if isinstance(source, Frames) else readings(recording)
-    if read is None or not read[1].on or read[1].quiet_us is None or read[1].quiet_us[0] >= first_us:
+    if read is None or not read[1].preload_at or read[1].quiet_us is None or read[1].quiet_us[0] >= first_us:
         return None, ""
-    span, said = _without(read[0], read[1], first_us), f"{recording.path}: the rest is {read[1]}"
+    span, line = _without(read[0], read[1], first_us), f"{recording.path}: the rest is {read[1]}"
     if span is None:
-        return None, f"{said}, and there is no other rest, so the tare holds it; give --tare FILE"
+        return None, f"{line}, and there is no other rest, so the tare holds it; give a tare's file"
     tare = Tare.take(source, start_us=span[0], stop_us=span[1], note=str(recording.path))
-    return tare, f"{said}, so the tare is of a time without it"
+    return tare, f"{line}, so the tare is of a time without it"
 
 
-def free_of_what_lay(recording: Recording, rest: Rest) -> tuple[tuple[int, int] | None, str]:
+def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] | None, str]:
     """Return a quiet stretch, us, without what lay on the array in that of a rest, and the line that says so.
 
     Without one it is that of the rest.
@@ -43,27 +43,27 @@ def free_of_what_lay(recording: Recording, rest: Rest) -> tuple[tuple[int, int] 
     source = recorded(recording)
     read = (source,) if isinstance(source, Frames) else readings(recording)
     assert read is not None  # a rest is of values
-    free, said = _free(read[0], rest), f"{recording.path}: the rest is {rest}"
+    free, line = _free(read[0], rest), f"{recording.path}: the rest is {rest}"
     span = _later(read[0], free) if len(free) else None
     if span is None:
-        return rest.quiet_us, f"{said}, and there is no other rest, so the tare holds it; give --tare FILE"
-    return span, f"{said}, so the tare is of a time without it"
+        return rest.quiet_us, f"{line}, and there is no other rest, so the tare holds it; give a tare's file"
+    return span, f"{line}, so the tare is of a time without it"
 
 
 def _free(pictures: Frames, rest: Rest) -> NDArray[np.int64]:
     """Return the numbers of the pictures without what lay on the array in the quiet stretch of a rest."""
     assert rest.quiet_us is not None
-    assert rest.lay is not None
-    on = rest.lay > 0
-    values = pictures.values.reshape(len(pictures), -1)[:, on]
-    lain = values[slice(*np.searchsorted(pictures.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
-    return np.flatnonzero((values < lain - rest.lay[on] / 2).all(axis=1))
+    assert rest.preload is not None
+    is_loaded = rest.preload > 0
+    values = pictures.values.reshape(len(pictures), -1)[:, is_loaded]
+    quiet = values[slice(*np.searchsorted(pictures.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
+    return np.flatnonzero((values < quiet - rest.preload[is_loaded] / 2).all(axis=1))
 
 
 def _later(pictures: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:
     """Return the first quiet stretch from the first of these pictures on, us, unless something lies on the array."""
     later = of_quiet(pictures.between(pictures.t[free[0]], np.inf))
-    return None if later.on else later.quiet_us
+    return None if later.preload_at else later.quiet_us
 
 
 def _without(pictures: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:

@@ -1,0 +1,44 @@
+"""Makes errors whose argument and remedy are data, and the line that shows them.
+
+An error that has an argument (`Error.argument`) names it once: before its text, or, with a remedy (`Error.hint`),
+within the remedy. The command line puts its option in the place of the argument.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from taxel._base.messages import escaped, escaped_lines
+from taxel._core import Error, ProblemError, error_line
+
+__all__ = ["helped", "refused"]
+
+_Error = TypeVar("_Error", bound=Error)
+
+
+def _shown(error: Error) -> str:
+    """Return the text of an error: one line, and below it the lines that it gives to be copied, if there are any."""
+    text, *below = error.args or ("",)
+    line = error_line(str(text), error.argument or "", error.hint)
+    return "\n".join([escaped(line), *map(escaped_lines, below)])
+
+
+# The class is of the core; it needs Python 3.12 to have methods of its own there.
+Error.__str__ = _shown  # type: ignore[method-assign, assignment]
+Error.__repr__ = lambda error: f"{type(error).__name__}({str(error)!r})"  # type: ignore[method-assign]
+
+
+def refused(name: str, text: str) -> ProblemError:
+    """Return the error of an argument, or of an entry of it: the text continues after its name, as "lambdas[2]"."""
+    argument = name.split("[", maxsplit=1)[0].split(".", maxsplit=1)[0]
+    if not argument.isidentifier():
+        return ProblemError(f"{name}{text}")
+    error = ProblemError(f"{name.removeprefix(argument)}{text}")
+    error.argument = argument
+    return error
+
+
+def helped(error: _Error, argument: str, hint: str) -> _Error:
+    """Return the same error with a remedy, of which `argument` is what helps."""
+    error.argument, error.hint = argument, hint
+    return error

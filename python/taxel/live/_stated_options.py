@@ -1,0 +1,104 @@
+"""The options of a `Live` that Rust reads too.
+
+Made from the structs of crates/taxel-live by tools/messages.py (`make messages`): edit those.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+
+from taxel._base.options import option
+from taxel.array import Array
+from taxel.detect import PlainRule, Readout
+from taxel.live.remote import Remote
+from taxel.tare import Tare
+from taxel.wire import Registers
+
+__all__ = ["StatedOptions"]
+
+
+@dataclass(frozen=True)
+class StatedOptions:
+    """Hold the options of a `Live`, which documents each, with their defaults."""
+
+    port: int = option(
+        5208, "The UDP port that the board sends to.", least=0, most=65_535, commands="live record bridge"
+    )
+    _: KW_ONLY
+    host: str = option(
+        "0.0.0.0", "The address of this machine to listen on; 0.0.0.0: all.", commands="live record bridge"
+    )
+    remote: Remote | None = option(
+        None,
+        "Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.",
+        commands="live record",
+        flag="--from",
+        metavar="ADDRESS",
+    )
+    array: Array | None = option(
+        None,
+        "Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.",
+        commands="live record bridge",
+        metavar="ROWSxCOLUMNS[xMM]",
+        typed="As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.",
+    )
+    registers: str | Registers | None = option(
+        None,
+        'The board\'s registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its '
+        "own.",
+        commands="live record bridge",
+        flag="--preset",
+    )
+    differences: bool = option(False, "The board sends intensity differences.", commands="live record bridge")
+    readout: Readout | PlainRule | None = option(
+        None,
+        "A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.",
+        commands="live bridge",
+        metavar="FILE",
+    )
+    tare: Tare | float | None = option(
+        None,
+        "Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).",
+        commands="live bridge",
+    )
+    record: str | os.PathLike[str] | None = option(
+        None, "Record in a new file (.mcap or .lsa).", commands="live bridge"
+    )
+    record_later: bool = option(
+        False, "Recordings begin and end while it runs (`record`, `end_recording`).", commands=""
+    )
+    name: str = option("board", "The board's name among the sources of the recording.", commands="record")
+    sources: Mapping[str, str] | None = option(
+        None,
+        "Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU "
+        "(serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.",
+        commands="record",
+        flag="--source",
+        metavar="NAME=WHAT",
+    )
+    compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
+    overwrite: bool = option(False, "Replace the file if it exists.", commands="record")
+    guard_frames: float = option(
+        5.0, "How far, in frames, a readout stays behind the host's clock while no events arrive.", least=0
+    )
+    gap_frames: float = option(
+        1.0, "At a gap in the sequence of version 2, frames to wait for what may only be late.", least=0, commands=""
+    )
+    lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.", flag="--json")
+    send: str | Sequence[str] = option(
+        (),
+        "Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.",
+        metavar="WHERE",
+    )
+    kernel_buffer_bytes: int = option(
+        33554432, "How much may wait in the kernel, bytes.", least=0, most=2_147_483_647, commands=""
+    )
+    queue_bytes: int = option(
+        67108864, "How much may wait for the decoder, bytes.", least=0, most=2_147_483_647, commands=""
+    )
+    readout_events: int = option(
+        1048576, "How many events may wait for the readout.", least=0, most=2_147_483_647, commands=""
+    )
+    gro: bool = option(True, "Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`).", commands="")

@@ -1,0 +1,119 @@
+"""Errors name their argument and their remedy as data; the command line puts its options in the place of arguments."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import _core
+from taxel._base.arguments import finite, whole
+from taxel._base.errors import helped, refused
+from taxel._base.parameters import described
+from taxel.cli import main
+from taxel.cli._commands import OWN, Commands
+
+#: Values of encoders' parameters that have no default.
+REQUIRED = {"levels": "[1.0]"}
+
+
+def line_of(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line of a command whose input is wrong."""
+    with pytest.raises(SystemExit) as ended:
+        main([*map(str, arguments)])
+    assert ended.value.code == 2
+    [line] = capsys.readouterr().err.splitlines()
+    return line.removeprefix("taxel: ")
+
+
+@pytest.mark.parametrize("kind", [taxel.FormatError, taxel.ProblemError, taxel.DeviceError, taxel.SceneError])
+def test_an_error_shows_its_argument_once(kind: type[taxel.Error]) -> None:
+    plain = kind("a.csv: is empty")
+    assert (str(plain), plain.argument, plain.hint) == ("a.csv: is empty", None, None)
+    wrong = refused("lambdas[2]", " is -1: must be 0 or more")
+    assert (str(wrong), wrong.argument) == ("lambdas[2] is -1: must be 0 or more", "lambdas")
+    lacking = helped(kind("a.csv: has no times"), "rate_hz", "give")
+    assert str(lacking) == "a.csv: has no times; give rate_hz"
+    for error in (plain, wrong, lacking):
+        for again in (copy.copy(error), pickle.loads(pickle.dumps(error))):
+            assert (str(again), again.argument, again.hint) == (str(error), error.argument, error.hint)
+
+
+def test_an_unknown_remedy_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(taxel.ProblemError) as caught:
+        _core.error_line("text", "tare", "pray")
+    assert str(caught.value).startswith("hint is ")
+    for hint in ("give", "larger", "lay_out", "pitch", "unfelt"):
+        assert hint in str(caught.value)
+        assert _core.error_line("text", "THERE", hint).count("THERE") == 1
+
+
+def test_the_compiled_part_s_errors_have_them_too() -> None:
+    with pytest.raises(taxel.ProblemError) as wrong:
+        _core.test_hook("problem")
+    assert (wrong.value.argument, wrong.value.hint) == ("tau", None)
+    assert str(wrong.value).startswith("tau: ")
+    with pytest.raises(taxel.FormatError) as larger:
+        _core.test_hook("format")
+    assert (larger.value.argument, larger.value.hint) == ("limit", "larger")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("errors") / "walk.npz"
+    t = np.arange(0, 100_000, 1000)
+    events = taxel.Events(t, t // 1000 % 4, t // 4000 % 4, t % 2000 == 0, array=taxel.Array(4, 4), intensity=t // 1000)
+    taxel.convert(events, path)
+    return path
+
+
+def ranged() -> Iterator[Any]:
+    """Every number of every encoder that has limits."""
+    for name in _core.encoder_names():
+        for parameter, limits in described(name)["ranges"].items():
+            yield pytest.param(name, parameter, limits, id=f"{name}.{parameter}")
+
+
+@pytest.mark.parametrize(("encoder", "parameter", "limits"), list(ranged()))
+def test_the_command_line_names_the_option_of_a_parameter(
+    encoder: str, parameter: str, limits: dict[str, Any], recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = limits["least"] - 1 if "least" in limits else limits["most"] + 1
+    is_list = isinstance(described(encoder)["defaults"].get(parameter), list)
+    for value in (wrong, "soon"):
+        settings = {name: REQUIRED[name] for name in described(encoder)["required"]}
+        settings[parameter] = f"[{value}]" if is_list else f"{value}"
+        typed = [f"--set={name}={each}" for name, each in settings.items()]
+        line = line_of(capsys, "encode", recording, recording.with_name("s.npz"), "--encoder", encoder, *typed)
+        assert line.startswith(f"--set {parameter}")
+        assert "must be" in line
+
+
+def limited() -> Iterator[Any]:
+    """Every option of every command that the parser checks for limits."""
+    group = Commands()
+    for name in OWN:
+        command: Any = group.get_command(None, name)
+        every = {name: command} | {f"{name} {own}": one for own, one in getattr(command, "commands", {}).items()}
+        for path, one in every.items():
+            for option in one.params:
+                if getattr(option, "min", None) is not None or getattr(option, "max", None) is not None:
+                    yield pytest.param(path, option, id=f"{path} {option.name}".replace(" ", "-"))
+
+
+@pytest.mark.parametrize(("command", "option"), list(limited()))
+def test_limits_have_one_voice(command: str, option: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    """What the parser refuses it refuses in the words of the checks of all arguments, and with their exit code."""
+    name = max(option.opts, key=len)
+    for value in [end + by for end, by in ((option.min, -1), (option.max, 1)) if end is not None]:
+        line = line_of(capsys, *command.split(), f"{name}={value}")
+        limits = {key: end for key, end in (("least", option.min), ("most", option.max)) if end is not None}
+        with pytest.raises(taxel.ProblemError) as caught:
+            (whole if option.type_descriptor.annotation is int else finite)(name, value, **limits)
+        assert line == str(caught.value)
