@@ -15,7 +15,8 @@ JSON = {
 }  # fmt: skip
 #: What returns another text: names and places, and lines for people.
 TEXTS = {
-    "clock_doubt", "instructions", "numbered_path", "ConeXCertificate.text", "ConeXFit.reason", "Live.place",
+    "clock_doubt", "error_line", "instructions", "numbered_path", "ConeXCertificate.text", "ConeXFit.reason",
+    "Error.argument", "Error.hint", "Live.place",
     "Panel.token", "Panel.url", "Tally.label", "Trained.ended", "WireBoard.command", "WireBoard.faults",
     "WireBoard.greeting",
 }  # fmt: skip
@@ -39,8 +40,9 @@ def returned(stub: ast.Module) -> Iterator[tuple[str, ast.expr]]:
                 if isinstance(member, ast.FunctionDef) and member.returns is not None:
                     yield f"{node.name}.{member.name}", member.returns
                 elif isinstance(member, ast.AnnAssign):
-                    assert isinstance(member.annotation, ast.Subscript), "Final[...]: nobody sets it"
-                    yield f"{node.name}.{ast.unparse(member.target)}", member.annotation.slice
+                    kind = member.annotation
+                    of = kind.slice if isinstance(kind, ast.Subscript) and ast.unparse(kind.value) == "Final" else kind
+                    yield f"{node.name}.{ast.unparse(member.target)}", of
 
 
 def of_text(stub: str) -> set[str]:

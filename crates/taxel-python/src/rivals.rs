@@ -174,11 +174,11 @@ pub fn fit_batch<'py>(
     parameters: &str,
     patterns: Vec<SpikesIn>,
     targets: Vec<PyReadonlyArray1<'py, f64>>,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Plain<Map<String, Value>>)> {
+) -> PyResult<(Column<f64>, Plain<Value>)> {
     let batch = Batch::from_json(name, parameters).map_err(core)?;
     let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
     let learnt = enter(py, |stop| batch.fit(&patterns, &targets, stop))?;
-    Ok((array(py, learnt.weights), Plain(learnt.results)))
+    Ok((column(py, learnt.weights), Plain(Value::Object(learnt.results))))
 }
 
 /// Output spikes of such a learner.

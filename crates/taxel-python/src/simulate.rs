@@ -19,7 +19,7 @@ use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Feed, Replay, Report, Scenes, Touch};
 
-use crate::convert::{ArrayParts, EventsIn, array, from_events, slice, to_array};
+use crate::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
 use crate::enter::{Shared, enter, enter_with_progress};
 use crate::errors::core;
 use crate::parameters::{Plain, parsed};
@@ -109,7 +109,7 @@ pub fn truth<'py>(
     parts: ArrayParts,
     registers: &str,
     acts: Vec<ActIn<'py>>,
-) -> PyResult<(Plain<Vec<Contact>>, Bound<'py, PyArray1<f32>>, NarrowOut)> {
+) -> PyResult<(Plain<Vec<Contact>>, Column<f32>, NarrowOut)> {
     let registers = parsed("registers", registers)?;
     let (array_felt, sensor) = (to_array(parts)?, Sensor::default());
     let (circuit, asynchronous, tare_ms) = (None, false, 0.0);
@@ -120,7 +120,7 @@ pub fn truth<'py>(
         let force_n = stage.force_n()?;
         Ok::<_, Error>((stage, force_n))
     })?;
-    Ok((Plain(stage.contacts().to_vec()), array(py, force_n), from_narrow(stage.narrow())))
+    Ok((Plain(stage.contacts().to_vec()), column(py, force_n), from_narrow(stage.narrow())))
 }
 
 /// The circuit of a board that is played to, and whether it is asynchronous.
