@@ -263,6 +263,14 @@ def _span(start: float | None, stop: float | None) -> str:
 def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
     """Read a table of loads, load,unit,from_s,to_s and, for a load on a single taxel, x,y.
 
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    list of KnownLoad
+
     Raises
     ------
     FormatError : a table that is none (names the line)
