@@ -13,7 +13,8 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
     (
         "taxel-core",
         &[
-            &["error", "reading"],
+            &["error"],
+            &["reading"],
             &["allowed", "vectors"],
             &["parameters", "array"],
             &["events", "frames", "spikes"],

@@ -187,7 +187,7 @@ impl Header {
             Topic::Samples => stream,
             Topic::Pictures => pictures,
             Topic::Datagrams => !stream && !pictures,
-            Topic::Counts => true,
+            Topic::Counts | Topic::Notes | Topic::Detections => true,
             _ => !stream,
         };
         Topic::ALL.into_iter().filter(belongs)

@@ -188,6 +188,7 @@ class _Source:
             parts.Lines(names, Once(samples, lambda: self.remarks().samples > 0)),
             timing=parts.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
             losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read().found),
+            marks=self.marks(),
         )
 
     def driven(self) -> Array:

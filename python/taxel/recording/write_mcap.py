@@ -56,6 +56,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
         header = {**samples.about, "sources": [], **_told(whole)}
         writer = RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
+        _add_small(writer, whole, _by_host(whole))
         writer.finish(json.dumps(counts[whole.origin.label]))
         return
     if not isinstance(whole, Board):
@@ -240,12 +241,14 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
         )
 
 
-def _add_remarks(writer: Any, events: Events, of: Source) -> None:
+def _by_host(of: Source) -> Callable[[int], int]:
+    """Return the function of a source's times, us, to those in the file, ns: by its clock where that is known."""
     clock = of.timing.usable()
+    return lambda t: max(0, t * 1000 if clock is None else int(clock.host_ns(t)))
 
-    def at_ns(t: int) -> int:
-        return max(0, t * 1000 if clock is None else int(clock.host_ns(t)))
 
+def _add_remarks(writer: Any, events: Events, of: Source) -> None:
+    at_ns = _by_host(of)
     detections = of.marks.detections()
     noted = [note.t for note in of.marks.notes() if note.t is not None]
     around = np.concatenate(
