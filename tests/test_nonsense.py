@@ -205,6 +205,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_clock(folder / "here_clock.mcap")
     (folder / "here_scene.toml").write_text(SCENE_FILE)
     (folder / "here_labels.csv").write_text("label,t_us\na,5\n")
+    (folder / "here_loads.csv").write_text("load,unit,from_s,to_s\n9,N,0.6,0.7\n")
     (folder / "here_trials.csv").write_text("recording,t_us,label\nhere_events,0,a\n")
     (folder / "pdb").mkdir()
     row = "\t".join(["0"] * 18)

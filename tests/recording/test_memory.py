@@ -112,7 +112,7 @@ def test_the_recordings_of_a_folder_count_together(tmp_path: Path) -> None:
     for k in range(4):
         taxel.convert(some_events(), tmp_path / f"{k}.npz")
         size = large.arrays_of(taxel.open_all(tmp_path / f"{k}.npz"))
-    with refused("--limit", FormatError):
+    with refused("; a larger limit reads more", FormatError):
         taxel.open_all(tmp_path, limit=3 * size)
     assert len(taxel.open_all(tmp_path, limit=100 * size)) == 4
 

@@ -81,7 +81,7 @@ SOUND: dict[str, Sound] = {
         labels=["a"],
         window_ms=50.0,
         noise_floor=3.0,
-        progress=lambda _: None,
+        progress=lambda *_: None,
     ),
     "taxel.detect.run": plain(
         taxel.detect.run, readout=READOUT, source=FRAMES, frame_us=192.0, tare=TARE, wire_version=2
@@ -113,7 +113,7 @@ SOUND: dict[str, Sound] = {
         search=False,
         window_ms=50.0,
         frame_us=192.0,
-        progress=lambda _: None,
+        progress=lambda *_: None,
     ),
     "taxel.detect.choose": plain(
         taxel.detect.choose,
@@ -122,9 +122,9 @@ SOUND: dict[str, Sound] = {
         k=2,
         window_ms=50.0,
         frame_us=192.0,
-        progress=lambda _: None,
+        progress=lambda *_: None,
     ),
-    "taxel.detect.fit": plain(taxel.detect.fit, examples=[EXAMPLE], recipe=RECIPE, progress=lambda _: None),
+    "taxel.detect.fit": plain(taxel.detect.fit, examples=[EXAMPLE], recipe=RECIPE, progress=lambda *_: None),
     "taxel.detect.Part": plain(
         lambda **given: judged(taxel.detect.Fold([taxel.detect.Part(0)], [taxel.detect.Part(**given)])),
         example=1,

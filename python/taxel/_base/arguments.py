@@ -492,4 +492,5 @@ def parameters(values: Mapping[str, object]) -> str:
             return whole(name, value)
         return finite(name, value)
 
-    return json.dumps({name: plain(name, value, 0) for name, value in values.items()})
+    named = {text("a parameter's name", name): value for name, value in values.items()}
+    return json.dumps({name: plain(name, value, 0) for name, value in named.items()})

@@ -19,8 +19,8 @@ _Error = TypeVar("_Error", bound=Error)
 def _shown(error: Error) -> str:
     """Return the text of an error: one line, and below it the lines that it gives to be copied, if there are any."""
     text, *below = error.args or ("",)
-    line = error_line(str(text), error.argument or "", error.hint)
-    return "\n".join([escaped(line), *map(escaped_lines, below)])
+    line = error_line(escaped(str(text)), error.argument or "", error.hint)
+    return "\n".join([line, *map(escaped_lines, below)])
 
 
 # The class is of the core; it needs Python 3.12 to have methods of its own there.

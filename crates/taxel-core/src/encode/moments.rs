@@ -144,7 +144,9 @@ impl Encoding for Moments {
             return Err(problem!("ages_ms"; "[{}]: must be a us or more above the one before", k + 1));
         }
         if self.levels == 0 && !self.graded && ages.is_empty() {
-            return Err(problem!("levels"; " is 0, and neither graded nor ages_ms is given: choose one or more of them"));
+            return Err(
+                problem!("levels"; " is 0, and neither graded nor ages_ms is given: choose one or more of them"),
+            );
         }
         if self.centre && !self.graded {
             return Err(problem!("centre"; " is given without graded: its place has graded spikes alone"));

@@ -88,7 +88,9 @@ impl Exposure {
         if let Some((start, stop)) = window
             && !(start.is_finite() && stop.is_finite() && start <= stop)
         {
-            return Err(problem!("window"; " is {start} to {stop} ms: must be finite, and its start not after its stop"));
+            return Err(
+                problem!("window"; " is {start} to {stop} ms: must be finite, and its start not after its stop"),
+            );
         }
         Ok(())
     }
