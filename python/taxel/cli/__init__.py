@@ -55,18 +55,21 @@ def program() -> NoReturn:
     """Run the command line as the only work of this process: its environment and its signals are the command's."""
     make_safe(os.environ)
     try:
-        stop_on_signals()
-        main()
+        # An interrupt within an import can come out of a library as another error: until then it ends the process.
+        main(loaded=stop_on_signals)
     except KeyboardInterrupt:
         leave(STOPPED)
     except SystemExit as end:
         leave(end.code)
 
 
-def main(arguments: list[str] | None = None) -> NoReturn:
-    """Run the command line; a wrong input ends it with one line on stderr and an exit code."""
+def main(arguments: list[str] | None = None, *, loaded: Callable[[], None] | None = None) -> NoReturn:
+    """Run the command line; a wrong input ends it with one line on stderr and an exit code.
+
+    `loaded` is called when the command has been imported, before it runs.
+    """
     try:
-        code = app(arguments, prog_name="taxel", standalone_mode=False)
+        code = app(arguments, prog_name="taxel", standalone_mode=False, obj=loaded)
     except _UsageError as error:
         if not str(error.format_message()).startswith("Usage:"):
             _end(_plain(error), WRONG_INPUT)

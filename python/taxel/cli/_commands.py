@@ -60,12 +60,18 @@ class Commands(TyperGroup):
             formatter.write_dl([*OWN.items(), *((name, _description(point)) for name, point in added().items())])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Find the command that was typed; the error for an unknown name suggests close ones, without importing any."""
+        """Import the command that was typed, and call what waits for that, which is the context's object.
+
+        The error for an unknown name suggests close ones, without importing any.
+        """
         typed = args[0]
         if typed not in OWN and typed not in (names := self.list_commands(ctx)):
             near = ", ".join(map(repr, get_close_matches(typed, names)))
             ctx.fail(f"No such command {typed!r}." + f" Did you mean {near}?" * bool(near))
-        return super().resolve_command(ctx, args)
+        resolved = super().resolve_command(ctx, args)
+        if ctx.obj is not None:
+            ctx.obj()
+        return resolved
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002  click's argument
         """Import a command.
