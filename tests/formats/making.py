@@ -44,7 +44,7 @@ def write_plate(folder: Path, person: str = "subj900", count: int = 2) -> Path:
     with h5py.File(file, "w") as h5:
         for k in range(count):
             image = np.zeros((40, 12, 60), np.uint16)
-            image[:, :, :40] = interpolated(footfall(k), 4 + k, 40)
+            image[:, :, :40] = interpolated(footfall(k), 4 + k % 3, 40)
             h5[f"img{k:03d}"] = image
     return file
 

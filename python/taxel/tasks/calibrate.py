@@ -275,7 +275,7 @@ def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
     ------
     FormatError : a table that is none (names the line)
     """
-    path, loads = Path(path), []
+    path, loads = Path(checked_path("path", path)), []
     for row in text.table(path, ["load", "unit", "from_s", "to_s"]):
         line = int(row["line"])
 
