@@ -35,7 +35,7 @@ pub struct Decoded {
     version_2: Plain<Value>,
     /// What a verdict takes from decoding.
     found: Plain<Value>,
-    /// Of each datagram its arrival (ns), and the earliest time (us) at which it could leave the board.
+    /// The arrival of each datagram (ns), and the earliest time (us) at which it could leave the board.
     arrived_ns: Column<i64>,
     left: Column<i64>,
 }

@@ -41,7 +41,7 @@ parameters! {
         pub wire_ohm: f64 = 0.0, "ohm", LINE;
         /// Where the amplifiers saturate, V.
         pub rail_v: f64 = 5.0, "V", Range::ABOVE_0;
-        /// Of the offsets.
+        /// The seed of the offsets.
         pub seed: u64 = 0;
     }
 }

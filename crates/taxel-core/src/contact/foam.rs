@@ -20,7 +20,7 @@ parameters! {
     pub struct Foam {
         /// Young's modulus E, kPa. A guess: makers' foams lie between 20 and 100.
         pub modulus_kpa: f64 = 60.0, "kPa", Range::ABOVE_0;
-        /// Of the layer, mm (thesis 4.3.1).
+        /// The thickness of the layer, mm (thesis 4.3.1).
         pub thickness_mm: f64 = 10.0, "mm", Range::ABOVE_0;
         /// Poisson's ratio in compression; independent columns are a good approximation only near 0.
         pub poisson: f64 = 0.0, "", Range::FROM_0.below(0.5);

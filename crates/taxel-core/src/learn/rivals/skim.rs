@@ -66,7 +66,7 @@ parameters! {
         pub thresholds: Vec<f64> = vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9], "", Range::FINITE;
         /// How far from a target an output spike may lie, ms; 50 as in 6.5.2.
         pub within_ms: f64 = 50.0, "ms", Range::ABOVE_0;
-        /// Of weights and delays of the layer.
+        /// The seed of weights and delays of the layer.
         pub seed: u64 = 0;
     }
 }

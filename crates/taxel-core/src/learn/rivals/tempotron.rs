@@ -31,7 +31,7 @@ parameters! {
         pub initial_sd: f64 = 1e-3, "", Range::FROM_0;
         /// Epochs at most.
         pub epochs: usize = 2000;
-        /// Of the first weights and the order of patterns.
+        /// The seed of the first weights and of the order of patterns.
         pub seed: u64 = 0;
         /// The time after which the caller requests the best so far, s; this crate reads no clock.
         pub max_seconds: Option<f64> = None, "s", Range::ABOVE_0;
