@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -12,11 +13,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import taxel
 from taxel.cli import app
 from taxel.demo.evaluation import evaluate_acts
 from taxel.demo.judging import GOALS, LABELS
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.demo.shipped import shipped
+from taxel.live import Live
 from taxel.simulate import Scene, Silence
 from taxel.wire import FRAME_US
 
@@ -62,6 +65,14 @@ def test_the_report_shows_what_it_should(toy):
     ):
         assert said in page, said
     assert "nan" not in page.replace("finance", "")
+
+
+def test_what_the_report_says_of_a_live_run_is_counted_there():
+    template = Path(taxel.__file__).with_name("demo") / "report.html.j2"
+    named = set(re.findall(r"values\.host\.(\w+)", template.read_text(encoding="utf-8")))
+    with Live(0, host="127.0.0.1") as live:
+        assert named
+        assert named <= live.counters.keys()
 
 
 def test_an_existing_folder_is_not_touched(toy):
