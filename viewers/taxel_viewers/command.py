@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from taxel.cli import SET_HELP, App, assignments, say
+from taxel.cli import SET_HELP, App, SecondsOption, assignments, say
 
 __all__ = ["app", "show"]
 
@@ -52,9 +52,7 @@ def show(
     speed: Annotated[
         float, typer.Option(min=0.001, max=100.0, help="Playback speed of a recording; 0.1 is ten times slower.")
     ] = 1.0,
-    seconds: Annotated[
-        float | None, typer.Option(min=0.001, help="End after this many seconds; without it with Ctrl-C.")
-    ] = None,
+    seconds: SecondsOption = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the viewer's place and, at the end, its counts as JSON.")
     ] = False,
