@@ -24,12 +24,14 @@ class There(RemoteBoard):
 def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path: Path) -> None:
     """The same as over a network, with a queue for one."""
     array = taxel.Array(32, 48, name="palm")
-    near = Live(0, host=LOOPBACK, array=array, record=tmp_path / "near.mcap")
+    near = Live(0, host=LOOPBACK, array=array, registers="2 kHz", record=tmp_path / "near.mcap")
     copies, board = near.copies(), There("there:1/left", near.about)
     far = Live(remote=board, record=tmp_path / "far.mcap")
     assert (far.place, far.array, far.about) == ("there:1/left", array, near.about)
     with pytest.raises(taxel.ProblemError, match="remote: is in use already; make another one"):
         Live(remote=board)
+    # A smaller array drives fewer lines of a preset.
+    assert (board.registers["lines"], board.registers["noise_floor"]) == (48, 10)
     now = time.time_ns()
     board.feed.begin_session()
     board.feed.compare(now, now, now, now)

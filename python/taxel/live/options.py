@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
+from taxel import _core
 from taxel._base.arguments import flag, instance, number, parameters, several, shown, text, whole
 from taxel._base.errors import refused
 from taxel._core import ProblemError
@@ -55,7 +56,7 @@ class LiveOptions(StatedOptions):
         if registers is None:
             registers = Registers(array=array)
         elif not isinstance(registers, Registers):
-            registers = Registers.preset(text("registers", registers), array=array)
+            registers = Registers._of(_core.registers_preset(text("registers", registers), array._parts()), array)
         return replace(self, array=array, registers=registers, differences=differences)
 
     def destinations(self) -> list[str]:
