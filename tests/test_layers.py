@@ -92,7 +92,6 @@ THOUSANDS = {
     "taxel.information.codes": "Hz",
     "taxel.information.wire_rate": "kbit/s",
     "taxel.report.detections": "seconds",
-    "taxel.live._to_foxglove": "ns",
 }
 
 
