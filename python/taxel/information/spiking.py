@@ -47,6 +47,12 @@ class _NeuronPerClass(Parameters, ABC):
         Raises
         ------
         ProblemError : patterns or labels that are invalid
+
+        Examples
+        --------
+        >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
+        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).classes_.tolist()
+        ['a', 'b']
         """
         trains = _listed(self, patterns)
         self.classes_, row = labelled(y, len(trains))
@@ -85,12 +91,34 @@ class _NeuronPerClass(Parameters, ABC):
         Raises
         ------
         ProblemError : not fitted, or patterns that are invalid
+
+        Examples
+        --------
+        >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
+        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).predict(patterns).tolist()
+        ['a', 'b', 'a', 'b']
         """
         best = self.decision_function(patterns).argmax(1)
         return np.asarray(self.classes_[best])
 
     def score(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> float:
-        """Return the share of patterns that are classified correctly."""
+        """Return the share of patterns that are classified correctly.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+        y : labels, shape (patterns,)
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that are invalid
+
+        Examples
+        --------
+        >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
+        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
+        1.0
+        """
         return float(np.mean(self.predict(patterns) == words("y", y)))
 
     def __sklearn_tags__(self) -> Any:
