@@ -198,10 +198,6 @@ def _say(line: Mapping[str, Any]) -> None:
     print(json.dumps(line), flush=True)
 
 
-def _show(step: str, done: int, of: int) -> None:
-    _say({"type": "progress", "step": step, "done": done, "of": of})
-
-
 def _main() -> NoReturn:
     stop_on_signals()
     try:
