@@ -19,31 +19,6 @@ from taxel._base.errors import refused
 from taxel._base.messages import plain
 from taxel._core import ProblemError
 
-__all__ = [
-    "bare",
-    "buffer_bytes",
-    "callback",
-    "column",
-    "fields",
-    "finite",
-    "finite_numbers",
-    "flag",
-    "floats",
-    "instance",
-    "mapping",
-    "nth",
-    "number",
-    "numbers",
-    "parameters",
-    "path",
-    "rows",
-    "several",
-    "shown",
-    "text",
-    "whole",
-    "window",
-]
-
 T = TypeVar("T")
 
 

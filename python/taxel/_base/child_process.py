@@ -30,8 +30,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-__all__ = ["GRACE_S", "ChildProcess", "make_safe", "search_path"]
-
 #: How long a child may take to end by itself after its parent has ended, s.
 GRACE_S = 3.0
 #: How long its parent waits for that, s.

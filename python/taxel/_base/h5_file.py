@@ -23,8 +23,6 @@ from taxel._base.limits import DESCRIPTION, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 
-__all__ = ["Entry", "H5File"]
-
 _CHILD = Path(__file__).with_name("h5_child.py")
 #: The longest time between two lines of the child, s; and the longest time for its start, which loads libraries.
 PATIENCE_S, BEGIN_S = 10.0, 120.0

@@ -13,8 +13,6 @@ from taxel._base.documents import text_of_json
 from taxel._base.files import write_whole
 from taxel._core import Error, FormatError
 
-__all__ = ["Saved", "read"]
-
 _S = TypeVar("_S")
 
 

@@ -16,8 +16,6 @@ from typer.core import TyperCommand
 from taxel._base.options import with_options
 from taxel._core import Error, ProblemError
 
-__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "with_out", "with_typed"]
-
 #: Arguments of Python that are typed as another option.
 _TYPED_AS = {"registers": "preset"}
 

@@ -24,19 +24,6 @@ from taxel.live._stated_options import StatedOptions
 from taxel.tare import Tare
 from taxel.wire import Registers
 
-__all__ = [
-    "REDRAW_S",
-    "BitsOption",
-    "CongestionOption",
-    "RateOption",
-    "counters_table",
-    "exit_code",
-    "for_live",
-    "outside",
-    "remote",
-    "with_live_options",
-]
-
 #: Interval at which the display is redrawn and the end is checked, s.
 REDRAW_S = 0.1
 

@@ -14,8 +14,6 @@ import typer
 if TYPE_CHECKING:
     from taxel.recording.open_options import OpenOptions
 
-__all__ = ["FileOptions", "with_file_options"]
-
 
 @dataclass(frozen=True)
 class FileOptions:

@@ -21,8 +21,6 @@ from taxel.cli._say import say
 if TYPE_CHECKING:
     from taxel.recording import Recording
 
-__all__ = ["app", "cut"]
-
 app = App()
 
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from taxel.detect import Outcome
     from taxel.tasks import Detected
 
-__all__ = ["app", "detect"]
-
 app = App()
 
 #: Rows of the table that is printed; all go to --csv and --json.

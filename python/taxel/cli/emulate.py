@@ -35,8 +35,6 @@ from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.simulate.options import EmulateOptions
 from taxel.spikes import to_ms
 
-__all__ = ["app", "emulate"]
-
 app = App()
 
 

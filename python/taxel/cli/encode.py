@@ -16,8 +16,6 @@ from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings, tare_option
 from taxel.cli._say import say
 
-__all__ = ["app", "encode"]
-
 app = App()
 
 

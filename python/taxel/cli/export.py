@@ -14,8 +14,6 @@ from taxel._core import Error
 from taxel.cli._app import App, with_out
 from taxel.cli._say import say
 
-__all__ = ["app", "nir"]
-
 app = App(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
 
 

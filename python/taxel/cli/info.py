@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from taxel.recording.pressure import Series
     from taxel.recording.rest import Rest
 
-__all__ = ["app", "info"]
-
 app = App()
 
 _PICTURES = (".png", ".svg", ".pdf")

@@ -21,8 +21,6 @@ from taxel.cli._say import say
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, Point
 
-__all__ = ["app", "information"]
-
 app = App()
 
 

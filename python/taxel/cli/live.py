@@ -48,8 +48,6 @@ from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers
 
-__all__ = ["app", "live"]
-
 app = App()
 
 #: How long a board may take to send its first datagram, s.

@@ -14,8 +14,6 @@ from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import READ_HELP
 from taxel.cli._say import say
 
-__all__ = ["app", "merge"]
-
 app = App()
 
 

@@ -34,8 +34,6 @@ from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.live import Live, Summary
 
-__all__ = ["app", "record"]
-
 app = App()
 
 #: With --trials: the number of empty trials in a row that ends the command.

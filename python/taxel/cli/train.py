@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from taxel.recording import Recording
     from taxel.tasks import Training
 
-__all__ = ["app", "train"]
-
 app = App()
 
 

@@ -25,8 +25,6 @@ from taxel.recording import Recording
 from taxel.recording.opening import recordings_in
 from taxel.recording.sidecars import calibrated_by
 
-__all__ = ["app", "view"]
-
 app = App()
 
 #: How often the viewers' states are read, s.

@@ -18,8 +18,6 @@ from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_us
 
-__all__ = ["WINDOW_MS", "Alignment", "align", "aligned_to"]
-
 #: How far from its label an input spike may lie, either way, ms.
 WINDOW_MS = 50.0
 #: Trains with more spikes a label than that are not compared with the labels: they fire throughout.

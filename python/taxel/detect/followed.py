@@ -12,8 +12,6 @@ from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_us
 
-__all__ = ["FOLLOWED_MS", "Followed", "distinct", "follow", "only", "silence"]
-
 #: How far from its label an onset may lie, either way, ms.
 FOLLOWED_MS = 50.0
 #: Thresholds of a quantity: numbers of taxels, or units of noise.

@@ -19,8 +19,6 @@ from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.spikes import to_us
 
-__all__ = ["Score", "Spread", "score", "score_together"]
-
 #: So far apart, us, no detection of one recording pairs with an event of another when all are scored together.
 APART_US = 10**12
 

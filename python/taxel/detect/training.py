@@ -34,9 +34,6 @@ from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
-__all__ = ["Trained", "fit"]
-
-
 #: Parameters of a learner that its rows do not depend on. Bounds could be among them, but that those of a train without
 #: a spike must contain 0.
 _NOT_OF_ROWS = (

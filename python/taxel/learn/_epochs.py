@@ -17,8 +17,6 @@ from taxel.learn._learner import SpikeLearner, Status
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["AfterSpike", "EpochLearner", "Updates", "keep"]
-
 AfterSpike = Literal["subtract", "membrane", "reset"]
 Updates = Literal["batch", "pattern"]
 

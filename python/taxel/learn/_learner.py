@@ -16,8 +16,6 @@ from taxel.learn._examples import examples
 from taxel.metrics import f1
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Learner", "SpikeLearner", "Status", "fired_by_neuron", "patterns_of"]
-
 #: How a fit ended, of all learners; the page on errors has the table.
 Status = Literal["solved", "feasible", "infeasible", "right", "epochs", "stopped", "assigned"]
 #: What a fit says of its weights. It does not hold of others; a certificate and multipliers are of the problem.

@@ -22,9 +22,6 @@ from taxel.learn.cone_x import Multipliers, _multipliers
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["ConeR", "ConeRProblem"]
-
-
 _DEFAULT = defaults("cone_r")
 #: The most trains with spikes in a fit: their Hessian needs 1.6 GB, and a step half a minute.
 _MOST_TRAINS = 10_000

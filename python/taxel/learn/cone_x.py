@@ -22,8 +22,6 @@ from taxel.learn._learner import SpikeLearner, Status, fired_by_neuron
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Certificate", "ConeX", "ConeXProblem", "Margin", "Multipliers", "Row"]
-
 
 class Row(NamedTuple):
     """Name a row of a problem by pattern and time.

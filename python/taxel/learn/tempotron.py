@@ -17,9 +17,6 @@ from taxel.learn._epochs import keep
 from taxel.learn._learner import Learner, Status, patterns_of
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Tempotron"]
-
-
 _DEFAULT = defaults("tempotron")
 
 

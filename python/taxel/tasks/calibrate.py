@@ -25,8 +25,6 @@ from taxel.recording import Recording
 from taxel.recording.pressure import readings
 from taxel.tasks.rest import GivenTare, check_tare, given_tare
 
-__all__ = ["CalibrateOptions", "Calibrated", "KnownLoad", "calibrate", "read_loads"]
-
 
 @dataclass(frozen=True)
 class KnownLoad:

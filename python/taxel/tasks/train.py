@@ -37,8 +37,6 @@ from taxel.tasks.labels import GivenLabels, labelled_trials, references
 from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
 from taxel.tasks.training import Training, TrainOptions
 
-__all__ = ["train"]
-
 
 def train(
     recordings: Recording | Sequence[Recording],

@@ -15,8 +15,6 @@ from taxel._base.messages import counted
 from taxel.array import Array
 from taxel.events import Events
 
-__all__ = ["Columns"]
-
 #: From this number of rows on, NumPy requests large pages (from 4 MB on) for the narrowest column too. The page fault
 #: at the first write to each small page costs more than the write itself.
 _LARGE = 1 << 22

@@ -17,8 +17,6 @@ from taxel.events import Events
 from taxel.wire.columns import Columns
 from taxel.wire.counts import Counts, Received, Status
 
-__all__ = ["Decoder", "decode"]
-
 _PAIRINGS = ("direct", "taxel")
 
 
