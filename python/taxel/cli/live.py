@@ -20,7 +20,7 @@ from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli._app import App, SecondsOption, with_typed
+from taxel.cli._app import App, SecondsOption
 from taxel.cli._board import (
     REDRAW_S,
     BitsOption,
@@ -58,7 +58,6 @@ _FIRST_WITHIN_S = 1.0
 class _Typed:
     """Hold the options of the command."""
 
-    options: dict[str, Any]
     rate_hz: RateOption = None
     bits: BitsOption = None
     congestion: CongestionOption = None
@@ -91,8 +90,7 @@ class _Typed:
 
 @app.command()
 @with_live_options("live")
-@with_typed(_Typed)
-def live(typed: _Typed) -> None:
+def live(options: dict[str, Any], typed: _Typed) -> None:
     """Receive a board's events and print what a readout detects, live; with --panel or --to, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
@@ -109,8 +107,9 @@ def live(typed: _Typed) -> None:
     Example: taxel live --from zenoh:192.168.1.5:7447/left --panel
     """
     spikes = spikes_of(typed.to, typed.encoder, typed.values)
-    _together(typed)
-    options = for_live(typed.options, typed.rate_hz, typed.bits)
+    _together(options, typed)
+    given_tare = options["tare"]
+    options = for_live(options, typed.rate_hz, typed.bits)
     trained, rest, record, address, lines = (options[name] for name in ("readout", "tare", "record", "remote", "lines"))
     _fresh(typed, rest)
     if typed.report is not None:
@@ -154,7 +153,7 @@ def live(typed: _Typed) -> None:
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
-            f"--tare {typed.options['tare']}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
+            f"--tare {given_tare}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
         )
     raise typer.Exit(exit_code(summary, pipeline.array))
 
@@ -227,9 +226,9 @@ def _unsent(summary: Summary) -> None:
             say(f"taxel: lines not sent to {one['to']}: {one['lost']} of {one['sent'] + one['lost']}: {why}", err=True)
 
 
-def _together(typed: _Typed) -> None:
+def _together(options: dict[str, Any], typed: _Typed) -> None:
     """Refuse options that would have no effect."""
-    readout, tare, send = (typed.options[name] for name in ("readout", "tare", "send"))
+    readout, tare, send = (options[name] for name in ("readout", "tare", "send"))
     if readout is None and not typed.panel and not typed.to:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel or --to VIEWER to show the board")
     if readout is None and (tare or typed.report or send):

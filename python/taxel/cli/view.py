@@ -13,7 +13,7 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import App, SecondsOption
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._paneling import PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
 from taxel.cli._topics import listed
@@ -32,7 +32,6 @@ _CHECK_EVERY = 0.1
 
 
 @app.command()
-@with_file_options
 def view(
     recording: Annotated[
         Path,
