@@ -27,7 +27,6 @@ import time
 import weakref
 from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 #: How long a child may take to end by itself after its parent has ended, s.
@@ -111,11 +110,9 @@ class ChildProcess(subprocess.Popen[Any]):
             self.kill()
             return self.wait()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         self.end()
-        super().__exit__(kind, error, trace)
+        super().__exit__(*raised)
 
 
 _running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()
