@@ -108,7 +108,8 @@ test-studies: released $(VENV)/.for-test
 slow: released $(VENV)/.for-test dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
-	$(BIN)/python -m pytest -q -m slow tests $(BESIDE)
+	$(BIN)/python -m pytest -q -m slow
+	$(BIN)/python -m pytest -q -m slow $(BESIDE)
 
 # Either build of the extension does.
 lint: $(VENV)/.for-test $(VENV)/.for-lint

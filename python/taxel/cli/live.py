@@ -20,7 +20,7 @@ from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli._app import App, SecondsOption, with_typed
+from taxel.cli._app import App, SecondsOption
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
 from taxel.cli._say import say
@@ -46,8 +46,6 @@ from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers
 
-__all__ = ["app", "live"]
-
 app = App()
 
 #: How long a board may take to send its first datagram, s.
@@ -58,7 +56,6 @@ _FIRST_WITHIN_S = 1.0
 class _Typed:
     """Hold the options of the command."""
 
-    options: dict[str, Any]
     rate_hz: RateOption = None
     bits: BitsOption = None
     congestion: CongestionOption = None
@@ -88,8 +85,7 @@ class _Typed:
 
 @app.command()
 @with_live_options("live")
-@with_typed(_Typed)
-def live(typed: _Typed) -> None:
+def live(options: dict[str, Any], typed: _Typed) -> None:
     """Receive a board's events and print what a readout detects, live; with --panel, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
@@ -103,8 +99,9 @@ def live(typed: _Typed) -> None:
     Example: taxel live --panel --control 127.0.0.1:5209
     Example: taxel live --from zenoh:192.168.1.5:7447/left --panel
     """
-    _together(typed)
-    options = for_live(typed.options, typed.rate_hz, typed.bits)
+    _together(options, typed)
+    given_tare = options["tare"]
+    options = for_live(options, typed.rate_hz, typed.bits)
     trained, rest, record, address, lines = (options[name] for name in ("readout", "tare", "record", "remote", "lines"))
     _fresh(typed, rest)
     if typed.report is not None:
@@ -145,7 +142,7 @@ def live(typed: _Typed) -> None:
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
-            f"--tare {typed.options['tare']}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
+            f"--tare {given_tare}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
         )
     raise typer.Exit(exit_code(summary, pipeline.array))
 
@@ -215,9 +212,9 @@ def _unsent(summary: Summary) -> None:
             say(f"taxel: lines not sent to {one['to']}: {one['lost']} of {one['sent'] + one['lost']}: {why}", err=True)
 
 
-def _together(typed: _Typed) -> None:
+def _together(options: dict[str, Any], typed: _Typed) -> None:
     """Refuse options that would have no effect."""
-    readout, tare, send = (typed.options[name] for name in ("readout", "tare", "send"))
+    readout, tare, send = (options[name] for name in ("readout", "tare", "send"))
     if readout is None and not typed.panel:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
     if readout is None and (tare or typed.report or send):

@@ -13,7 +13,7 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import App, SecondsOption
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
 from taxel.cli._topics import listed
@@ -24,13 +24,10 @@ from taxel.recording import Recording
 from taxel.recording.opening import recordings_in
 from taxel.recording.sidecars import calibrated_by
 
-__all__ = ["app", "view"]
-
 app = App()
 
 
 @app.command()
-@with_file_options
 def view(
     recording: Annotated[
         Path,
