@@ -51,15 +51,12 @@ class StatedOptions:
     readout: Readout | PlainRule | None = option(
         None,
         "A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.",
-        commands="live",
         metavar="FILE",
     )
     tare: Tare | float | None = option(
-        None,
-        "Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).",
-        commands="live",
+        None, "Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON)."
     )
-    record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).", commands="live")
+    record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).")
     record_later: bool = option(
         False, "Recordings begin and end while it runs (`record`, `end_recording`).", commands=""
     )
