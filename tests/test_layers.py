@@ -91,7 +91,6 @@ THOUSANDS = {
     "taxel.information.answers": "bits a thousand events",
     "taxel.information.wire_rate": "kbit/s",
     "taxel.report.detections": "seconds",
-    "taxel.live._to_foxglove": "ns",
 }
 
 

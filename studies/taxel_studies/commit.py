@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import NamedTuple
 from uuid import uuid4
 
-__all__ = ["Checkout", "checkout_of", "code_version"]
-
 #: The results that measurements leave in a checkout of taxel: they change no code.
 _RESULTS = "benchmarks/results"
 #: Variables that name another repository; git sets some of them while a hook runs.

@@ -21,8 +21,6 @@ from taxel.recording.rest import FORCE_UNITS
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["ReadoutStream", "detector", "tare_text"]
-
 
 class _Detector(Saved):
     """What a readout and a plain rule have in common: a file, and a stream."""
