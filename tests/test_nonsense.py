@@ -263,6 +263,7 @@ MEANS = [
     ("infinity", "to the end", ["Recording.between(stop)", "cut(stop_us)", "detect.Part(stop)"]),
     ("infinity", "for ever", ["device.Cable.reopen(within)", "device.Device(patience)"]),
     ("infinity", "no spike is moved", ["metrics.victor_purpura(q)"]),
+    ("infinity", "no spike is moved", ["metrics.victor_purpura_multi_unit(q)", "metrics.victor_purpura_multi_unit(k)"]),
     ("NaN", "its reader has checked the row", ["Note(t)", "Note(at_ns)", "Note(replaces)"]),
     ("infinity", "its reader has checked the row", ["Note(t)", "Note(at_ns)", "Note(replaces)"]),
 ]

@@ -19,6 +19,7 @@ ARRAY = Array(2, 3, pitch_mm=1.0)
 WINDOW = (0.0, 1000.0)
 METRICS = {
     "victor_purpura": {"q": 0.05},
+    "victor_purpura_multi_unit": {"q": 0.05, "k": 0.5},
     "van_rossum": {"tau": 20.0},
     "van_rossum_absolute": {"tau": 20.0},
     "van_rossum_spatial": {"array": ARRAY, "tau": 5.0},

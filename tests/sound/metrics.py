@@ -13,6 +13,9 @@ SOUND: dict[str, Sound] = {
     "taxel.metrics.matching": plain(taxel.metrics.matching, spikes=[[1.0, 2.0]], targets=[[1.5]], window_ms=5.0),
     "taxel.metrics.f1": plain(taxel.metrics.f1, spikes=[[1.0, 2.0]], targets=[[1.5]], window_ms=5.0),
     "taxel.metrics.victor_purpura": plain(taxel.metrics.victor_purpura, a=[1.0, 2.0], b=[1.5], q=0.1),
+    "taxel.metrics.victor_purpura_multi_unit": plain(
+        taxel.metrics.victor_purpura_multi_unit, a=UNSIGNED, b=UNSIGNED, q=0.1, k=0.5
+    ),
     "taxel.metrics.van_rossum": plain(taxel.metrics.van_rossum, a=[1.0, 2.0], b=[1.5], tau=5.0, normalisation="spike"),
     "taxel.metrics.van_rossum_absolute": plain(
         taxel.metrics.van_rossum_absolute, a=[1.0, 2.0], b=[1.5], tau=5.0, window=(0.0, 50.0), step_ms=1.0

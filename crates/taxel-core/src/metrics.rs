@@ -2,7 +2,7 @@
 //!
 //! A metric is a value of [`Metric`]; [`Metric::distance`] compares two patterns, [`Metric::pairwise`] computes
 //! matrices. A distance between trains is extended to patterns as the sum over trains with the same number; the metrics
-//! with `spatial` in their names use other trains as well.
+//! with `spatial` or `multi_unit` in their names use other trains as well.
 
 mod distance;
 mod edges;
@@ -73,6 +73,8 @@ macro_rules! metrics {
 metrics! {
     /// The least cost of turning one train into the other.
     victor_purpura: VictorPurpura,
+    /// The least cost of turning one pattern into the other, if a spike may also change its train.
+    victor_purpura_multi_unit: VictorPurpuraMultiUnit,
     /// Euclidean distance between trains smoothed by an exponential.
     van_rossum: VanRossum,
     /// Time integral, or sum, of the absolute difference between trains smoothed by an exponential.

@@ -11,6 +11,7 @@ from taxel.metrics.van_rossum_absolute import van_rossum_absolute as van_rossum_
 from taxel.metrics.van_rossum_spatial import van_rossum_spatial as van_rossum_spatial
 from taxel.metrics.van_rossum_spatial_absolute import van_rossum_spatial_absolute as van_rossum_spatial_absolute
 from taxel.metrics.victor_purpura import victor_purpura as victor_purpura
+from taxel.metrics.victor_purpura_multi_unit import victor_purpura_multi_unit as victor_purpura_multi_unit
 
 # The imports above are the registry of metrics.
 __all__ = [name for name, held in sorted(globals().items()) if callable(held)]
