@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml)
+SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
 
 .PHONY: help check setup build released aarch64 bridge demo test test-studies slow lint format registers messages bench docs dist clean
 
@@ -26,9 +26,9 @@ check:
 
 # What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
 # Of the distributions of their own in this repository, that is what they need beside taxel.
-BESIDE := studies benchmarks viewers
+BESIDE := studies benchmarks viewers bridge
 PROJECTS := pyproject.toml $(BESIDE:%=%/pyproject.toml)
-wanted = $(BIN)/python -c 'import sys, tomllib; projects = [tomllib.load(open(f, "rb"))["project"] for f in "$(PROJECTS)".split()]; extras = {"beside": [x for p in projects[1:] for x in p["dependencies"]]} | {k: v for p in projects for k, v in p["optional-dependencies"].items()}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), projects[0]["dependencies"]) if not x.startswith("taxel")))'
+wanted = $(BIN)/python -c 'import sys, tomllib; projects = [tomllib.load(open(f, "rb"))["project"] for f in "$(PROJECTS)".split()]; extras = {"beside": [x for p in projects[1:] for x in p["dependencies"]]} | {k: v for p in projects for k, v in p.get("optional-dependencies", {}).items()}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), projects[0]["dependencies"]) if not x.startswith("taxel")))'
 # Python compiles a module when it is first imported; compiling all of them at once takes ten seconds of the first minutes.
 # Where it may not store what it compiled, each start would compile them all again.
 install = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile)
@@ -68,10 +68,11 @@ $(VENV)/.released: $(VENV)/.installed $(SOURCES)
 	@rm -f $(VENV)/.built && touch $@
 
 # Outside the workspace: 260 crates for those only who have more than one computer.
-BRIDGE := --release --manifest-path crates/taxel-bridge/Cargo.toml --target-dir target/bridge
-$(VENV)/.bridge: $(VENV)/.installed $(shell find crates/taxel-bridge -type f)
+BRIDGE := --release --manifest-path bridge/zenoh/Cargo.toml --target-dir target/bridge
+$(VENV)/.bridge: $(VENV)/.installed $(shell find bridge/zenoh -type f)
 	$(BIN)/maturin build $(BRIDGE) --out target/bridge/wheels
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_bridge-*.whl
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir target/bridge/wheels ./bridge
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_zenoh-*.whl
 	@touch $@
 
 # For boards like a Jetson or a Raspberry Pi: the extension for their processor, made on this machine. No test runs there.
@@ -114,7 +115,7 @@ slow: released $(VENV)/.for-test dist bridge
 lint: $(VENV)/.for-test $(VENV)/.for-lint
 	@$(MAKE) --question $(VENV)/.released 2>/dev/null || $(MAKE) --no-print-directory build
 	cargo fmt --all --check
-	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml --check
+	cargo fmt --manifest-path bridge/zenoh/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
 	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
@@ -129,7 +130,7 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 
 format: $(VENV)/.for-lint
 	cargo fmt --all
-	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml
+	cargo fmt --manifest-path bridge/zenoh/Cargo.toml
 	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -195,7 +196,7 @@ $(PEERS)/.installed: $(PROJECTS) | $(VENV)/.installed
 
 bench: released bridge $(PEERS)/.installed
 	@$(subst $(abspath $(VENV)),$(abspath $(PEERS)),$(develop))
-	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_bridge-*.whl
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_zenoh-*.whl
 	$(PEERS)/bin/taxel bench all
 
 docs: build $(VENV)/.for-docs

@@ -22,6 +22,7 @@ BESIDE = {
     "studies": "studies/taxel_studies",
     "benchmarks": "benchmarks/taxel_benchmarks",
     "viewers": "viewers/taxel_viewers",
+    "bridge": "bridge",
 }
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\(\w+\))?\s+)?mod\s+\w+\s*(;|\{)")
 

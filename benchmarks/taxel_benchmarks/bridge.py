@@ -26,10 +26,11 @@ import numpy as np
 
 import taxel
 from taxel import ProblemError
-from taxel.live import Live, Remote
+from taxel.live import Live
 from taxel_benchmarks._goals import Goal, at_most
 from taxel_benchmarks._peer import missing
 from taxel_benchmarks._rounds import stamp
+from taxel_bridge import Remote
 
 #: Frames a second, datagrams a frame, and bytes a datagram.
 STREAMS = {
@@ -188,11 +189,11 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
 
 
 def run(*, quick: bool) -> dict[str, Any]:
-    absent = missing({"taxel-bridge": "taxel_bridge"})
+    absent = missing({"taxel_zenoh": "taxel_zenoh"})
     if absent:
         if not quick:
-            raise ProblemError("bridge: the wheel taxel-bridge is not built: make bridge")
-        return stamp() | {"left out": {"all of it": "taxel-bridge not installed: make bridge"}, "ratios": {}}
+            raise ProblemError("bridge: the wheel taxel_zenoh is not built: make bridge")
+        return stamp() | {"left out": {"all of it": "taxel_zenoh not installed: make bridge"}, "ratios": {}}
     rounds, seconds = (1, 1.0) if quick else (3, 2.0)
     load = os.getloadavg()[0]
     rows: dict[str, dict[str, list[dict[str, Any]]]] = {name: {"block": [], "drop": []} for name in STREAMS}
@@ -205,7 +206,7 @@ def run(*, quick: bool) -> dict[str, Any]:
     streams = {name: {way: _middle(kept) for way, kept in ways.items()} for name, ways in rows.items()}
     return {
         "question": (__doc__ or "").splitlines()[0],
-        **stamp("taxel-bridge"),
+        **stamp("taxel_zenoh"),
         "load_before": load,
         "load_after": os.getloadavg()[0],
         "streams": streams,

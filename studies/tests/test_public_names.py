@@ -16,11 +16,9 @@ import taxel
 import taxel_studies
 
 ROOT = Path(taxel_studies.__file__).parents[2]
-FILES = sorted(
-    file
-    for package in ("studies/taxel_studies", "benchmarks/taxel_benchmarks", "viewers/taxel_viewers")
-    for file in (ROOT / package).rglob("*.py")
-)
+#: The folders of distributions beside taxel, which hold a package of this name each.
+BESIDE = ("studies", "benchmarks", "viewers", "bridge")
+FILES = sorted(file for folder in BESIDE for file in (ROOT / folder / f"taxel_{folder}").rglob("*.py"))
 
 
 def is_module(name: str) -> bool:
@@ -70,19 +68,19 @@ def test_what_is_private_or_unnamed_is_found() -> None:
 
 
 def test_taxel_imports_none() -> None:
-    importing = re.compile(r"^\s*(from|import) (taxel_studies|taxel_benchmarks|taxel_viewers)\b", re.MULTILINE)
+    importing = re.compile(rf"^\s*(from|import) taxel_({'|'.join(BESIDE)})\b", re.MULTILINE)
     product = (ROOT / "python").rglob("*.py")
     assert [str(file.relative_to(ROOT)) for file in product if importing.search(file.read_text())] == []
 
 
 def test_all_distributions_have_one_version_and_want_each_other() -> None:
-    version, beside = taxel.__version__, ("studies", "benchmarks", "viewers")
+    version = taxel.__version__
     ours, *theirs = (
-        tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"] for folder in ("", *beside)
+        tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"] for folder in ("", *BESIDE)
     )
     assert {project["version"] for project in (ours, *theirs)} == {version}
     assert all(f"taxel=={version}" in project["dependencies"] for project in theirs)
-    assert f"taxel_studies=={version}" in theirs[1]["dependencies"]
+    assert {f"taxel_studies=={version}", f"taxel_bridge=={version}"} <= {*theirs[1]["dependencies"]}
     extras = {"studies": "taxel_studies", "cluster": "taxel_studies[cluster]"}
     extras |= {name: f"taxel_viewers[{name}]" for name in ("rerun", "foxglove")}
     assert {name: ours["optional-dependencies"][name] for name in extras} == {

@@ -23,7 +23,7 @@ from .marked import TAXEL
 
 CHECKOUT = Path(__file__).parents[2]
 #: Modules that something imports if they are there, beside all that are installed or of Python itself.
-OPTIONAL = ("usercustomize", "zenoh", "taxel_bridge", "pylsl", "serial", "rerun", "foxglove", "__main__", "_opening")
+OPTIONAL = ("usercustomize", "zenoh", "taxel_zenoh", "pylsl", "serial", "rerun", "foxglove", "__main__", "_opening")
 SCENE = """
 surface = "columns"
 [[bodies]]

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import taxel
 from taxel import _core
 from taxel.cli import app
-from taxel.cli._board import counters_table, doubted
+from taxel.cli.board import counters_table, doubted
 from taxel.clock import doubt
 from taxel.live import Live
 

@@ -119,8 +119,8 @@ LEFT_OUT: dict[str, str] = {
     "taxel.live.Panel.delta_intensity": "needs a panel each time, 0.25 s; tried in tests/panel/test_server.py",
     "taxel.live.Panel.listen": "needs a panel each time, 0.25 s; tried in tests/panel/test_board.py",
     "taxel.live.Panel.read_out": "needs a panel each time, 0.25 s; tried in tests/panel/test_windows.py",
-    "taxel.live.Bridge": "needs a wheel of its own; tried in tests/bridge",
-    "taxel.live.Remote": "needs a wheel of its own; tried in tests/bridge",
+    "taxel.live.RemoteBoard": "is a base of classes of such packages; tried in tests/live/test_remote.py",
+    "taxel.live.RemoteBoard.begin": "is called by a Live; tried in tests/live/test_remote.py",
     "taxel.live.PanelClient": "connects to a panel; tried in tests/live/test_client.py",
     "taxel.live.PanelClient.play": "asks a panel; tried in tests/live/test_client.py",
 }

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from taxel.cli import SET_HELP, App, assignments, say
+from taxel.cli import SET_HELP, App, SecondsOption, assignments, say
 
 __all__ = ["app", "show"]
 
@@ -52,9 +52,7 @@ def show(
     speed: Annotated[
         float, typer.Option(min=0.001, max=100.0, help="Playback speed of a recording; 0.1 is ten times slower.")
     ] = 1.0,
-    seconds: Annotated[
-        float | None, typer.Option(min=0.001, help="End after this many seconds; without it with Ctrl-C.")
-    ] = None,
+    seconds: SecondsOption = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the viewer's place and, at the end, its counts as JSON.")
     ] = False,
@@ -67,16 +65,17 @@ def show(
     Example: taxel show walk.mcap foxglove --speed 0.1
     """
     from taxel import ProblemError, Tare  # noqa: PLC0415  the command line starts quickly
-    from taxel.tasks.encode import encoder_of  # noqa: PLC0415
+    from taxel.encode import Encoder  # noqa: PLC0415
     from taxel_viewers.viewer import Viewer, Viewing  # noqa: PLC0415
 
     if encoder is None and (values or tare is not None):
         raise ProblemError("--set and --tare without --encoder: give --encoder NAME")
     # The libraries' own messages are not for the user.
     os.environ.setdefault("RUST_LOG", "off")
-    spikes = None if encoder is None else encoder_of(encoder, assignments(values or []))
-    if spikes is not None and tare is not None:
-        spikes = spikes.with_tare(Tare.load(tare))
+    spikes: Encoder | None = None
+    if encoder is not None:
+        spikes = Encoder.from_json(json.dumps({**assignments(values or []), "name": encoder}, default=str))
+        spikes = spikes if tare is None else spikes.with_tare(Tare.load(tare))
     with Viewer(shows, viewer, encoder=spikes, speed=speed) as shown:
         say(json.dumps({"place": shown.place}) if as_json else f"{shown.place}; Ctrl-C ends")
         until, before = None if seconds is None else time.monotonic() + seconds, Viewing()

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use serde_json::{Value, json};
 use taxel_core::problem;
 use taxel_live::capture::{self, Receiver, ReceiverOptions};
 use taxel_live::host_clock::RoundTrip;
@@ -13,7 +12,6 @@ use taxel_live::pipeline::{Copied, Copies as PipelineCopies};
 
 use crate::enter::{Shared, enter};
 use crate::errors::ProblemError;
-use crate::parameters::Plain;
 
 /// The entrance for parcels of another computer.
 #[pyclass(frozen)]
@@ -53,11 +51,6 @@ impl Feed {
     /// Adds a round trip to the other computer's clock: four times, ns since 1970.
     fn compare(&self, asked: i64, came: i64, answered: i64, back: i64) {
         self.feed.compare(RoundTrip { asked, came, answered, back });
-    }
-
-    /// Counts of what came and what was lost.
-    fn bridged(&self) -> Plain<Value> {
-        Plain(json!(self.feed.bridged()))
     }
 
     /// Ends the pipeline because of an error.

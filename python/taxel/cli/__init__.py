@@ -20,12 +20,12 @@ from taxel._base.child_process import make_safe
 from taxel._base.number_text import float_of
 from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import DeviceError, Error, ProblemError
-from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App
+from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App, SecondsOption
 from taxel.cli._commands import Commands
 from taxel.cli._recordings import SET_HELP, assignments
 from taxel.cli._say import say
 
-__all__ = ["SET_HELP", "App", "app", "assignments", "main", "program", "say"]
+__all__ = ["SET_HELP", "App", "SecondsOption", "app", "assignments", "main", "program", "say"]
 
 app = App(
     name="taxel",

@@ -36,7 +36,6 @@ OWN = {
     "detect": "Detect events in recordings by a readout; score them.",
     "export": "Write a readout for other simulators and for chips.",
     "information": "Estimate how many bits labelled touches hold.",
-    "bridge": "Publish a board to other computers.",
 }
 
 

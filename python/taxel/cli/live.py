@@ -21,7 +21,10 @@ from taxel._base.stopping import asked_to_end
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import App, SecondsOption
-from taxel.cli._board import (
+from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
+from taxel.cli._recordings import try_report
+from taxel.cli._say import say
+from taxel.cli.board import (
     REDRAW_S,
     BitsOption,
     CongestionOption,
@@ -34,9 +37,6 @@ from taxel.cli._board import (
     remote,
     with_live_options,
 )
-from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
-from taxel.cli._recordings import try_report
-from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout
 from taxel.detections import Detection

@@ -17,7 +17,10 @@ from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import OUTSIDE, App, SecondsOption, with_out
-from taxel.cli._board import (
+from taxel.cli._noting import noting
+from taxel.cli._recordings import pairs
+from taxel.cli._say import say
+from taxel.cli.board import (
     REDRAW_S,
     BitsOption,
     RateOption,
@@ -29,9 +32,6 @@ from taxel.cli._board import (
     remote,
     with_live_options,
 )
-from taxel.cli._noting import noting
-from taxel.cli._recordings import pairs
-from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.live import Live, Summary
 

@@ -1,10 +1,9 @@
 """From a board's datagrams to detections, as they arrive, and the panel that shows them in a browser."""
 
-from taxel.live.bridge import Bridge
 from taxel.live.client import PanelClient
 from taxel.live.live import Live
 from taxel.live.panel import Panel
-from taxel.live.remote import Remote
+from taxel.live.remote import RemoteBoard
 from taxel.live.sending import PORT, send
 from taxel.live.source import Source
 from taxel.live.summary import Summary
@@ -12,11 +11,10 @@ from taxel.live.summary import delays as delays
 
 __all__ = [
     "PORT",
-    "Bridge",
     "Live",
     "Panel",
     "PanelClient",
-    "Remote",
+    "RemoteBoard",
     "Source",
     "Summary",
     "send",

@@ -12,7 +12,7 @@ from dataclasses import KW_ONLY, dataclass
 from taxel._base.options import option
 from taxel.array import Array
 from taxel.detect import PlainRule, Readout
-from taxel.live.remote import Remote
+from taxel.live.remote import RemoteBoard
 from taxel.tare import Tare
 from taxel.wire import Registers
 
@@ -23,14 +23,10 @@ __all__ = ["StatedOptions"]
 class StatedOptions:
     """Hold the options of a `Live`, which documents each, with their defaults."""
 
-    port: int = option(
-        5208, "The UDP port that the board sends to.", least=0, most=65_535, commands="live record bridge"
-    )
+    port: int = option(5208, "The UDP port that the board sends to.", least=0, most=65_535, commands="live record")
     _: KW_ONLY
-    host: str = option(
-        "0.0.0.0", "The address of this machine to listen on; 0.0.0.0: all.", commands="live record bridge"
-    )
-    remote: Remote | None = option(
+    host: str = option("0.0.0.0", "The address of this machine to listen on; 0.0.0.0: all.", commands="live record")
+    remote: RemoteBoard | None = option(
         None,
         "Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.",
         commands="live record",
@@ -40,7 +36,7 @@ class StatedOptions:
     array: Array | None = option(
         None,
         "Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.",
-        commands="live record bridge",
+        commands="live record",
         metavar="ROWSxCOLUMNS[xMM]",
         typed="As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.",
     )
@@ -48,24 +44,22 @@ class StatedOptions:
         None,
         'The board\'s registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its '
         "own.",
-        commands="live record bridge",
+        commands="live record",
         flag="--preset",
     )
-    differences: bool = option(False, "The board sends intensity differences.", commands="live record bridge")
+    differences: bool = option(False, "The board sends intensity differences.", commands="live record")
     readout: Readout | PlainRule | None = option(
         None,
         "A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.",
-        commands="live bridge",
+        commands="live",
         metavar="FILE",
     )
     tare: Tare | float | None = option(
         None,
         "Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).",
-        commands="live bridge",
+        commands="live",
     )
-    record: str | os.PathLike[str] | None = option(
-        None, "Record in a new file (.mcap or .lsa).", commands="live bridge"
-    )
+    record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).", commands="live")
     record_later: bool = option(
         False, "Recordings begin and end while it runs (`record`, `end_recording`).", commands=""
     )

@@ -54,9 +54,9 @@ class Live:
         The UDP port that the board sends to. 0 finds a free one, see `address`.
     host : str
         The address of this machine to listen on; 0.0.0.0: all.
-    remote : Remote, optional
+    remote : RemoteBoard, optional
         Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there. Stop the
-        `Live` before the `Remote`.
+        `Live` before it.
     array : Array, optional
         Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
     registers : str or Registers, optional
@@ -169,7 +169,7 @@ class Live:
             send=[to for to in destinations if not to.startswith(_LSL)],
             sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in sources],
         )
-        feed = None if remote is None else remote._fed(options.queue_bytes)
+        feed = None if remote is None else _core.Feed(remote.place, options.queue_bytes)
         self._core = _core.Live(
             stated,
             None if options.record is None else checked_path("record", options.record),
@@ -178,7 +178,7 @@ class Live:
         )
         self._remote, self._place = remote, self._core.place()
         if remote is not None and feed is not None:
-            remote._begin(feed)
+            remote.begin(feed)
         for what, inlet in inlets.items():
             inlet.begin(partial(self._core.sample, what))
 
@@ -204,6 +204,25 @@ class Live:
         """The origin of the datagrams: "UDP 127.0.0.1:5208", or the address of a remote board."""
         return self._place
 
+    @property
+    def about(self) -> dict[str, Any]:
+        """The description of the sensor as JSON values, for a `RemoteBoard`: array, registers, differences."""
+        registers = self._core.registers()
+        return {"array": self.array._geometry(), "registers": registers, "differences": self._options.differences}
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended, by `stop` or an error."""
+        return self._core.is_over()
+
+    def copies(self) -> _core.Copies:
+        """Return what copies everything that arrives from now on, for other computers.
+
+        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("picture", JSON) ten
+        times a second, ("detection", JSON); ``is_over()`` says whether the pipeline has ended and all were taken.
+        """
+        return self._core.copy()
+
     def next(self, timeout: float = 1.0) -> Detection | None:
         """Return the next detection, or None after `timeout` without one, or at once after the end.
 
@@ -228,7 +247,7 @@ class Live:
     def __iter__(self) -> Iterator[Detection]:
         """Yield detections as they come, until `stop` is called."""
         while True:
-            over = self._core.is_over()
+            over = self.is_over
             detection = self.next(0.0 if over else _WAIT_S)
             if detection is not None:
                 yield detection

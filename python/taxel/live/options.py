@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
+from taxel import _core
 from taxel._base.arguments import flag, instance, number, parameters, several, shown, text, whole
 from taxel._base.errors import refused
 from taxel._core import ProblemError
@@ -14,7 +15,7 @@ from taxel.array import Array
 from taxel.detect import PlainRule, Readout
 from taxel.detect.detector import detector
 from taxel.live._stated_options import StatedOptions
-from taxel.live.remote import Remote
+from taxel.live.remote import RemoteBoard
 from taxel.tare import Tare
 from taxel.wire import Registers
 
@@ -38,7 +39,8 @@ class LiveOptions(StatedOptions):
         if readout is not None:
             detector("readout", readout)._check_unit("ticks", "live values")
         if remote is not None:
-            instance("remote", remote, Remote)
+            if instance("remote", remote, RemoteBoard).in_use:  # type: ignore[type-abstract]
+                raise refused("remote", ": is in use already; make another one")
             array = remote.array if array is None else array
             registers = Registers._of(remote.registers, remote.array) if registers is None else registers
             differences = flag("differences", differences) or remote.differences
@@ -54,7 +56,7 @@ class LiveOptions(StatedOptions):
         if registers is None:
             registers = Registers(array=array)
         elif not isinstance(registers, Registers):
-            registers = Registers.preset(text("registers", registers), array=array)
+            registers = Registers._of(_core.registers_preset(text("registers", registers), array._parts()), array)
         return replace(self, array=array, registers=registers, differences=differences)
 
     def destinations(self) -> list[str]:
@@ -92,8 +94,8 @@ def _plain(one: Field[Any], value: object) -> object:
             return json.loads(value._json())
         case Readout() | PlainRule() | Tare():
             return value.to_json()
-        case Remote():
-            return value._place
+        case RemoteBoard():
+            return value.place
     if value is None and "None" in one.type:
         return None
     checks: dict[Any, Callable[[], object]] = {

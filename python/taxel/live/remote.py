@@ -1,307 +1,69 @@
-"""Boards of other computers, received as if they were connected to this one.
-
-Zenoh transports their datagrams, by the wheel ``taxel-bridge``, which only users of more than one computer install.
-"""
+"""A board of another computer, whose datagrams a package beside taxel carries to this one."""
 
 from __future__ import annotations
 
-import contextlib
-import errno
-import importlib
-import json
-import re
-import socket
-import threading
-import time
-from collections.abc import Iterator
-from types import TracebackType
-from typing import Any, NamedTuple
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from importlib.metadata import entry_points
+from typing import Any
 
-from taxel import _core
-from taxel._base.arguments import finite, shown, text
-from taxel._base.errors import refused
-from taxel._core import DeviceError, ProblemError
+from taxel._base.arguments import text
+from taxel._core import DeviceError, Feed, ProblemError
 from taxel.array import Array
 
-__all__ = ["Address", "Remote", "wheel", "with_taxel_errors"]
-
-#: Zenoh's default port.
-_PORT = 7447
-
-#: Interval at which a wait checks whether to stop, s.
-_POLL_S = 0.05
-
-#: Number of clock comparisons at the beginning, and their interval afterwards, s.
-_AT_FIRST, _COMPARE_S = 8, 0.25
-
-#: Timeout of a query for the published boards, s.
-_ASK_S = 0.5
-
-#: Timeout of the TCP connection that finds out why no bridge answered, s.
-_REACH_S = 2.0
+__all__ = ["Feed", "RemoteBoard", "receiver_of"]
 
 
-class Address(NamedTuple):
-    """Hold the address of a board of another computer: ``zenoh:HOST[:PORT][/NAME]``.
+class RemoteBoard(ABC):
+    """Receive a board of another computer for a `Live`: the base of those that do so over a network.
 
-    Attributes
+    Parameters
     ----------
-    host : str
-        The computer whose bridge listens, or a Zenoh router.
-    port : int
-    name : str or None
-        The board; None if only one is published there.
+    place : str
+        Its address, as text.
+    about : mapping
+        The description of the sensor, as `Live.about` of the other computer states it.
     """
 
-    host: str
-    port: int
-    name: str | None
+    def __init__(self, place: str, about: Mapping[str, Any]) -> None:
+        self.place = text("place", place)
+        #: The sensor.
+        self.array = Array._from_geometry(dict(about["array"]))
+        #: The contents of the board's registers, in their own units.
+        self.registers = dict(about["registers"])
+        #: Whether the board sends differences for intensities.
+        self.differences = bool(about["differences"])
+        #: Whether a `Live` receives from it.
+        self.in_use = False
 
-    @classmethod
-    def of(cls, address: str) -> Address:
-        """Return the address that a text names.
+    @abstractmethod
+    def begin(self, feed: Feed) -> None:
+        """Set `in_use`, and pass what arrives to a pipeline from now on, from a thread of its own.
 
         Parameters
         ----------
-        address : str
-
-        Raises
-        ------
-        ProblemError : the text is no such address
-
-        Examples
-        --------
-        >>> Address.of("zenoh:192.168.1.5/left")
-        Address(host='192.168.1.5', port=7447, name='left')
+        feed : Feed
+            Takes parcels of datagrams (``take``), the beginning of a session of the other computer and round trips to
+            its clock (``begin_session``, ``compare``), and an error that ends the pipeline (``fail``).
         """
-        match = re.fullmatch(
-            r"zenoh:(?P<host>\[[0-9a-fA-F:.]+\]|[\w.-]+)(:(?P<port>\d{1,5}))?(/(?P<name>[\w.-]{1,64}))?",
-            text("address", address),
-            re.ASCII,
-        )
-        port = _PORT if match is None else int(match["port"] or _PORT)
-        if match is None or not 1 <= port <= 65_535:
-            raise ProblemError(f"address {address!r}: must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left")
-        return cls(match["host"], port, match["name"])
-
-    @property
-    def place(self) -> str:
-        """HOST:PORT."""
-        return f"{self.host}:{self.port}"
-
-    def __str__(self) -> str:
-        return f"zenoh:{self.place}" + ("" if self.name is None else f"/{self.name}")
 
 
-class Remote:
-    """Receive a board of another computer, which a `Bridge` there publishes. A context manager.
-
-    Give it to `Live`, which then decodes, shows, records and detects as if the board were connected here; or
-    read the detections and pictures of that computer: `detections`, `pictures`.
+def receiver_of(address: str) -> Any:
+    """Return what makes a `RemoteBoard` of an address: the entry point of ``taxel.remotes`` that has its scheme's name.
 
     Parameters
     ----------
     address : str
-        ``zenoh:HOST[:PORT][/NAME]``.
-    congestion : {"block", "drop"}
-        Where this computer is too slow: the bridge waits for it, as a recorder needs, or drops datagrams and counts
-        them.
-    timeout : float, s
-        How long to wait for the bridge.
+        SCHEME:REST, as zenoh:192.168.1.5:7447/left.
 
     Raises
     ------
-    DeviceError : no bridge answers, or several boards are published and none is named; the wheel is not installed
-    ProblemError : the text is no address
-
-    Examples
-    --------
-    ``with Remote("zenoh:192.168.1.5/left") as remote, Live(remote=remote) as live: ...`` receives a board of another
-    computer.
-
-    >>> Remote("192.168.1.5")
-    Traceback (most recent call last):
-    taxel.ProblemError: address '192.168.1.5': must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left
-
-    Notes
-    -----
-    The computers' clocks are compared by round trips, four times a second: of each second the shortest counts, the
-    drift is the median slope, and the offset the middle of what the shortest ones allow
-    (`Live.counters["bridged"]["clock"]`).
+    DeviceError : no package that receives from such addresses is installed
+    ProblemError : no scheme
     """
-
-    def __init__(self, address: str, *, congestion: str = "block", timeout: float = 5.0) -> None:
-        self.address = Address.of(address)
-        if congestion not in ("block", "drop"):
-            raise refused("congestion", f" is {shown(congestion)}: must be block or drop")
-        self.congestion = congestion
-        self._zenoh = with_taxel_errors(wheel().Subscriber, [self.address.place])
-        try:
-            self.name, self._about = self._find(finite("timeout", timeout, "s", least=0.0, most=1e9))
-        except BaseException:
-            self._zenoh.close()
-            raise
-        self._feed: _core.Feed | None = None
-        self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
-        #: The sensor, as the other computer describes it.
-        self.array: Array = Array._from_geometry(dict(self._about["array"]))
-
-    def _find(self, timeout: float) -> tuple[str, dict[str, Any]]:
-        """Return the board's name and description."""
-        until = time.monotonic() + timeout
-        while True:
-            boards: dict[str, str] = dict(with_taxel_errors(self._zenoh.names, _ASK_S))
-            name = self.address.name
-            if name in boards:
-                return name, json.loads(boards[name])
-            if name is None and len(boards) == 1:
-                ((name, about),) = boards.items()
-                return name, json.loads(about)
-            if name is None and boards:
-                names = ", ".join(sorted(boards))
-                raise DeviceError(f"{self.address}: publishes {names}; add /NAME")
-            if time.monotonic() >= until:
-                if boards:
-                    raise DeviceError(f"{self.address}: publishes {', '.join(sorted(boards))}, not {name}")
-                raise DeviceError(f"{self.address}: {self._why_unreachable()}")
-            # A query on a link that is not established yet returns at once.
-            time.sleep(_POLL_S)
-
-    def _why_unreachable(self) -> str:
-        """Return why no bridge answers, as far as this computer can tell."""
-        begin = "begin taxel bridge on that computer, with --listen and an address that others reach"
-        try:
-            with socket.create_connection((self.address.host.strip("[]"), self.address.port), timeout=_REACH_S):
-                return f"no board is published there; {begin}"
-        except socket.gaierror:
-            return "no computer of that name is known here; name it by its address"
-        except TimeoutError:
-            return f"does not answer; is the address right, does a firewall let port {self.address.port} (TCP) through?"
-        except OSError as error:
-            if error.errno == errno.ECONNREFUSED:
-                return f"that computer is reached, but no program listens at this port; {begin}"
-            return f"{(error.strerror or str(error)).lower()}; is the address right, are both on one network?"
-
-    @property
-    def registers(self) -> dict[str, Any]:
-        """The contents of the board's registers, in their own units."""
-        return dict(self._about["registers"])
-
-    @property
-    def differences(self) -> bool:
-        """Whether the board sends differences for intensities."""
-        return bool(self._about["differences"])
-
-    @property
-    def _place(self) -> str:
-        """The board's whole address."""
-        return str(self.address._replace(name=self.name))
-
-    def _fed(self, queue_bytes: int) -> _core.Feed:
-        """Return the feed for a pipeline."""
-        self._only_one()
-        return _core.Feed(self._place, queue_bytes)
-
-    def _begin(self, feed: _core.Feed) -> None:
-        """Feed the pipeline from now on."""
-        self._feed = feed
-        self._thread = threading.Thread(target=self._run, args=(feed,), name="taxel-bridge", daemon=True)
-        self._thread.start()
-
-    def _only_one(self) -> None:
-        if self._feed is not None:
-            raise refused("remote", ": is in use already; make another one")
-
-    def _run(self, feed: _core.Feed) -> None:
-        """Feed received parcels until the pipeline ends, or `stop` is called."""
-        try:
-            self._compare(feed, _AT_FIRST)
-            self._zenoh.listen(self.name, self.congestion)
-            clocks = threading.Thread(target=self._clocks, args=(feed,), name="taxel-clocks", daemon=True)
-            clocks.start()
-            while not (feed.is_over() or self._ending.is_set()):
-                parcel = self._zenoh.take(_POLL_S)
-                while parcel is not None and not feed.take(parcel):
-                    self._begin_session(feed)
-                    if feed.is_over() or self._ending.is_set():
-                        break
-            clocks.join()
-        except Exception as error:
-            # The pipeline raises it in its callers.
-            feed.fail(str(error))
-
-    def _begin_session(self, feed: _core.Feed) -> None:
-        """Begin another session: it must be of the same sensor, and the clocks are compared again."""
-        about = dict(with_taxel_errors(self._zenoh.names, _ASK_S)).get(self.name)
-        if about is not None and json.loads(about)["array"] != self._about["array"]:
-            raise DeviceError("the board there is another one now; make a new Remote")
-        feed.begin_session()
-        self._compare(feed, _AT_FIRST)
-
-    def _compare(self, feed: _core.Feed, times: int) -> None:
-        for _ in range(times):
-            trip = self._zenoh.compare(self.name)
-            if trip is not None:
-                feed.compare(*trip)
-
-    def _clocks(self, feed: _core.Feed) -> None:
-        # A round trip takes up to a second if the other computer is gone: parcels must not wait for it.
-        with contextlib.suppress(ConnectionError):
-            while not (feed.is_over() or self._ending.wait(_COMPARE_S)):
-                self._compare(feed, 1)
-
-    def detections(self) -> Iterator[dict[str, Any]]:
-        """Yield the detections of the other computer's readout, with the keys of ``taxel live --json``; endless."""
-        return self._messages("detection")
-
-    def pictures(self) -> Iterator[dict[str, Any]]:
-        """Yield the held values, ten times a second while events arrive: t_us, rows, columns, ticks; endless."""
-        return self._messages("picture")
-
-    def _messages(self, what: str) -> Iterator[dict[str, Any]]:
-        self._only_one()
-        with_taxel_errors(self._zenoh.listen, self.name, what)
-        while not self._ending.is_set():
-            message = with_taxel_errors(self._zenoh.take, _POLL_S)
-            if message is not None:
-                yield json.loads(message)
-
-    def stop(self) -> None:
-        """Disconnect; discard what was received and not read."""
-        self._ending.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        with_taxel_errors(self._zenoh.close)
-
-    def __enter__(self) -> Remote:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
-
-    def __repr__(self) -> str:
-        return f"Remote({str(self.address._replace(name=self.name))!r}, congestion={self.congestion!r})"
-
-
-def wheel() -> Any:
-    """Return the module of the wheel taxel-bridge."""
-    try:
-        return importlib.import_module("taxel_bridge")
-    except ImportError:
-        raise DeviceError(
-            "a bridge needs the wheel taxel-bridge: run make bridge in a checkout of taxel (six minutes on one core)"
-        ) from None
-
-
-def with_taxel_errors(call: Any, *arguments: Any) -> Any:
-    """Call a function of the wheel; raise its errors as errors of taxel."""
-    try:
-        return call(*arguments)
-    except ConnectionError as error:
-        raise DeviceError(f"bridge: {error}") from None
-    except ValueError as error:
-        raise ProblemError(str(error)) from None
+    scheme, colon, _ = text("address", address).partition(":")
+    if not colon:
+        raise ProblemError(f"address {address!r}: must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left")
+    for point in entry_points(group="taxel.remotes", name=scheme):
+        return point.load()
+    raise DeviceError(f"{address}: nothing that is installed receives {scheme}: addresses; zenoh: needs taxel_bridge")

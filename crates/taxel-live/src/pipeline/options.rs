@@ -42,18 +42,18 @@ options! {
         /// The UDP port that the board sends to.
         ///
         /// 0 finds a free one, see `address`.
-        port: u16 = 5208, "commands" = "live record bridge";
+        port: u16 = 5208, "commands" = "live record";
         /// The address of this machine to listen on; 0.0.0.0: all.
-        host: String = "0.0.0.0".to_owned(), "commands" = "live record bridge";
+        host: String = "0.0.0.0".to_owned(), "commands" = "live record";
         /// Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.
         ///
-        /// Stop the `Live` before the `Remote`.
+        /// Stop the `Live` before it.
         remote: Option<String> = None, "commands" = "live record", "flag" = "--from", "metavar" = "ADDRESS",
-            "python" = "Remote | None";
+            "python" = "RemoteBoard | None";
         /// Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
-        array: Array = Array::thesis(), "commands" = "live record bridge", "metavar" = "ROWSxCOLUMNS[xMM]",
+        array: Array = Array::thesis(), "commands" = "live record", "metavar" = "ROWSxCOLUMNS[xMM]",
             "python" = "Array | None", "typed" = "As 24x20x5; without a pitch 2.67 mm, or unknown with --rate-hz.";
         /// The board's registers: one of "5.2 kHz", "2 kHz", "20.8 kHz". Default: "5.2 kHz"; a remote board reports its own.
         ///
@@ -61,17 +61,17 @@ options! {
         /// of a board of this array at reset.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
-        registers: Registers = Registers::default(), "commands" = "live record bridge", "flag" = "--preset",
+        registers: Registers = Registers::default(), "commands" = "live record", "flag" = "--preset",
             "python" = "str | Registers | None";
         /// The board sends intensity differences.
         ///
         /// The panel's "delta intensity".
-        differences: bool = false, "commands" = "live record bridge";
+        differences: bool = false, "commands" = "live record";
         /// A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none.
         ///
         /// Without one nothing is detected.
         #[serde(skip_serializing)]
-        readout: Option<String> = None, "commands" = "live bridge", "metavar" = "FILE",
+        readout: Option<String> = None, "metavar" = "FILE",
             "python" = "Readout | PlainRule | None";
         /// Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).
         ///
@@ -79,12 +79,12 @@ options! {
         /// on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
-        tare: Option<StatedTare> = None, "commands" = "live bridge", "python" = "Tare | float | None";
+        tare: Option<StatedTare> = None, "python" = "Tare | float | None";
         /// Record in a new file (.mcap or .lsa).
         ///
         /// `.mcap` holds all data, `.lsa` the raw bytes of the manual.
         #[serde(serialize_with = "shown")]
-        record: Option<PathBuf> = None, "commands" = "live bridge", "python" = "str | os.PathLike[str] | None";
+        record: Option<PathBuf> = None, "python" = "str | os.PathLike[str] | None";
         /// Recordings begin and end while it runs (`record`, `end_recording`).
         ///
         /// Then none begins here, and `sources` are recorded while one runs.

@@ -12,7 +12,7 @@ mod subscriber;
 use pyo3::prelude::*;
 
 #[pymodule]
-fn taxel_bridge(module: &Bound<'_, PyModule>) -> PyResult<()> {
+fn taxel_zenoh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<publisher::Publisher>()?;
     module.add_class::<subscriber::Subscriber>()

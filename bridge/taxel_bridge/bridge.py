@@ -13,13 +13,9 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
 
-from taxel import _core
-from taxel._base.arguments import number, text
-from taxel._base.errors import refused
-from taxel._base.messages import escaped
-from taxel._core import DeviceError, ProblemError
-from taxel.live.live import Live
-from taxel.live.remote import wheel, with_taxel_errors
+from taxel import DeviceError, Error, ProblemError
+from taxel.live import Live
+from taxel_bridge.remote import wheel, with_taxel_errors
 
 __all__ = ["PLACE", "Bridge"]
 
@@ -58,7 +54,7 @@ class Bridge:
 
     Raises
     ------
-    DeviceError : the address cannot be bound; the wheel is not installed
+    DeviceError : the address cannot be bound; the wheel taxel_zenoh is not installed
     ProblemError : arguments that are invalid
     """
 
@@ -72,21 +68,25 @@ class Bridge:
         clock_ahead_s: float = 0.0,
         clock_drift_ppm: float = 0.0,
     ) -> None:
-        self.name, self.listen = text("name", name), _places("listen", listen)
+        self.name, self.listen = name, _places("listen", listen)
         self._live = live
-        ahead_ns = round(number("clock_ahead_s", clock_ahead_s) * 1e9)
-        drift = number("clock_drift_ppm", clock_drift_ppm)
         zenoh = wheel()
         routers = _places("connect", connect)
         try:
             self._zenoh = with_taxel_errors(
-                zenoh.Publisher, self.name, self.listen, routers, _about(live), ahead_ns, drift
+                zenoh.Publisher,
+                name,
+                self.listen,
+                routers,
+                json.dumps(live.about),
+                round(clock_ahead_s * 1e9),
+                clock_drift_ppm,
             )
         except DeviceError:
             for place in self.listen:
                 _refused(place)
             raise
-        self._copies = live._core.copy()
+        self._copies = live.copies()
         self._failed: BaseException | None = None
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="taxel-bridge", daemon=True)
@@ -106,7 +106,7 @@ class Bridge:
                     renewed = time.monotonic()
                     with contextlib.suppress(ProblemError):
                         # The pipeline has ended: the loop ends too.
-                        self._zenoh.tell(_about(self._live))
+                        self._zenoh.tell(json.dumps(self._live.about))
         except Exception as error:
             # `stop` raises it, in the thread of its caller.
             self._failed = error
@@ -125,7 +125,7 @@ class Bridge:
         DeviceError : publishing failed
         """
         if self._thread.is_alive():
-            if not self._live._core.is_over():
+            if not self._live.is_over:
                 self._ending.set()
             self._thread.join()
         with_taxel_errors(self._zenoh.close)
@@ -143,19 +143,19 @@ class Bridge:
             self.stop()
         else:
             # The first error is the one that is raised.
-            with contextlib.suppress(_core.Error, OSError):
+            with contextlib.suppress(Error, OSError):
                 self.stop()
 
     def __repr__(self) -> str:
-        return escaped(f"Bridge({self.name!r}, {', '.join(self.listen)})")
+        return f"Bridge({self.name!r}, {', '.join(self.listen)})"
 
 
 def _places(name: str, addresses: str | Sequence[str]) -> list[str]:
     places = [addresses] if isinstance(addresses, str) else list(addresses)
     for place in places:
-        match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[\w.-]+):(\d{1,5})", text(name, place), re.ASCII)
+        match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[\w.-]+):(\d{1,5})", place, re.ASCII)
         if not match or not 1 <= int(match[2]) <= 65_535:
-            raise refused(name, f" is {place!r}: must be HOST:PORT, as {PLACE}")
+            raise ProblemError(f"{name} is {place!r}: must be HOST:PORT, as {PLACE}")
     return places
 
 
@@ -177,11 +177,3 @@ def _refused(place: str) -> None:
         }.get(error.errno or 0)
         why = (error.strerror or str(error)).lower()
         raise DeviceError(f"listen {place}: {why}" + (f"; {right}" if right else "")) from None
-
-
-def _about(live: Live) -> str:
-    """Return the description of the sensor that is published."""
-    registers = live._core.registers()
-    return json.dumps(
-        {"array": live.array._geometry(), "registers": registers, "differences": live._options.differences}
-    )

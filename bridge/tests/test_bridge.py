@@ -9,15 +9,15 @@ import time
 
 import numpy as np
 import pytest
-from loopback import free_port, until
+from processes import command
+from tests.loopback import free_port, until
 
 import taxel
-from taxel.live import Bridge, Live, Remote, send
+from taxel.live import Live, send
 from taxel.simulate import Scene, Silence, emulate
+from taxel_bridge import Bridge, Remote
 
-from .processes import command
-
-pytest.importorskip("taxel_bridge", reason="the wheel taxel-bridge is not built: make bridge")
+pytest.importorskip("taxel_zenoh", reason="the wheel taxel_zenoh is not built: make bridge")
 
 AHEAD_S, DRIFT_PPM = 3.7, 50.0
 
@@ -60,7 +60,7 @@ def test_the_sensor_and_its_registers_are_told(place):
         Remote(f"zenoh:{place}") as remote,
     ):
         assert (remote.name, remote.array) == ("palm", array)
-        assert remote.registers == near._core.registers()
+        assert remote.registers == near.about["registers"]
         with Live(remote=remote) as far:
             assert far.array == array
             assert far.place == f"zenoh:{place}/palm"

@@ -13,20 +13,12 @@ from rich.console import Group
 from rich.live import Live as Display
 from rich.text import Text
 
-from taxel._base.messages import counted
-from taxel._core import ProblemError
-from taxel.cli._app import App, SecondsOption
-from taxel.cli._board import (
-    REDRAW_S,
-    counters_table,
-    exit_code,
-    for_live,
-    with_live_options,
-)
-from taxel.cli._say import say
+from taxel import ProblemError
+from taxel.cli import App, SecondsOption, say
+from taxel.cli.board import REDRAW_S, counters_table, exit_code, for_live, with_live_options
 from taxel.cli.console import Console
-from taxel.live import Bridge, Live
-from taxel.live.bridge import PLACE
+from taxel.live import Live
+from taxel_bridge.bridge import PLACE, Bridge
 
 __all__ = ["app", "bridge"]
 
@@ -34,7 +26,7 @@ app = App()
 
 
 @app.command()
-@with_live_options("bridge")
+@with_live_options("live", "port", "host", "array", "registers", "differences", "readout", "tare", "record")
 def bridge(
     options: dict[str, Any],
     name: Annotated[str, typer.Option(help="The board's name: letters, digits, - _ or .")] = "board",
@@ -59,7 +51,7 @@ def bridge(
 
     On the other computer, taxel live and taxel record receive the board with --from zenoh:HOST:PORT/NAME. The bridge
     listens on loopback unless --listen names another address; what it publishes is neither encrypted nor protected by a
-    password. It needs the wheel taxel-bridge (make bridge). Exit code 3: nothing was received, or something was lost
+    password. It needs the wheel taxel_zenoh (make bridge). Exit code 3: nothing was received, or something was lost
     here after it had arrived.
 
     Example: taxel bridge --port 5208 --name left --listen 192.168.1.5:7447
@@ -95,8 +87,7 @@ def bridge(
         )
     else:
         sent = counts["block"]["sent"] + counts["drop"]["sent"]
-        received = counted(summary.counters["capture"]["datagrams"], "datagram")
-        say(f"{received} received, {counted(sent, 'parcel')} published")
+        say(f"datagrams received: {summary.counters['capture']['datagrams']}, parcels published: {sent}")
         say(summary.verdict)
     raise typer.Exit(exit_code(summary, live.array))
 

@@ -1,18 +1,15 @@
-"""Addresses of boards on other computers, and what is said where nothing carries them; parcels without a network."""
+"""Addresses of boards on other computers, and what is said where nothing carries them."""
 
 import sys
-import time
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import taxel
-from taxel import _core
 from taxel.cli import main
-from taxel.live import Bridge, Live, Remote
-from taxel.live.remote import Address
-from taxel.simulate import Silence, emulate
+from taxel.live import Live
+from taxel_bridge import Address, Bridge, Remote
 
 HOSTS = st.one_of(
     st.ip_addresses(v=4).map(str),
@@ -40,7 +37,7 @@ def test_what_is_no_address_is_refused_with_one_that_is(said):
 
 
 def test_without_the_wheel_one_line_says_how_to_get_it(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "taxel_bridge", None)
+    monkeypatch.setitem(sys.modules, "taxel_zenoh", None)
     for command in (["live", "--panel", "--from", "zenoh:127.0.0.1/left"], ["bridge", "--port", "0"]):
         with pytest.raises(SystemExit) as ended:
             main(command)
@@ -64,31 +61,3 @@ def test_what_only_a_remote_board_takes_is_refused_without_one(capsys):
         Bridge(live, listen="7447")
     with Live(0, host="127.0.0.1") as live, pytest.raises(taxel.ProblemError, match="must be HOST:PORT"):
         Bridge(live, listen="127.0.0.1:99999")
-
-
-def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path):
-    """The same as over a network, with a queue for one."""
-    near = Live(0, host="127.0.0.1", record=tmp_path / "near.mcap")
-    copies, feed = near._core.copy(), _core.Feed("zenoh:there:1/left", 1 << 20)
-    far = _core.Live("{}", tmp_path / "far.mcap", None, feed)
-    assert far.place() == "zenoh:there:1/left"
-    now = time.time_ns()
-    feed.begin_session()
-    feed.compare(now, now, now, now)
-    emulate("{}:{}".format(*near.address), [Silence(200.0)], tare_ms=20.0, wire=2)
-    sent = near.stop().counters
-    kinds = set()
-    while not copies.is_over():
-        kind, data = copies.next(0.05) or ("nothing", b"")
-        kinds.add(kind)
-        if kind == "parcel":
-            assert feed.take(data)
-    assert "parcel" in kinds
-    assert feed.take(b"no parcel")
-    came = far.stop().counters
-    assert came["decoded"] == sent["decoded"] > 0
-    bridged = came["bridged"]
-    assert (bridged["missing"], bridged["dropped"], bridged["refused"], bridged["ended"]) == (0, 0, 1, True)
-    ours, theirs = (taxel.open(tmp_path / f"{name}.mcap").events for name in ("near", "far"))
-    assert ours == theirs
-    assert len(ours)

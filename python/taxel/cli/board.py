@@ -1,4 +1,4 @@
-"""Options and output that the commands that receive from a board share."""
+"""Options and output that the commands that receive from a board share, with those of other distributions."""
 
 from __future__ import annotations
 
@@ -19,10 +19,13 @@ from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.cli._app import OUTSIDE, WRONG_INPUT, as_command
 from taxel.detect import load
-from taxel.live import Remote, Summary, delays
+from taxel.live import RemoteBoard, Summary, delays
 from taxel.live._stated_options import StatedOptions
+from taxel.live.remote import receiver_of
 from taxel.tare import Tare
 from taxel.wire import Registers
+
+__all__ = ["REDRAW_S", "counters_table", "exit_code", "for_live", "with_live_options"]
 
 #: Interval at which the display is redrawn and the end is checked, s.
 REDRAW_S = 0.1
@@ -68,9 +71,21 @@ def _parameter(one: Field[Any]) -> inspect.Parameter:
     )
 
 
-def with_live_options(command: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator that gives a command the options of `Live` that it has, in its argument `options`, by name."""
-    chosen = [one for one in fields(StatedOptions) if command in one.metadata["typed"].get("commands", "live").split()]
+def with_live_options(command: str, *names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that gives a command options of `Live`, in its argument `options`, by name.
+
+    Parameters
+    ----------
+    command : str
+        A command whose options these are.
+    *names : str
+        Those of its options that are taken. Default: all.
+    """
+    chosen = [
+        one
+        for one in fields(StatedOptions)
+        if command in one.metadata["typed"].get("commands", "live").split() and one.name in (names or (one.name,))
+    ]
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
         def call(**typed: Any) -> None:
@@ -112,13 +127,16 @@ def _registers(
 
 def remote(
     address: str | None, congestion: str | None, *, lossless: bool
-) -> contextlib.AbstractContextManager[Remote | None]:
+) -> contextlib.AbstractContextManager[RemoteBoard | None]:
     """Return the receiver of another computer's board; `lossless`: it blocks by default, else it drops."""
     if address is None:
         if congestion is not None:
             raise ProblemError("--congestion belongs to a board of another computer: give --from ADDRESS")
         return contextlib.nullcontext()
-    return Remote(address, congestion=congestion or ("block" if lossless else "drop"))
+    received: contextlib.AbstractContextManager[RemoteBoard] = receiver_of(address)(
+        address, congestion=congestion or ("block" if lossless else "drop")
+    )
+    return received
 
 
 def _rest(value: str | None) -> Tare | float | None:

@@ -8,17 +8,17 @@ import subprocess
 import time
 
 import pytest
+from processes import Process
 
 import taxel
-
-from .processes import Process
 
 BOARD, FAR = "10.77.0.1", "10.77.0.2"
 BOARD_6, FAR_6 = "fd77::1", "fd77::2"
 
 LISTENS = """
 import json, sys, time
-from taxel.live import Live, Remote
+from taxel.live import Live
+from taxel_bridge import Remote
 
 def say(**what):
     print(json.dumps(what | {"at": time.monotonic()}), flush=True)
@@ -46,7 +46,7 @@ def ip(*arguments, check=True):
 @pytest.fixture
 def two():
     """Make two computers and a cable between them; return how each is called."""
-    pytest.importorskip("taxel_bridge", reason="the wheel taxel-bridge is not built: make bridge")
+    pytest.importorskip("taxel_zenoh", reason="the wheel taxel_zenoh is not built: make bridge")
     if shutil.which("ip") is None:
         pytest.skip("no iproute2 here")
     near, far = names = [f"taxel-{os.getpid()}-{end}" for end in ("near", "far")]
