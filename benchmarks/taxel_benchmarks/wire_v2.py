@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import wire
-from taxel.simulate import Board, Pictures, Scene, Silence, Version2, play
+from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, play
 from taxel.wire import FRAME_US, Registers
 from taxel_benchmarks._goals import Goal, at_least, at_most
 from taxel_benchmarks._instructions import beside_avx2
@@ -87,7 +87,7 @@ def footfall() -> Frames:
         toe = np.exp(-(((y - 54) / 3) ** 2) - ((x - 36) / 3) ** 2) * max(0.0, share - 0.5)
         pictures[k] = load * (sole + 1.5 * toe)
     pictures *= np.float32(0.8) / pictures.max() * (1 + 0.02 * draw.standard_normal((64, 64)).clip(-2, 2))
-    return felt([Pictures(pictures.clip(0, 1), 2000.0)])
+    return felt([FrameSequence(pictures.clip(0, 1), 2000.0)])
 
 
 def drop() -> Frames:

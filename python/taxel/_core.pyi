@@ -50,7 +50,7 @@ _Events = tuple[
     NDArray[np.bool_] | None,
     list[tuple[int, bool]],
 ]
-#: array, t, values one picture after the other
+#: array, t, values one frame after the other
 _Frames = tuple[_Array, NDArray[np.int64], NDArray[np.float32]]
 #: times, offsets, values, kind, start, stop; ms
 _Spikes = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float32] | None, str, float, float]
@@ -426,7 +426,7 @@ def law_of(
     json: str, ramp: float, given: NDArray[np.float64], rest: NDArray[np.float64], back: bool
 ) -> NDArray[np.float64]: ...
 
-# simulate: acts as ms of silence, a scene as JSON, or pictures with their period in us
+# simulate: acts as ms of silence, a scene as JSON, or a sequence of frames with its period in us
 
 _Act = float | str | tuple[NDArray[np.float32], float]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel.simulate import Board, Pictures, Scene, Silence, Version2, emulate, play, truth
+from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, emulate, play, truth
 from taxel.simulate.circuit import Circuit, VirtualGround
 from taxel.wire import Registers
 
@@ -89,7 +89,7 @@ def test_a_slow_press_is_told_between_the_frames_of_a_scan():
     """Taxels that rise by a tick each 2 ms: whole frames when scanned, their own times when not."""
     slope_us, frames = 2000.0, 1000
     values = np.broadcast_to(np.arange(frames)[:, None, None] * 192.0 / slope_us / 150.0, (frames, 64, 64))
-    acts = [Silence(1.0), Pictures(values.astype(np.float32), 192.0)]
+    acts = [Silence(1.0), FrameSequence(values.astype(np.float32), 192.0)]
     quiet = {"noise_ticks": 0.0, "gain_spread": 0.0, "offset_mv": 0.0}
     scanned, alone = (
         play(acts, seed=1, tare_ms=0.0, sensor=quiet, wire=2, asynchronous=which).events for which in (False, True)

@@ -13,7 +13,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.formats import plate
 from taxel.formats.trial import Trial
-from taxel.simulate import Act, Pictures, Silence
+from taxel.simulate import Act, FrameSequence, Silence
 
 __all__ = ["NOTE", "footfalls"]
 
@@ -45,7 +45,7 @@ def footfalls(data: Path) -> list[Act]:
     acts: list[Act] = [Silence(300.0)]
     for file in plate.files(place):
         for trial in islice(plate.trials(file), _EACH):
-            acts += [Pictures(_shrunk(trial), float(plate.FRAME_US)), Silence(300.0)]
+            acts += [FrameSequence(_shrunk(trial), float(plate.FRAME_US)), Silence(300.0)]
     return acts
 
 

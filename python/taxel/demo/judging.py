@@ -30,7 +30,7 @@ CLASSES: tuple[tuple[str, Callable[[Contact], bool]], ...] = (
     ("pressed by hand, 0.4 to 1 N", lambda c: c.kind == "hand" and 0.4 <= c.peak_n < 1.0),
     ("pressed by hand, below 0.4 N", lambda c: c.kind == "hand" and c.peak_n < 0.4),
     ("come to rest, then lifted", lambda c: c.kind == "rest"),
-    ("footfall", lambda c: c.kind == "pictures"),
+    ("footfall", lambda c: c.kind == "frames"),
 )
 
 #: Within how many ms of a first impact and of its lift-off `known` should lie, in 95 of 100.

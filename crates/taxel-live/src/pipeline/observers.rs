@@ -86,7 +86,7 @@ impl Observers {
             return false;
         }
         self.pictured = Instant::now();
-        self.shared.published().picture.iter_mut().zip(held.picture()).for_each(|(shown, value)| *shown = value);
+        self.shared.published().picture.iter_mut().zip(held.frame()).for_each(|(shown, value)| *shown = value);
         true
     }
 
