@@ -532,7 +532,7 @@ impl Reader {
         decoded.events.t.iter_mut().for_each(|t| *t += header.decoding.origin_us);
         decoded.events.markers.iter_mut().for_each(|m| m.t += header.decoding.origin_us);
         decoded.counts = *sender.counts();
-        decoded.version_2 = sender.two().counts();
+        decoded.version_2 = sender.version_2().counts();
         decoded.found = Found::of(&sender, header.decoding.origin_us);
         Ok(decoded)
     }
