@@ -41,7 +41,7 @@ __all__ = [
     "conditions",
     "named",
     "named_by_neighbours",
-    "pictures",
+    "frames_of",
     "played",
     "sampled",
     "smoothed",
@@ -303,7 +303,7 @@ def sampled(drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.flo
     return counts
 
 
-def pictures(
+def frames_of(
     drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.float64], rig: Rig, length_ms: float
 ) -> NDArray[np.float64]:
     """Return each taxel's reading less that before the impact, sampled at a period, (drops, samples, taxels).

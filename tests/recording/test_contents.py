@@ -12,13 +12,13 @@ import pytest
 import taxel
 from taxel import Note
 from taxel.recording.between import between
-from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, parts_of
+from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, parts_of
 from taxel.recording.cut import region
+from taxel.recording.frames import as_frames, calibrated
 from taxel.recording.merge import merged
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
 from taxel.recording.parts import Lines, Timing
-from taxel.recording.pictures import calibrated, pictures
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
 from taxel.recording.stored import stored
@@ -49,13 +49,13 @@ def full(folder: Path, kind: type[Source]) -> Contents:
     )
     one = replace(one, sensor=replace(one.sensor, side="left", heel="top"), losses=losses, wire=wire)
     header = {name: getattr(one, name) for name in ("origin", "sensor", "settings", "marks", "timing", "losses")}
-    drawn = pictures(one, 100)
+    drawn = as_frames(one, 100)
     readings, five = replace(drawn.readings, untimed=True, turned=255.0), np.arange(5)
     samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
     every: dict[type[Source], Source] = {
         Board: one,
         Drawn: Drawn(readings=readings, wire=wire, **header),
-        Pictures: Pictures(readings=readings, **header),
+        FrameSource: FrameSource(readings=readings, **header),
         Stream: Stream(readings=readings, lines=Lines(tuple(f"c{k}" for k in range(10)), known(samples)), **header),
     }
     own = every[kind]
@@ -81,7 +81,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
         {*TABLE, "sensor.array", "sensor.calibration", "settings.held", "marks.zeroings", "lines.columns"},
     ),
     "merge": (
-        lambda of, _: merged([of, of], gap=0 if isinstance(of.one, Pictures) else None),
+        lambda of, _: merged([of, of], gap=0 if isinstance(of.one, FrameSource) else None),
         {*TABLE, *TIMED, *NAMED, "losses.verdict", "timing.stretch"},
     ),
     "on_clock": (
@@ -89,7 +89,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
         {*TABLE, *TIMED, "marks.board_changes", "timing.clock", "timing.clock_of", "losses.verdict"},
     ),
     "with_notes": (lambda of, _: with_notes(of, (Note("more", 5, 0),)), {"marks.notes"}),
-    "pictures": (lambda of, _: replace(of, one=pictures(of.one)), {*TABLE, "settings.held"}),
+    "as_frames": (lambda of, _: replace(of, one=as_frames(of.one)), {*TABLE, "settings.held"}),
     "calibrated": (
         lambda of, _: replace(of, one=calibrated(of.one)),
         {*TABLE, "settings.held", "sensor.calibration"},
@@ -112,7 +112,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("kind", [Board, Pictures, Drawn, Stream])
+@pytest.mark.parametrize("kind", [Board, FrameSource, Drawn, Stream])
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
     tmp_path: Path, function: str, kind: type[Source]
@@ -129,7 +129,7 @@ def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
     said = after.one.losses.lost()
     assert "something" in said
     assert unsaid(of.one, after.one, said, {*anew, "losses.lost"}) == []
-    if function not in ("between", "on_clock", "with_notes", "pictures", "calibrated"):
+    if function not in ("between", "on_clock", "with_notes", "as_frames", "calibrated"):
         assert "the source other" in said
 
 

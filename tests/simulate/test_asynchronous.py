@@ -16,7 +16,7 @@ from taxel.wire import Registers
 
 def heard(board: Board, frames: np.ndarray) -> taxel.Events:
     """What a host decodes of frames."""
-    sent = [datagram for picture in frames for datagram in board.frame(picture)]
+    sent = [datagram for frame in frames for datagram in board.frame(frame)]
     decoder = taxel.wire.Decoder(2, array=board.array)
     pieces = [decoder.push(datagram) for datagram in sent]
     assert (decoder.counts.intact, decoder.counts.missing) == (len(sent), 0)
@@ -65,8 +65,8 @@ def test_what_a_host_holds_is_within_the_floor_and_steps_are_no_larger():
     registers = Registers(array=array, wire_version=2, noise_floor=4)
     board, decoder = Board(registers, array, asynchronous=True), taxel.wire.Decoder(2, array=array)
     walk = random.integers(0, 151, (200, 9)).astype(np.uint16)
-    for picture in [*walk, walk[-1], walk[-1]]:
-        for datagram in board.frame(picture):
+    for frame in [*walk, walk[-1], walk[-1]]:
+        for datagram in board.frame(frame):
             decoder.push(datagram)
     assert (np.abs(decoder.held.ravel() - walk[-1].astype(int)) <= 4).all()
 

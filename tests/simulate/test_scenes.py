@@ -121,7 +121,7 @@ def test_without_noise_an_untouched_board_is_silent_after_the_tare():
     assert (played.datagrams, played.words) == (2, 2)
 
 
-def test_pictures_touch_from_the_empty_one_before_to_the_empty_one_after():
+def test_frames_touch_from_the_empty_one_before_to_the_empty_one_after():
     values = np.zeros((5, 64, 64))
     values[2:4, 20:30, 20:30] = 0.5
     contacts, _ = truth([FrameSequence(values, 2000.0)])

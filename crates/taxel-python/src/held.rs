@@ -173,8 +173,8 @@ pub fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResul
                 stop.check()?;
             }
             let ticks = events.intensity.map_or(UNKNOWN, |of| if of.present[k] { of.ticks[k] } else { UNKNOWN });
-            let own = events.repaired.is_none_or(|repaired| !repaired[k]);
-            counts.event(events.t[k], events.array.index(events.x[k], events.y[k]), ticks, events.p[k], own);
+            let is_change = events.repaired.is_none_or(|repaired| !repaired[k]);
+            counts.event(events.t[k], events.array.index(events.x[k], events.y[k]), ticks, events.p[k], is_change);
         }
         if let Some(&last) = events.t.last() {
             counts.advance(last.saturating_add(2 * BIN_US));

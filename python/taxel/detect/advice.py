@@ -22,7 +22,7 @@ from taxel.encode import ContactArea, Encoder, Moments
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.rest import of_pictures
+from taxel.recording.rest import of_frames
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 
@@ -296,7 +296,7 @@ def fallen(examples: Sequence[Example]) -> str:
     """Return that the values of an example fall from their rest, and what turns them; "" where none do."""
     for example in examples:
         source = recorded(example.source, hold=False)
-        if isinstance(source, Frames) and (rest := of_pictures(source)).falls:
+        if isinstance(source, Frames) and (rest := of_frames(source)).falls:
             return f"{example.name}: " * bool(example.name) + rest.fall(getattr(example.source, "path", None))
     return ""
 

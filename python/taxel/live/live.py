@@ -271,9 +271,9 @@ class Live:
         return self._core.counters()
 
     @property
-    def picture(self) -> NDArray[np.uint16]:
+    def frame(self) -> NDArray[np.uint16]:
         """Values that the taxels hold, ticks, shape (rows, columns), ten times a second; 0 without any event so far."""
-        return self._core.picture().reshape(self.array.shape)
+        return self._core.frame().reshape(self.array.shape)
 
     @property
     def tare(self) -> Tare | None:

@@ -1,4 +1,4 @@
-"""An opened recording: its events or pictures, their times, and what was lost."""
+"""An opened recording: its events or frames, their times, and what was lost."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from taxel.labels import Note
 from taxel.recording.between import Slices, between, inside
 from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents, S, Stream
+from taxel.recording.frames import as_frames, at_rate, calibrated
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.parts import Wire
-from taxel.recording.pictures import at_rate, calibrated, pictures
 from taxel.recording.raw import Datagrams
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
@@ -106,32 +106,32 @@ class Recording:
 
         Raises
         ------
-        ProblemError : the file holds pictures
+        ProblemError : the file holds frames
         """
         events = self._contents.one.table
         if not isinstance(events, Events):
-            raise ProblemError(f"{self.path}: holds pictures and no events; ask for frames()")
+            raise ProblemError(f"{self.path}: holds frames and no events; ask for frames()")
         return events
 
     def frames(self, rate_hz: float | None = None) -> Frames:
-        """Return pictures over time.
+        """Return frames over time.
 
         Parameters
         ----------
         rate_hz : float, above 0, optional
-            Pictures a second, with a period rounded to whole us; default: a file of pictures returns its own, one of
+            Frames a second, with a period rounded to whole us; default: a file of frames returns its own, one of
             events 100 a second.
 
         Returns
         -------
         Frames
-            For events: the held intensities, beginning with `held`, or with 0; for pictures: the last at each time.
+            For events: the held intensities, beginning with `held`, or with 0; for frames: the last at each time.
 
         Raises
         ------
         ProblemError : an invalid rate, or events without intensities
         """
-        return pictures(self._contents.one, rate_hz).table
+        return as_frames(self._contents.one, rate_hz).table
 
     @property
     def sources(self) -> dict[str, Recording]:
@@ -192,7 +192,7 @@ class Recording:
         return self._contents.one.sensor.calibration()
 
     def calibrated(self, rate_hz: float | None = None, rest: Tare | None = None) -> Frames:
-        """Return pictures in N or kPa, by the calibration in the file's folder.
+        """Return frames in N or kPa, by the calibration in the file's folder.
 
         Parameters
         ----------
@@ -224,12 +224,12 @@ class Recording:
 
     @property
     def has_events(self) -> bool:
-        """Whether the file holds events (else pictures)."""
+        """Whether the file holds events (else frames)."""
         return self._contents.one.has_events
 
     @property
     def timed(self) -> bool:
-        """Whether it has times; else its pictures are numbered: the time of picture k is k us (`at_rate`)."""
+        """Whether it has times; else its frames are numbered: the time of frame k is k us (`at_rate`)."""
         return not self._contents.one.untimed
 
     @property
@@ -430,7 +430,7 @@ class Recording:
         return vars(self) | {"_cut_from": None}
 
     def _why_empty(self) -> str:
-        """Return where the events or pictures of a recording are of which a part without any was taken."""
+        """Return where the events or frames of a recording are of which a part without any was taken."""
         if self._cut_from is None:
             return f": {self.title} is empty"
         of, start, stop = self._cut_from
@@ -441,7 +441,7 @@ class Recording:
         return f"{asked}: {whole.title} " + (f"lies from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
-        """Return the same recording of numbered pictures with times: so many pictures a second, the first at 0.
+        """Return the same recording of numbered frames with times: so many frames a second, the first at 0.
 
         Parameters
         ----------
@@ -489,7 +489,7 @@ class Recording:
         if contents.is_several:
             return escaped(f"Recording({self.name}: {len(contents.sources)} sources: {', '.join(contents.sources)})")
         what = contents.one.table
-        noun = "event" if self.has_events else "picture"
+        noun = "event" if self.has_events else "frame"
         time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) and self.timed else "no time"
         more = [counted(len(self.notes), "note")] * bool(self.notes)
         more += [counted(len(self.detections), "detection")] * bool(len(self.detections))

@@ -12,7 +12,7 @@ use serde_json::json;
 use super::shared::Shared;
 use super::sink::OutputDetection;
 use crate::capture::{Batch, Packer};
-use crate::recording::{PICTURE_EVERY, now_ns};
+use crate::recording::{LOW_RATE_EVERY, now_ns};
 
 /// Longest time for which a parcel gathers datagrams.
 pub(super) const GATHER: Duration = Duration::from_millis(5);
@@ -71,7 +71,7 @@ impl Copies {
 
     /// A picture, if it is due and events have arrived since the last one.
     fn picture(&mut self) -> Option<Copied> {
-        if self.pictured.elapsed() < PICTURE_EVERY {
+        if self.pictured.elapsed() < LOW_RATE_EVERY {
             return None;
         }
         self.pictured = Instant::now();
@@ -85,7 +85,7 @@ impl Copies {
             "t_us": published.counters.board.board_us,
             "rows": array.rows,
             "columns": array.columns,
-            "ticks": published.picture,
+            "ticks": published.frame,
         });
         Some(Copied::Picture(picture.to_string().into_bytes()))
     }
