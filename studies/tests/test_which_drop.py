@@ -61,9 +61,7 @@ def made(boards: int, told: bool) -> list[Row]:
             frames = random.integers(20, 22, (len(LOOKED_MS), 4))
             if told:
                 frames[:, :3] += 40 * np.array(classes)
-            board_drops.append(
-                {**{name: float(value) for name, value in values.items()}, "frames": frames.tolist()}
-            )
+            board_drops.append({**{name: float(value) for name, value in values.items()}, "frames": frames.tolist()})
         rows.append(Row({"drops": 20}, board, board_drops))
     return rows
 

@@ -61,9 +61,7 @@ class FileOptions:
     ] = None
     rate_hz: Annotated[
         float | None,
-        typer.Option(
-            metavar="HZ", help="Frames a second, for recordings without times, whose frames are numbered."
-        ),
+        typer.Option(metavar="HZ", help="Frames a second, for recordings without times, whose frames are numbered."),
     ] = None
     limit: Annotated[
         int | None,
