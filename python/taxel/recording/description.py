@@ -203,7 +203,7 @@ def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
         raise ProblemError("no object")
     return {
         name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else whole(name, n, 0)
-        for name, n in ((_OLD_KEYS.get(name, name), n) for name, n in counts.items())
+        for name, n in ((_OLD_KEYS.get(name, str(name)), n) for name, n in counts.items())
     }
 
 
