@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, number, numbers, several, shown, text, whole
+from taxel._base.columns import frozen
 from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, warn
 from taxel._core import ProblemError
@@ -54,8 +55,7 @@ class Places:
             values = numbers(name, getattr(self, name), np.float64).copy()
             if values.ndim not in (1, 2) or values.shape != np.shape(self.x):
                 raise refused(name, f" has shape {values.shape}: must be one a taxel, as x, {np.shape(self.x)}")
-            values.setflags(write=False)
-            object.__setattr__(self, name, values)
+            object.__setattr__(self, name, frozen(values))
         if self.unit is not None:
             text("unit", self.unit, ("mm",))
 
@@ -158,8 +158,7 @@ class Array:
             exists = numbers("exists", self.exists, np.bool_).copy()
             if exists.shape != self.shape:
                 raise refused("exists", f" has shape {exists.shape}: must be {self.shape}")
-            exists.setflags(write=False)
-            object.__setattr__(self, "exists", exists)
+            object.__setattr__(self, "exists", frozen(exists))
         if self.places is not None:
             if self.pitch_mm is not None:
                 raise ProblemError("pitch_mm and places are both given: give one of them")
@@ -425,15 +424,8 @@ class Array:
         lists = None if of is None else (of.x.ravel().tolist(), of.y.ravel().tolist())
         areas = None if of is None or of.area is None else of.area.ravel().tolist()
         places = None if of is None or lists is None else (*lists, areas, of.unit == "mm")
-        return (
-            self.rows,
-            self.columns,
-            pitch,
-            self.name,
-            exists,
-            places,
-            None if self.names is None else list(self.names),
-        )
+        names = None if self.names is None else list(self.names)
+        return self.rows, self.columns, pitch, self.name, exists, places, names
 
     @classmethod
     def _from_parts(cls, parts: _core._Array) -> Array:
@@ -462,9 +454,7 @@ class Array:
         return cls(rows, columns, pitch, grid, name, of_each, geometry.get("names"))
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Array):
-            return NotImplemented
-        return self._parts() == other._parts()
+        return self._parts() == other._parts() if isinstance(other, Array) else NotImplemented
 
     def __hash__(self) -> int:
         return hash((self.rows, self.columns, self.pitch_mm, self.name))

@@ -12,8 +12,7 @@ import time
 import tty
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from types import TracebackType
+from dataclasses import dataclass, replace
 from typing import Self, TypeVar
 
 from taxel import _core
@@ -41,13 +40,9 @@ _FLOOR_REGISTER, _FLOOR_MASK = 5, 0xFF00
 #: The line that a board sends at its reset, and on request.
 _GREETING = re.compile(r"taxel-board v(\d) (\d+)x(\d+) (\d+)ch")
 
-_SPEEDS = {
-    9600: termios.B9600,
-    57_600: termios.B57600,
-    115_200: termios.B115200,
-    230_400: termios.B230400,
-    460_800: termios.B460800,
-    921_600: termios.B921600,
+#: The constant of each baud rate.
+_SPEEDS: dict[int, int] = {
+    baud: getattr(termios, f"B{baud}") for baud in (9600, 57_600, 115_200, 230_400, 460_800, 921_600)
 }
 
 
@@ -379,9 +374,7 @@ class Cable:
     def __enter__(self) -> Cable:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -592,9 +585,7 @@ class Device:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -612,11 +603,7 @@ class Device:
                 raise
         greeting = self.cable.reopen(self.patience)
         self.reconnects += 1
-        if (greeting.rows, greeting.columns, greeting.channels) != (
-            self.greeting.rows,
-            self.greeting.columns,
-            self.greeting.channels,
-        ):
+        if replace(greeting, wire_version=self.greeting.wire_version) != self.greeting:
             raise DeviceError(f"{self.cable.place}: another board is there now: {greeting}")
         self.greeting = greeting
         if self._set is not None:

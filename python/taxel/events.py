@@ -213,17 +213,10 @@ class Events(Columns):
             t = self.t[places]
         except (TypeError, ValueError) as error:
             raise refused("events", f"[{shown(chosen)}]: {error}") from None
-        return self._unchecked(
-            t,
-            self.x[places],
-            self.y[places],
-            self.p[places],
-            self.array,
-            None if self.intensity is None else self.intensity[places],
-            None if self.present is None else self.present[places],
-            None if self.repaired is None else self.repaired[places],
-            self._markers_of(places),
-        )
+        held: list[Any] = [self.intensity, self.present, self.repaired]
+        ticks, present, repaired = (None if column is None else column[places] for column in held)
+        x, y, p, markers = self.x[places], self.y[places], self.p[places], self._markers_of(places)
+        return self._unchecked(t, x, y, p, self.array, ticks, present, repaired, markers)
 
     def _markers_of(self, places: slice | NDArray[Any]) -> tuple[tuple[int, bool], ...]:
         """Return the markers of the time of chosen events."""

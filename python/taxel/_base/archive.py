@@ -19,8 +19,6 @@ from taxel._base.limits import UNPACKED, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 
-__all__ = ["read_array", "read_arrays", "shapes", "stored_names"]
-
 #: Bytes of the description of an array: NumPy writes at most 64 KiB where it needs no more.
 _HEADER = 1 << 16
 #: Bytes that are converted at once.

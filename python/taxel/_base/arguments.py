@@ -7,7 +7,7 @@ import math
 import operator
 import os
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from decimal import Decimal
 from itertools import chain, islice
 from typing import Any, SupportsIndex, TypeVar
@@ -19,32 +19,8 @@ from taxel._base.errors import refused
 from taxel._base.messages import plain
 from taxel._core import ProblemError
 
-__all__ = [
-    "bare",
-    "buffer_bytes",
-    "callback",
-    "column",
-    "fields",
-    "finite",
-    "finite_numbers",
-    "flag",
-    "floats",
-    "instance",
-    "mapping",
-    "nth",
-    "number",
-    "numbers",
-    "parameters",
-    "path",
-    "rows",
-    "several",
-    "shown",
-    "text",
-    "whole",
-    "window",
-]
-
 T = TypeVar("T")
+R = TypeVar("R")
 
 
 #: The most characters of a value that an error shows.
@@ -122,6 +98,11 @@ def several(name: str, values: object) -> list[Any]:
     if not sized and len(entries) > _MOST_ENTRIES:
         raise refused(name, f" is {shown(values)}: must give at most {_MOST_ENTRIES} entries")
     return entries
+
+
+def optional(check: Callable[[str, T], R], name: str, value: T | None) -> R | None:
+    """Return what a check returns for a value; None for None."""
+    return None if value is None else check(name, value)
 
 
 def callback(name: str, value: T) -> T:

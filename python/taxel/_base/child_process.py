@@ -27,10 +27,7 @@ import time
 import weakref
 from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
-
-__all__ = ["GRACE_S", "ChildProcess", "make_safe", "search_path"]
 
 #: How long a child may take to end by itself after its parent has ended, s.
 GRACE_S = 3.0
@@ -113,11 +110,9 @@ class ChildProcess(subprocess.Popen[Any]):
             self.kill()
             return self.wait()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         self.end()
-        super().__exit__(kind, error, trace)
+        super().__exit__(*raised)
 
 
 _running: weakref.WeakSet[ChildProcess] = weakref.WeakSet()

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import column, numbers
 from taxel._base.limits import unpacked
 
-__all__ = ["Columns", "Growing", "frozen", "frozen_whole", "own", "own_column", "own_numbers"]
-
 
 class Columns:
     """Keep arrays read-only after a copy or unpickling, which make NumPy's arrays writable."""

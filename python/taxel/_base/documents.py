@@ -18,21 +18,6 @@ from taxel._base.limits import UNPACKED, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError
 
-__all__ = [
-    "BY_HAND",
-    "BY_TAXEL",
-    "NotTomlError",
-    "decoded",
-    "memory_of_json",
-    "object_of_json",
-    "of_json",
-    "of_toml",
-    "read_json",
-    "read_text",
-    "read_toml",
-    "text_of_json",
-]
-
 #: Bytes of a document that people write, as a layout, a recipe or a scene: 1 MiB.
 BY_HAND = 1 << 20
 #: Bytes of one that taxel writes, with numbers of each taxel or input, as a readout, a tare or a calibration: 256 MiB.

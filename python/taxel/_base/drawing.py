@@ -6,8 +6,6 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-__all__ = ["draw", "draw_by"]
-
 _load: Callable[[], ModuleType] | None = None
 
 

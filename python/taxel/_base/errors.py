@@ -11,8 +11,6 @@ from typing import TypeVar
 from taxel._base.messages import escaped, escaped_lines
 from taxel._core import Error, ProblemError, error_line
 
-__all__ = ["helped", "refused"]
-
 _Error = TypeVar("_Error", bound=Error)
 
 

@@ -14,8 +14,6 @@ from taxel._base.arguments import flag
 from taxel._base.arguments import path as checked_path
 from taxel._core import open_regular
 
-__all__ = ["beside", "named", "open_file", "try_whole", "whole_file", "write_whole"]
-
 
 def beside(path: Path, name: str) -> Path:
     """Return the place of a file of this name in the folder that a file or folder lies in.

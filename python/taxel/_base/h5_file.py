@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -10,7 +11,6 @@ import subprocess
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -22,8 +22,6 @@ from taxel._base.files import open_file
 from taxel._base.limits import DESCRIPTION, unpacked
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
-
-__all__ = ["Entry", "H5File"]
 
 _CHILD = Path(__file__).with_name("h5_child.py")
 #: The longest time between two lines of the child, s; and the longest time for its start, which loads libraries.
@@ -89,8 +87,9 @@ class H5File:
                 stderr=subprocess.DEVNULL,
             )
         self._answers, self._rest = selectors.DefaultSelector(), bytearray()
-        assert self._child.stdout is not None  # a pipe
-        self._answers.register(self._child.stdout, selectors.EVENT_READ)
+        assert self._child.stdin is not None and self._child.stdout is not None  # noqa: PT018  pipes
+        self._stdin, self._stdout = self._child.stdin, self._child.stdout
+        self._answers.register(self._stdout, selectors.EVENT_READ)
         self.entries: dict[str, Entry] = {}
         self.left_out: dict[str, str] = {}
         try:
@@ -213,10 +212,9 @@ class H5File:
         return f"{self.path}, data set {name}"
 
     def _order(self, what: Any) -> None:
-        assert self._child.stdin is not None  # a pipe
         try:
-            self._child.stdin.write(json.dumps(what).encode() + b"\n")
-            self._child.stdin.flush()
+            self._stdin.write(json.dumps(what).encode() + b"\n")
+            self._stdin.flush()
         except BrokenPipeError:
             # The last answer of the child has the reason.
             return
@@ -249,10 +247,9 @@ class H5File:
 
     def _more(self, most: int, patience_s: float) -> bytes:
         """Return what the child has written since, as soon as there is something."""
-        assert self._child.stdout is not None  # a pipe
         if not self._answers.select(patience_s):
             raise FormatError(f"{self.path}: not a whole HDF5 file (the library has read nothing for {patience_s:g} s)")
-        more = os.read(self._child.stdout.fileno(), most)
+        more = os.read(self._stdout.fileno(), most)
         if not more:
             raise FormatError(
                 f"{self.path}: not a whole HDF5 file (reading it ended the library, status {self._child.wait()})"
@@ -262,19 +259,14 @@ class H5File:
     def close(self) -> None:
         """End the child."""
         self._child.kill()
-        for pipe in (self._child.stdin, self._child.stdout):
-            if pipe is not None:
-                try:
-                    pipe.close()
-                except BrokenPipeError:
-                    continue
+        for pipe in (self._stdin, self._stdout):
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
         self._child.wait()
         self._answers.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -13,8 +13,6 @@ from taxel._base.child_process import ChildProcess, search_path
 from taxel._base.files import whole_file
 from taxel._core import Error
 
-__all__ = ["write_h5"]
-
 _CHILD = Path(__file__).with_name("h5_writing_child.py")
 
 

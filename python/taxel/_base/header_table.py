@@ -14,8 +14,6 @@ from taxel._base.documents import read_text
 from taxel._base.limits import TEXT, unpacked
 from taxel._core import FormatError
 
-__all__ = ["HeaderTable", "lines_of", "text_of"]
-
 #: The names of other separators than the comma, for errors.
 _PARTED = {";": "semicolons", "\t": "tabs"}
 

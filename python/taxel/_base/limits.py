@@ -19,27 +19,6 @@ import numpy as np
 from taxel._base.errors import helped
 from taxel._core import FormatError
 
-__all__ = [
-    "ABOUT",
-    "CHUNK",
-    "COLUMNS",
-    "DESCRIPTION",
-    "LINE",
-    "MARKERS",
-    "TAXELS",
-    "TEXT",
-    "TIME_US",
-    "UNIT",
-    "UNPACKED",
-    "VALUE",
-    "available",
-    "given",
-    "keep",
-    "memory",
-    "opening",
-    "unpacked",
-]
-
 #: Taxels of a sensor: 2048 x 2048.
 TAXELS = 1 << 22
 #: Columns of a table of text: a time, and 256 x 256 taxels.

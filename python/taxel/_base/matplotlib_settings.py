@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-__all__ = ["ignore_current_folder"]
-
 
 class _Finder:
     """Finds matplotlib as the finders behind it do; no file of its name in the current folder exists while it loads."""

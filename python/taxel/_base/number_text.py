@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["float_of", "int_of", "refuse_digits"]
-
 
 def float_of(text: str) -> float:
     """Return the number that a text states; it may be infinite or NaN.

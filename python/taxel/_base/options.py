@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import field, fields
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-__all__ = ["about", "option", "with_fields_of", "with_options"]
-
 _P = ParamSpec("_P")
 _Self = TypeVar("_Self")
 _Options = TypeVar("_Options")

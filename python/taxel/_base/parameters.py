@@ -16,8 +16,6 @@ from taxel._base.arguments import bare, flag, instance, parameters, shown
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 
-__all__ = ["Parameters", "Value", "defaults", "described", "ranges"]
-
 
 @cache
 def described(kind: str) -> dict[str, Any]:

@@ -8,8 +8,6 @@ from typing import TypeAlias
 
 from taxel._base.arguments import callback
 
-__all__ = ["Progress", "Steps", "reporting"]
-
 #: Called with what is done next, how much of it is done, and all of it (0 if that is not known).
 Progress: TypeAlias = Callable[[str, int, int], object]
 

@@ -13,8 +13,6 @@ from taxel._base.documents import text_of_json
 from taxel._base.files import write_whole
 from taxel._core import Error, FormatError
 
-__all__ = ["Saved", "read"]
-
 _S = TypeVar("_S")
 
 
@@ -69,9 +67,7 @@ class Saved(ABC):
         return read(path, cls._WHAT, cls.from_json)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, type(self)):
-            return NotImplemented
-        return self.to_json() == other.to_json()
+        return self.to_json() == other.to_json() if isinstance(other, type(self)) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]
 

@@ -13,8 +13,6 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import NoReturn
 
-__all__ = ["asked_to_end", "leave", "stop_on_signals"]
-
 #: A terminal that closes sends SIGHUP twice, and a service that ends SIGTERM and SIGHUP: signals that follow another
 #: within this time are not taken for a second request, s.
 _ONE_REQUEST_S = 1.0

@@ -10,8 +10,6 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["beginning_us", "begun"]
-
 #: Times from here on are taken to count from 1970, us: it is 2001-09-09. The page of the panel has the same number.
 _SINCE_1970_US = 10**15
 

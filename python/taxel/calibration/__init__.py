@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
+from taxel._base.columns import frozen
 from taxel._base.documents import object_of_json
 from taxel._base.errors import refused
 from taxel._base.files import beside, named
@@ -24,7 +25,7 @@ from taxel._base.saved import Saved
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration._curves import Curve, Law, Power, Table, Values, above_0, curve_of
-from taxel.calibration._loads import UNITS, Laid, Load, Sensor, best_exponent, gains, same, there
+from taxel.calibration._loads import UNITS, Laid, Load, Sensor, best_exponent, gains, same
 from taxel.frames import Frames
 from taxel.tare import Tare
 
@@ -298,7 +299,7 @@ class Calibration(Saved):
         made = [loading.made(curve, each_gain) for loading in laid]
         missed = np.concatenate([loading.errors(curve, each_gain) for loading in laid])
         unknown = 1 + (differ and exponent is None and not isinstance(curve, Table))
-        unknown += int(np.count_nonzero(each_gain[there(array)] != gain)) if each else 0
+        unknown += int(np.count_nonzero(each_gain[array._there()] != gain)) if each else 0
         whole_fit.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
         whole_fit.loads = tuple((load.load, load.unit, value) for load, value in zip(measured, made, strict=True))
         return whole_fit
@@ -363,7 +364,7 @@ class Calibration(Saved):
     def _values(self, readings: NDArray[Any], rest: Values) -> NDArray[np.float32]:
         known = np.nan_to_num(rest)
         read = np.asarray(readings, np.float64)
-        loaded = (read > known + self.floor) & ~np.isnan(rest) & there(self.array)
+        loaded = (read > known + self.floor) & ~np.isnan(rest) & self.array._there()
         return _32_bits(np.where(loaded, self.gain * self._curve.values(read, known), 0.0))
 
     def _region(self, columns: slice, rows: slice) -> Calibration:
@@ -491,9 +492,7 @@ def _by_taxel(name: str, value: Any, array: Array) -> Values:
         raise refused(name, f" has shape {values.shape}: must be a number, or {array.shape}")
     if np.isinf(values).any():
         raise refused(name, ": must be finite")
-    every = np.broadcast_to(values, array.shape).copy()
-    every.setflags(write=False)
-    return every
+    return frozen(np.broadcast_to(values, array.shape).copy())
 
 
 def _iso(value: object) -> str:

@@ -16,8 +16,6 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 
-__all__ = ["N_PER_KPA_MM2", "Curve", "Law", "Power", "Table", "Values", "above_0", "curve_of"]
-
 #: Of a load that uniform pressure in kPa makes on 1 mm2: N.
 N_PER_KPA_MM2 = 1e-3
 

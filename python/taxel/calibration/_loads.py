@@ -80,7 +80,7 @@ class Laid(NamedTuple):
             raise ProblemError(f"{place}: no frame while it lies")
         rest = sensor.rest
         readings = frames.values.mean(axis=0, dtype=np.float64)
-        chosen = there(sensor.array) & ~np.isnan(rest)
+        chosen = sensor.array._there() & ~np.isnan(rest)
         if load.taxel is not None:
             only = several(f"{place}, taxel", load.taxel)
             if len(only) != 2:
@@ -169,11 +169,6 @@ def gains(array: Array, curve: Curve, laid: Sequence[Laid], each: bool) -> tuple
     squares = (share**2).sum(axis=0)
     np.divide(share.sum(axis=0), squares, out=every, where=squares > 0)
     return every, common
-
-
-def there(array: Array) -> NDArray[np.bool_]:
-    """Return which taxels exist."""
-    return np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists)
 
 
 def same(calibrated: Array, given: Array, what: str, unit: str | None = None, expected: str | None = None) -> None:

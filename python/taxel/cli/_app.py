@@ -6,23 +6,19 @@ import errno
 import functools
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import is_dataclass
+from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
-from taxel._base.options import with_options
 from taxel._core import Error, ProblemError
-
-__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "with_out", "with_typed"]
 
 #: Arguments of Python that are typed as another option.
 _TYPED_AS = {"registers": "preset"}
-
-_KEYWORD = inspect.Parameter.KEYWORD_ONLY
-_Typed = TypeVar("_Typed")
 
 #: Exit codes: the user's input is wrong; board, socket or disk; stopped by Ctrl-C.
 WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
@@ -90,20 +86,38 @@ class App(typer.Typer):
         super().__init__(**(plain | options))
 
     def command(self, *names: Any, **options: Any) -> Callable[[Any], Any]:
-        """Register a command."""
-        return super().command(*names, **{"cls": _Command, **options})
+        """Register a command, whose arguments of a dataclass are given by an option for each field."""
+        register = super().command(*names, **{"cls": _Command, **options})
+        return lambda work: register(_with_fields(work))
 
 
-def with_typed(options: type[_Typed]) -> Callable[[Callable[[_Typed], None]], Callable[..., None]]:
-    """Return a decorator that gives a command the fields of a dataclass as its arguments and options."""
+def as_command(
+    call: Callable[..., None], work: Callable[..., None], parameters: Iterable[inspect.Parameter]
+) -> Callable[..., None]:
+    """Return `call` as the command that `work` is, but with these parameters: options may stand before arguments."""
+    functools.update_wrapper(call, work)
+    keywords = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
+    call.__signature__ = inspect.Signature(keywords)  # type: ignore[attr-defined]
+    call.__annotations__ = {}  # those of `work`, which the signature replaces
+    return call
 
-    def decorate(work: Callable[[_Typed], None]) -> Callable[..., None]:
-        command = with_options(options)(work)
-        # typer reads annotations, not their text.
-        command.__signature__ = inspect.signature(options, eval_str=True)  # type: ignore[attr-defined]
-        return command
 
-    return decorate
+def _with_fields(work: Callable[..., None]) -> Callable[..., None]:
+    """Return a command with the fields of each dataclass that it takes in place of that argument."""
+    given = inspect.signature(work, eval_str=True).parameters
+    groups: dict[str, Any] = {
+        name: parameter.annotation for name, parameter in given.items() if is_dataclass(parameter.annotation)
+    }
+    if not groups:
+        return work
+    fields = {name: inspect.signature(group, eval_str=True).parameters for name, group in groups.items()}
+
+    def call(**typed: Any) -> None:
+        held = {name: group(**{field: typed.pop(field) for field in fields[name]}) for name, group in groups.items()}
+        work(**typed, **held)
+
+    each = [fields[name].values() if name in fields else [parameter] for name, parameter in given.items()]
+    return as_command(call, work, chain.from_iterable(each))
 
 
 def with_out(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -112,22 +126,20 @@ def with_out(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     out = Annotated[Path | None, typer.Option("--out", "-o", metavar=upper, help=f"The same as {upper}.")]
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
-        own = dict(inspect.signature(work, eval_str=True).parameters)
-        own[name] = own[name].replace(default=None, annotation=_or_none(own[name].annotation))
+        given = dict(inspect.signature(work, eval_str=True).parameters)
+        given[name] = given[name].replace(default=None, annotation=_or_none(given[name].annotation))
 
-        def command(ctx: typer.Context, typed_out: Path | None, **typed: Any) -> None:
+        def call(ctx: typer.Context, typed_out: Path | None, **typed: Any) -> None:
             if typed_out is None and typed[name] is None:
                 raise ProblemError(f"{upper} is missing; see {ctx.command_path} --help")
             if typed_out is not None and typed[name] is not None:
                 raise ProblemError(f"{upper} is given twice: {typed[name]} and {typed_out}")
             work(**{**typed, name: typed[name] or typed_out})
 
-        functools.update_wrapper(command, work)
         more = {"ctx": typer.Context, "typed_out": out}
-        own |= {key: inspect.Parameter(key, _KEYWORD, default=None, annotation=kind) for key, kind in more.items()}
-        command.__signature__ = inspect.Signature([one.replace(kind=_KEYWORD) for one in own.values()])  # type: ignore[attr-defined]
-        command.__annotations__ = {}  # those of `work`, which the signature replaces
-        return command
+        keyword = inspect.Parameter.KEYWORD_ONLY
+        given |= {key: inspect.Parameter(key, keyword, default=None, annotation=kind) for key, kind in more.items()}
+        return as_command(call, work, given.values())
 
     return decorate
 

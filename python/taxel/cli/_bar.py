@@ -8,8 +8,6 @@ from contextlib import contextmanager
 
 from taxel._base.messages import escaped
 
-__all__ = ["bar", "duration"]
-
 
 @contextmanager
 def bar(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,25 +17,12 @@ from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
-from taxel.cli._app import OUTSIDE, WRONG_INPUT
+from taxel.cli._app import OUTSIDE, WRONG_INPUT, as_command
 from taxel.detect import load
 from taxel.live import Remote, Summary, delays
 from taxel.live._stated_options import StatedOptions
 from taxel.tare import Tare
 from taxel.wire import Registers
-
-__all__ = [
-    "REDRAW_S",
-    "BitsOption",
-    "CongestionOption",
-    "RateOption",
-    "counters_table",
-    "exit_code",
-    "for_live",
-    "outside",
-    "remote",
-    "with_live_options",
-]
 
 #: Interval at which the display is redrawn and the end is checked, s.
 REDRAW_S = 0.1
@@ -90,15 +77,9 @@ def with_live_options(command: str) -> Callable[[Callable[..., None]], Callable[
             options = {one.name: typed.pop(one.name) for one in chosen}
             work(options=options, **typed)
 
-        functools.update_wrapper(call, work)
-        signature = inspect.signature(work, eval_str=True)
-        parameters: list[inspect.Parameter] = []
-        for parameter in signature.parameters.values():
-            parameters += map(_parameter, chosen) if parameter.name == "options" else [parameter]
-        every = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
-        call.__signature__ = signature.replace(parameters=every)  # type: ignore[attr-defined]
-        call.__annotations__ = {}  # those of `work`, which the signature replaces
-        return call
+        given = inspect.signature(work, eval_str=True).parameters.items()
+        each = [map(_parameter, chosen) if name == "options" else [parameter] for name, parameter in given]
+        return as_command(call, work, chain.from_iterable(each))
 
     return decorate
 

@@ -17,8 +17,6 @@ from typer.core import TyperGroup
 from taxel._base.messages import escaped, first_line
 from taxel._core import ProblemError
 
-__all__ = ["OWN", "Commands", "added"]
-
 #: Our commands, each a module of this name, and what they do, in the order of the work.
 OWN = {
     "demo": "Play scenes on an emulated board, and report what was found.",

@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterator
 
 from taxel._core import Error
 
-__all__ = ["noting"]
-
 #: Interval at which the end of the recording is checked, s.
 _POLL_S = 0.1
 

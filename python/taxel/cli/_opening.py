@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from taxel.recording.open_options import OpenOptions
-
-__all__ = ["FileOptions", "with_file_options"]
 
 
 @dataclass(frozen=True)
@@ -77,20 +72,4 @@ class FileOptions:
         """What opens files by these options."""
         from taxel.recording.open_options import OpenOptions  # noqa: PLC0415  the command line starts quickly
 
-        return OpenOptions(**{one.name: getattr(self, one.name) for one in fields(self)})
-
-
-def with_file_options(work: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of `FileOptions` in place of its argument `files`, which holds them."""
-    options = inspect.signature(FileOptions, eval_str=True).parameters
-    own = inspect.signature(work, eval_str=True).parameters.values()
-
-    def command(**typed: Any) -> None:
-        work(files=FileOptions(**{name: typed.pop(name) for name in options}), **typed)
-
-    functools.update_wrapper(command, work)
-    parameters = [one for each in own for one in (options.values() if each.name == "files" else [each])]
-    # The options have defaults, and may stand before arguments without one.
-    keywords = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in parameters]
-    command.__signature__ = inspect.Signature(keywords)  # type: ignore[attr-defined]
-    return command
+        return OpenOptions(**vars(self))

@@ -11,8 +11,6 @@ import typer
 from taxel.cli.console import Console
 from taxel.live import Panel
 
-__all__ = ["OpenOption", "PanelHostOption", "PanelPortOption", "announce"]
-
 PanelHostOption = Annotated[
     str,
     typer.Option(

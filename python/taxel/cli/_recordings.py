@@ -37,13 +37,22 @@ def tare_option(default: str = "") -> Any:
     return typer.Option(metavar="SECONDS|FILE", help=f"{about} {default}".rstrip())
 
 
+def pairs(option: str, texts: Iterable[str], form: str = "NAME=VALUE") -> Iterator[tuple[str, str]]:
+    """Yield names and values that an option gives as NAME=VALUE."""
+    for text in texts:
+        name, _, value = text.partition("=")
+        if not name or not value:
+            raise ProblemError(f"{option} {text}: must be {form}")
+        yield name, value
+
+
 def assignments(settings: list[str]) -> dict[str, Any]:
     """Return the values of ``--set KEY=VALUE``; a VALUE that is not TOML is text."""
     values = {}
-    for one in settings:
-        key, equals, value = one.partition("=")
+    for setting in settings:
+        key, equals, value = setting.partition("=")
         if not equals or not key.strip():
-            raise ProblemError(f"--set {short(one)}: must be KEY=VALUE")
+            raise ProblemError(f"--set {short(setting)}: must be KEY=VALUE")
         try:
             values[key.strip()] = of_toml(f"--set {short(key.strip())}", f"value = {value}")["value"]
         except NotTomlError:

@@ -6,8 +6,6 @@ import typer
 
 from taxel._base.messages import escaped
 
-__all__ = ["say"]
-
 
 def say(*lines: object, err: bool = False) -> None:
     """Print each text as one line: names in strangers' files may hold line breaks and escapes of a terminal.

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from taxel.formats.ros import Topic
 
-__all__ = ["listed"]
-
 
 def listed(file: Path, found: Sequence[Topic], as_json: bool) -> list[str]:
     """Return the topics of a ROS bag that hold numbers as lines for people, or as one of JSON."""

@@ -12,17 +12,14 @@ import taxel
 from taxel._base.files import beside, named, try_whole
 from taxel._core import ProblemError
 from taxel.cli._app import App
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import assignments, progress, say_warnings, tare_option
 from taxel.cli._say import say
-
-__all__ = ["app", "calibrate"]
 
 app = App()
 
 
 @app.command()
-@with_file_options
 def calibrate(
     recording: Annotated[
         Path, typer.Argument(help="A recording of the sensor, with the loads on it if there are any.")

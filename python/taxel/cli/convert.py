@@ -14,21 +14,18 @@ from taxel._base.files import try_whole
 from taxel._core import ProblemError
 from taxel.cli._app import App, with_out
 from taxel.cli._bar import bar
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import of_source, progress
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
 
-__all__ = ["app", "convert"]
-
 app = App()
 
 
 @app.command()
 @with_out("target")
-@with_file_options
 def convert(
     source: Annotated[Path, typer.Argument(help="A recording, a file of another maker, or a folder.")],
     target: Annotated[
@@ -79,10 +76,8 @@ def convert(
     if as_json:
         say(json.dumps({**written[0], "source": str(source)} if target.suffix else {"written": written}))
         return
-    for one in written:
-        say(f"written to {one['target']}")
-        for what in one["lost"]:
-            say(f"  lost: {what}")
+    for made in written:
+        say(f"written to {made['target']}", *(f"  lost: {what}" for what in made["lost"]))
 
 
 def _places(opened: list[Recording], folder: Path) -> list[Path]:

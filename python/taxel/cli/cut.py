@@ -14,21 +14,18 @@ from taxel import _core
 from taxel._base.messages import plain
 from taxel._core import ProblemError
 from taxel.cli._app import App, with_out
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import READ_HELP, of_source
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
 
-__all__ = ["app", "cut"]
-
 app = App()
 
 
 @app.command()
 @with_out("out")
-@with_file_options
 def cut(
     recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}.")],
     out: Annotated[
@@ -83,9 +80,7 @@ def cut(
         lost = taxel.convert(part, place, overwrite=overwrite)
         written.append({"file": str(place), "lost": lost})
         if not as_json:
-            say(f"written to {place}: {part!r}")
-            for what in lost:
-                say(f"  lost: {what}")
+            say(f"written to {place}: {part!r}", *(f"  lost: {what}" for what in lost))
     if as_json:
         say(json.dumps({"recording": str(recording), "written": written}))
 

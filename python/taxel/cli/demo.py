@@ -14,8 +14,6 @@ from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED
 
-__all__ = ["app", "demo"]
-
 app = App()
 
 

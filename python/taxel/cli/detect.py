@@ -14,7 +14,7 @@ import taxel
 from taxel._base.files import try_whole, write_whole
 from taxel._base.times import begun
 from taxel.cli._app import App
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import READ_HELP, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
 from taxel.detections import Detections
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from taxel.detect import Outcome
     from taxel.tasks import Detected
 
-__all__ = ["app", "detect"]
-
 app = App()
 
 #: Rows of the table that is printed; all go to --csv and --json.
@@ -35,7 +33,6 @@ _ROWS = 40
 
 
 @app.command()
-@with_file_options
 def detect(
     recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}, or a folder of them.")],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],

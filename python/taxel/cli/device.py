@@ -21,8 +21,6 @@ from taxel.device import Device, ports
 from taxel.wire import PRESETS, Registers, described
 from taxel.wire.registers import QUOTED_PRESETS
 
-__all__ = ["app", "apply", "listed", "record", "set_registers", "show", "watch"]
-
 app = App(no_args_is_help=True, help="Find a board on its serial line, set it by name, and read back its registers.")
 
 PlaceArgument = Annotated[str, typer.Argument(help="A serial device (/dev/ttyUSB0), or host:port.")]

@@ -6,7 +6,7 @@ import json
 import secrets
 import sys
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import count
@@ -21,8 +21,8 @@ from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
-from taxel.cli._app import App, with_typed
-from taxel.cli._recordings import progress
+from taxel.cli._app import App
+from taxel.cli._recordings import pairs, progress
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
@@ -34,8 +34,6 @@ from taxel.simulate.board import fitting
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.simulate.options import EmulateOptions
 from taxel.spikes import to_ms
-
-__all__ = ["app", "emulate"]
 
 app = App()
 
@@ -138,7 +136,6 @@ class _Played:
 
 
 @app.command()
-@with_typed(_Typed)
 def emulate(typed: _Typed) -> None:
     """Emulate a board that sends its events by UDP, in real time, until Ctrl-C.
 
@@ -312,15 +309,13 @@ def _print(report: EmulatorReport, in_time: bool) -> None:
         say(report.verdict)
 
 
-def _pairs(option: str, assignments: Iterable[str]) -> dict[str, str]:
-    """Return names and values of NAME=VALUE."""
-    pairs = {}
-    for one in assignments:
-        name, equals, value = one.partition("=")
-        if not equals or not value:
-            raise ProblemError(f"--{option} {one}: must be NAME=VALUE")
-        pairs[name] = value
-    return pairs
+def _pairs(option: str, assignments: Iterable[str], known: Collection[str]) -> dict[str, str]:
+    """Return names and values of NAME=VALUE; refuse a name that is not known."""
+    values = dict(pairs(f"--{option}", assignments))
+    for name in values:
+        if name not in known:
+            raise ProblemError(f"--{option} {name}: must be one of {', '.join(known)}")
+    return values
 
 
 def _number(option: str, name: str, value: str) -> float:
@@ -344,12 +339,10 @@ def _named(option: str) -> Iterator[None]:
 def _flaws(assignments: list[str], seed: int) -> Flaws | None:
     sizes: dict[str, Any] = {}
     seeds = {}
-    for name, value in _pairs("flaw", assignments).items():
-        if name not in Flaws._names():
-            raise ProblemError(f"--flaw {name}: must be one of {', '.join(Flaws._names())}")
-        size, _, own = value.partition(":")
+    for name, value in _pairs("flaw", assignments, Flaws._names()).items():
+        size, _, own_seed = value.partition(":")
         sizes[name] = _number("flaw", name, size)
-        seeds[name] = int(_number("flaw", name, own)) if own else seed
+        seeds[name] = int(_number("flaw", name, own_seed)) if own_seed else seed
     with _named("flaw"):
         return Flaws(**sizes, seeds=seeds) if sizes else None
 
@@ -359,19 +352,15 @@ def _circuit(assignments: list[str], seed: int) -> Circuit | None:
     converter: dict[str, Any] = {}
     parts = dict.fromkeys(("gain", "switch_ohm", "wire_ohm", "offset_mv"), readout)
     parts |= dict.fromkeys(("hysteresis_v", "settle_us", "amplifier_us"), converter)
-    for name, value in _pairs("circuit", assignments).items():
-        if name not in parts:
-            raise ProblemError(f"--circuit {name}: must be one of {', '.join(parts)}")
+    for name, value in _pairs("circuit", assignments, parts).items():
         parts[name][name] = _number("circuit", name, value)
     with _named("circuit"):
         return Circuit(readout=VirtualGround(**readout), converter=Converter(**converter)) if assignments else None
 
 
 def _faults(assignments: list[str], seed: int) -> Faults | None:
-    shares = {name: _number("fault", name, value) for name, value in _pairs("fault", assignments).items()}
-    for name in shares:
-        if name not in Faults._names():
-            raise ProblemError(f"--fault {name}: must be one of {', '.join(Faults._names())}")
+    values = _pairs("fault", assignments, Faults._names())
+    shares = {name: _number("fault", name, value) for name, value in values.items()}
     with _named("fault"):
         return Faults(**shares, seed=seed) if shares else None
 

@@ -12,18 +12,15 @@ import taxel
 from taxel._base.files import try_whole
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import App, with_out
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings, tare_option
 from taxel.cli._say import say
-
-__all__ = ["app", "encode"]
 
 app = App()
 
 
 @app.command()
 @with_out("out")
-@with_file_options
 def encode(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
     out: Annotated[Path, typer.Argument(help="The new file, a .npz that SpikeTrains.load reads.")],

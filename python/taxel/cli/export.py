@@ -14,8 +14,6 @@ from taxel._core import Error
 from taxel.cli._app import App, with_out
 from taxel.cli._say import say
 
-__all__ = ["app", "nir"]
-
 app = App(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
 
 
@@ -50,6 +48,4 @@ def nir(
     if as_json:
         say(json.dumps({"readout": str(readout), "written": str(out), "lost": lost}))
         return
-    say(f"written to {out}")
-    for what in lost:
-        say(f"  NIR cannot hold: {what}")
+    say(f"written to {out}", *(f"  NIR cannot hold: {what}" for what in lost))

@@ -20,7 +20,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import App
 from taxel.cli._bar import bar
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import progress, say_warnings, tare_option
 from taxel.cli._say import say
 from taxel.cli._topics import listed
@@ -33,15 +33,12 @@ if TYPE_CHECKING:
     from taxel.recording.pressure import Series
     from taxel.recording.rest import Rest
 
-__all__ = ["app", "info"]
-
 app = App()
 
 _PICTURES = (".png", ".svg", ".pdf")
 
 
 @app.command()
-@with_file_options
 def info(
     file: Annotated[
         Path,

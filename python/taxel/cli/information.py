@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
 import taxel
+from taxel._base.files import try_whole
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._bar import bar, duration
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, Point
 
-__all__ = ["app", "information"]
-
 app = App()
+
+_Number = TypeVar("_Number", int, float)
 
 
 @app.command()
-@with_file_options
 def information(
     recordings: Annotated[
         list[Path], typer.Argument(help="Recordings, or folders of them: .mcap, .lsa, .npz, .csv, other makers' files.")
@@ -73,16 +74,15 @@ def information(
     """
     if report.suffix != ".html":
         raise ProblemError(f"--report {report}: is one page, so its name must end in .html")
-    if report.exists() and not overwrite:
-        raise FileExistsError(17, "exists already; give --overwrite or another --report", str(report))
+    try_whole(report, overwrite=overwrite)
     options = taxel.tasks.InformationOptions(
         encoder,
         assignments(values or []),
         window_ms,
-        _numbers("--windows", windows_ms),
-        _numbers("--periods", periods_ms),
-        _whole("--taxels", taxels),
-        _whole("--pools", pools),
+        _listed("--windows", windows_ms, float_of, "numbers, as 1,2,5"),
+        _listed("--periods", periods_ms, float_of, "numbers, as 1,2,5"),
+        _listed("--taxels", taxels, int_of, "whole numbers, as 10,30"),
+        _listed("--pools", pools, int_of, "whole numbers, as 10,30"),
         draws,
         shuffles,
         folds,
@@ -119,9 +119,7 @@ def information(
     if as_json:
         say(json.dumps({**result.to_dict(), "report": str(report)}))
         return
-    for line in lines(result.answer):
-        say(line)
-    say(f"written to {report}")
+    say(*lines(result.answer), f"written to {report}")
 
 
 class _Known:
@@ -225,19 +223,9 @@ def _interval(estimate: Estimate) -> str:
     return f"{estimate.bits:.2f} of {estimate.most:.2f} bits [{low:.2f} {high:.2f}]"
 
 
-def _numbers(option: str, text: str | None) -> list[float] | None:
-    if text is None:
-        return None
+def _listed(option: str, text: str | None, of: Callable[[str], _Number], must: str) -> list[_Number] | None:
+    """Return numbers between commas; None without any."""
     try:
-        return [float_of(cell) for cell in text.split(",")]
+        return None if text is None else [of(cell) for cell in text.split(",")]
     except ValueError:
-        raise ProblemError(f"{option} {text}: must be numbers, as 1,2,5") from None
-
-
-def _whole(option: str, text: str | None) -> list[int] | None:
-    if text is None:
-        return None
-    try:
-        return [int_of(cell) for cell in text.split(",")]
-    except ValueError:
-        raise ProblemError(f"{option} {text}: must be whole numbers, as 10,30") from None
+        raise ProblemError(f"{option} {text}: must be {must}") from None

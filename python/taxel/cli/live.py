@@ -20,7 +20,7 @@ from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli._app import App, SecondsOption, with_typed
+from taxel.cli._app import App, SecondsOption
 from taxel.cli._board import (
     REDRAW_S,
     BitsOption,
@@ -37,18 +37,14 @@ from taxel.cli._board import (
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
 from taxel.cli._say import say
-from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout
 from taxel.detections import Detection
 from taxel.device import Cable
-from taxel.encode import Encoder
-from taxel.live import Live, Panel, Summary, Viewer, delays
+from taxel.live import Live, Panel, Summary, delays
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers
-
-__all__ = ["app", "live"]
 
 app = App()
 
@@ -60,7 +56,6 @@ _FIRST_WITHIN_S = 1.0
 class _Typed:
     """Hold the options of the command."""
 
-    options: dict[str, Any]
     rate_hz: RateOption = None
     bits: BitsOption = None
     congestion: CongestionOption = None
@@ -86,33 +81,27 @@ class _Typed:
         Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: this folder.")
     ] = None
     opens: OpenOption = False
-    to: ToOption = None
-    encoder: SpikesOption = None
-    values: SpikesSetOption = None
 
 
 @app.command()
 @with_live_options("live")
-@with_typed(_Typed)
-def live(typed: _Typed) -> None:
-    """Receive a board's events and print what a readout detects, live; with --panel or --to, show them.
+def live(options: dict[str, Any], typed: _Typed) -> None:
+    """Receive a board's events and print what a readout detects, live; with --panel, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
     JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
     reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
-    which are counted. --panel shows the board in a browser, --to in Rerun or Foxglove; a slow viewer loses pictures,
-    never data. Exit code 3: nothing was received, or something was lost after it had arrived; 2: the board has more
-    taxels than the array.
+    which are counted. --panel shows the board in a browser; a slow viewer loses pictures, never data. Exit code 3:
+    nothing was received, or something was lost after it had arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
     Example: taxel live --panel --control 127.0.0.1:5209
-    Example: taxel live --to rerun --to foxglove --encoder fa1
     Example: taxel live --from zenoh:192.168.1.5:7447/left --panel
     """
-    spikes = spikes_of(typed.to, typed.encoder, typed.values)
-    _together(typed)
-    options = for_live(typed.options, typed.rate_hz, typed.bits)
+    _together(options, typed)
+    given_tare = options["tare"]
+    options = for_live(options, typed.rate_hz, typed.bits)
     trained, rest, record, address, lines = (options[name] for name in ("readout", "tare", "record", "remote", "lines"))
     _fresh(typed, rest)
     if typed.report is not None:
@@ -134,9 +123,7 @@ def live(typed: _Typed) -> None:
                 soft_wrap=True,
             )
         with Live(**options | {"remote": board}) as pipeline:
-            if spikes is not None and isinstance(rest, Tare):
-                spikes = spikes.with_tare(rest)
-            last, external = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
+            last = _shown(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
             _drain(last, console, say)
@@ -148,7 +135,6 @@ def live(typed: _Typed) -> None:
         _report(typed.report, trained, summary.path, tare if tare is not None else rest)
         console.print(f"report: {typed.report / 'report.html'}", soft_wrap=True)
     _unsent(summary)
-    report_viewers(external, quiet=lines)
     if not lines:
         _print_summary(summary, options["guard_frames"])
     elif summary.verdict.status in ("damaged", "lost", "nothing arrived"):
@@ -156,7 +142,7 @@ def live(typed: _Typed) -> None:
     if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
-            f"--tare {typed.options['tare']}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
+            f"--tare {given_tare}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
         )
     raise typer.Exit(exit_code(summary, pipeline.array))
 
@@ -164,15 +150,13 @@ def live(typed: _Typed) -> None:
 def _shown(
     typed: _Typed,
     pipeline: Live,
-    spikes: Encoder | None,
     console: Console,
     at_rest: contextlib.ExitStack,
     *,
     fresh: bool,
-) -> tuple[Live, list[Viewer]]:
-    """Show the board in terminal, panel and viewers until the end; return the last receiver, and the viewers."""
+) -> Live:
+    """Show the board in terminal and panel until the end; return the last receiver."""
     shows: Panel | None = None
-    external: list[Viewer] = []
     # A serial line has one user at a time: first the tare, then the panel.
     later = typed.control if fresh and typed.panel else None
     # A reader of the lines that ends (BrokenPipeError) ends the command as Ctrl-C does.
@@ -184,9 +168,8 @@ def _shown(
             )
             # Standard output has the lines of --json; whoever reads them needs the address too.
             announce(shows, typed.opens, Console(stderr=True))
-        external = viewers(shown, pipeline if shows is None else shows, typed.to or (), spikes)
-        _watch(pipeline, shows, external, typed.seconds, console, at_rest, fresh=fresh, control=later)
-    return pipeline if shows is None or shows.live is None else shows.live, external
+        _watch(pipeline, shows, typed.seconds, console, at_rest, fresh=fresh, control=later)
+    return pipeline if shows is None or shows.live is None else shows.live
 
 
 def _report(folder: Path, readout: Readout | PlainRule, path: Path, tare: Tare | float | None) -> None:
@@ -229,11 +212,11 @@ def _unsent(summary: Summary) -> None:
             say(f"taxel: lines not sent to {one['to']}: {one['lost']} of {one['sent'] + one['lost']}: {why}", err=True)
 
 
-def _together(typed: _Typed) -> None:
+def _together(options: dict[str, Any], typed: _Typed) -> None:
     """Refuse options that would have no effect."""
-    readout, tare, send = (typed.options[name] for name in ("readout", "tare", "send"))
-    if readout is None and not typed.panel and not typed.to:
-        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel or --to VIEWER to show the board")
+    readout, tare, send = (options[name] for name in ("readout", "tare", "send"))
+    if readout is None and not typed.panel:
+        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
     if readout is None and (tare or typed.report or send):
         raise ProblemError("--tare, --report and --send belong to a readout: give --readout FILE")
     if typed.folder is not None and not typed.panel:
@@ -266,7 +249,6 @@ def _warn_of_unknown(tare: Tare) -> None:
 def _watch(
     pipeline: Live,
     panel: Panel | None,
-    external: list[Viewer],
     seconds: float | None,
     console: Console,
     at_rest: contextlib.ExitStack,
@@ -318,8 +300,7 @@ def _watch(
                 say(f"taxel: {wrong}", err=True)
                 warned = True
             if now["seconds"] - before["seconds"] >= REDRAW_S:
-                lines = [Text(state_of(viewer)) for viewer in external]
-                display.update(Group(counters_table(before, now), _state(now, pipeline.place), *lines))
+                display.update(Group(counters_table(before, now), _state(now, pipeline.place)))
                 before = now
 
 

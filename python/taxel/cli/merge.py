@@ -10,17 +10,14 @@ import typer
 
 import taxel
 from taxel.cli._app import App
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import READ_HELP
 from taxel.cli._say import say
-
-__all__ = ["app", "merge"]
 
 app = App()
 
 
 @app.command()
-@with_file_options
 def merge(
     recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The new file; its extension gives the format.")],
@@ -51,6 +48,4 @@ def merge(
     if as_json:
         say(json.dumps({"recordings": [str(path) for path in recordings], "file": str(out), "lost": lost}))
         return
-    say(f"written to {out}: {merged!r}")
-    for what in lost:
-        say(f"  lost: {what}")
+    say(f"written to {out}: {merged!r}", *(f"  lost: {what}" for what in lost))

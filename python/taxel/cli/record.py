@@ -6,7 +6,7 @@ import errno
 import json
 import time
 from contextlib import nullcontext, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,16 +30,38 @@ from taxel.cli._board import (
     with_live_options,
 )
 from taxel.cli._noting import noting
+from taxel.cli._recordings import pairs
 from taxel.cli._say import say
 from taxel.cli.console import Console
 from taxel.live import Live, Summary
-
-__all__ = ["app", "record"]
 
 app = App()
 
 #: With --trials: the number of empty trials in a row that ends the command.
 _EMPTY = 3
+
+
+@dataclass(frozen=True)
+class _Typed:
+    """Hold for how long, how often and until which mark is recorded."""
+
+    rate_hz: RateOption = None
+    bits: BitsOption = None
+    seconds: SecondsOption = None
+    markers: Annotated[bool, typer.Option("--markers", help="End at the board's stop marker.")] = False
+    length: Annotated[
+        float | None, typer.Option(min=0.001, help="Automatic mode: record trials of this length, s.")
+    ] = None
+    countdown: Annotated[int, typer.Option(min=0, help="Automatic mode: countdown before each trial, s.")] = 3
+    start_index: Annotated[
+        int, typer.Option(min=0, help="Automatic mode: the number of the first trial, appended to its name.")
+    ] = 1
+    trials: Annotated[
+        int | None, typer.Option(min=1, help="Automatic mode: number of trials. Default: until Ctrl-C.")
+    ] = None
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one line of JSON for each recording, and nothing else.")
+    ] = False
 
 
 @app.command()
@@ -48,23 +70,7 @@ _EMPTY = 3
 def record(
     file: Annotated[Path, typer.Argument(help="A new file: .mcap (with times, registers, notes) or .lsa (raw bytes).")],
     options: dict[str, Any],
-    rate_hz: RateOption = None,
-    bits: BitsOption = None,
-    seconds: SecondsOption = None,
-    markers: Annotated[bool, typer.Option("--markers", help="End at the board's stop marker.")] = False,
-    length: Annotated[
-        float | None, typer.Option(min=0.001, help="Automatic mode: record trials of this length, s.")
-    ] = None,
-    countdown: Annotated[int, typer.Option(min=0, help="Automatic mode: countdown before each trial, s.")] = 3,
-    start_index: Annotated[
-        int, typer.Option(min=0, help="Automatic mode: the number of the first trial, appended to its name.")
-    ] = 1,
-    trials: Annotated[
-        int | None, typer.Option(min=1, help="Automatic mode: number of trials. Default: until Ctrl-C.")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one line of JSON for each recording, and nothing else.")
-    ] = False,
+    typed: _Typed,
 ) -> None:
     """Record what a board sends by UDP, and report what was lost.
 
@@ -82,39 +88,29 @@ def record(
     Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
     Example: taxel record --from zenoh:192.168.1.5:7447/left walk.mcap
     """
-    if length is None and trials is not None:
+    if typed.length is None and typed.trials is not None:
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
-    if length is not None and seconds is not None:
+    if typed.length is not None and typed.seconds is not None:
         raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
-    live = for_live(options, rate_hz, bits) | {"sources": _sources(options["sources"] or [])}
-    console = Console(stderr=True, quiet=as_json)
-    if length is None:
-        summary, code = _one(file, live, seconds, markers, console)
-        _print(summary, as_json)
+    live = for_live(options, typed.rate_hz, typed.bits) | {"sources": _sources(options["sources"] or [])}
+    console = Console(stderr=True, quiet=typed.as_json)
+    if typed.length is None:
+        summary, code = _one(file, live, typed, console)
+        _print(summary, typed.as_json)
     else:
-        code = _automatic(file, live, length, countdown, start_index, trials, markers, console, as_json)
+        code = _automatic(file, live, typed, console)
     if code:
         raise typer.Exit(code)
 
 
-def _automatic(
-    file: Path,
-    live: dict[str, Any],
-    length: float,
-    countdown: int,
-    index: int,
-    trials: int | None,
-    markers: bool,
-    console: Console,
-    as_json: bool,
-) -> int:
+def _automatic(file: Path, live: dict[str, Any], typed: _Typed, console: Console) -> int:
     """Record trials from one receiver until Ctrl-C, which ends the current one regularly; return an exit code."""
-    how = {name: live.pop(name) for name in ("compression", "overwrite")}
+    trials, how = typed.trials, {name: live.pop(name) for name in ("compression", "overwrite")}
     codes: list[int] = []
     empty = 0
 
     def following(saved: int) -> Path:
-        name = Path(_core.numbered_path(file, index + saved))
+        name = Path(_core.numbered_path(file, typed.start_index + saved))
         if name.exists() and not how["overwrite"]:
             raise FileExistsError(errno.EEXIST, "exists already", str(name))
         return name
@@ -123,7 +119,7 @@ def _automatic(
         """Print how a trial ended; the next trial gets the number of an empty one."""
         nonlocal empty
         if ended is not None and ended.path is not None:
-            _print(ended, as_json)
+            _print(ended, typed.as_json)
             codes.append(exit_code(ended, receiver.array))
             empty = 0
         else:
@@ -140,10 +136,10 @@ def _automatic(
             try:
                 while trials is None or (len(codes) < trials and empty < _EMPTY):
                     if not receiver.records:
-                        _count_down(name, countdown, console)
+                        _count_down(name, typed.countdown, console)
                         receiver.record(name, **how)
-                    _watch(receiver, name, length, markers, console, keys, trial=True)
-                    if countdown or len(codes) + 1 == trials or not receiver.records:
+                    _watch(receiver, name, typed.length, typed.markers, console, keys, trial=True)
+                    if typed.countdown or len(codes) + 1 == trials or not receiver.records:
                         report(receiver.end_recording())
                         name = following(len(codes)) if trials is None or len(codes) < trials else name
                     elif receiver.record_again():
@@ -174,9 +170,7 @@ def _count_down(name: Path, seconds: int, console: Console) -> None:
     console.bell()
 
 
-def _one(
-    file: Path, options: dict[str, Any], seconds: float | None, markers: bool, console: Console
-) -> tuple[Summary, int]:
+def _one(file: Path, options: dict[str, Any], typed: _Typed, console: Console) -> tuple[Summary, int]:
     """Record one file until its time is over, the board marks a stop, or Ctrl-C; return summary and exit code."""
     with (
         remote(options["remote"], None, lossless=True) as board,
@@ -184,7 +178,7 @@ def _one(
     ):
         notes = noting(live.note, console.print) if _takes_notes(file, options["sources"]) else nullcontext("")
         with suppress(KeyboardInterrupt), notes as keys:
-            _watch(live, file, seconds, markers, console, keys, trial=False)
+            _watch(live, file, typed.seconds, typed.markers, console, keys, trial=False)
         summary = live.stop()
         return summary, exit_code(summary, live.array)
 
@@ -227,12 +221,9 @@ def _watch(
 def _sources(texts: list[str]) -> dict[str, str]:
     """Return the sources that ``--source NAME=WHAT`` describes, by name."""
     sources: dict[str, str] = {}
-    for one in texts:
-        name, equals, what = one.partition("=")
-        if not equals or not name or not what:
-            raise ProblemError(f"--source {one}: must be NAME=WHAT, as imu=serial:/dev/ttyACM0")
+    for name, what in pairs("--source", texts, "NAME=WHAT, as imu=serial:/dev/ttyACM0"):
         if name in sources:
-            raise ProblemError(f"--source {one}: there are two sources of that name")
+            raise ProblemError(f"--source {name}={what}: there are two sources of that name")
         sources[name] = what
     return sources
 

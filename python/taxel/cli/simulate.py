@@ -18,8 +18,6 @@ from taxel.cli._recordings import progress
 from taxel.cli._say import say
 from taxel.cli.console import Console
 
-__all__ = ["app", "simulate"]
-
 app = App()
 
 

@@ -16,7 +16,7 @@ from taxel._base.files import try_whole
 from taxel._base.messages import collected
 from taxel._core import ProblemError
 from taxel.cli._app import App
-from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import READ_HELP, SET_HELP, assignments, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
 
@@ -25,13 +25,10 @@ if TYPE_CHECKING:
     from taxel.recording import Recording
     from taxel.tasks import Training
 
-__all__ = ["app", "train"]
-
 app = App()
 
 
 @app.command()
-@with_file_options
 def train(
     recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
     files: FileOptions,

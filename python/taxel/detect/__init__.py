@@ -1,40 +1,28 @@
 """Spikes to detections, live and from recordings, and their score."""
 
-from taxel.detect.alignment import Alignment
-from taxel.detect.detector import ReadoutStream
-from taxel.detect.examples import Example, Outcome
-from taxel.detect.folds import Fold, Judged, Part, choose, judge
-from taxel.detect.plain_rule import PlainRule
-from taxel.detect.plain_score import PlainScore
-from taxel.detect.readout import Learner, Readout, load, run
-from taxel.detect.recipe import Recipe
-from taxel.detect.scoring import Score, Spread, score
-from taxel.detect.trained import TrainedNeuron
-from taxel.detect.training import Trained, fit
-from taxel.detect.tuning import tune
+from taxel.detect.alignment import Alignment as Alignment
+from taxel.detect.detector import ReadoutStream as ReadoutStream
+from taxel.detect.examples import Example as Example
+from taxel.detect.examples import Outcome as Outcome
+from taxel.detect.folds import Fold as Fold
+from taxel.detect.folds import Judged as Judged
+from taxel.detect.folds import Part as Part
+from taxel.detect.folds import choose as choose
+from taxel.detect.folds import judge as judge
+from taxel.detect.plain_rule import PlainRule as PlainRule
+from taxel.detect.plain_score import PlainScore as PlainScore
+from taxel.detect.readout import Learner as Learner
+from taxel.detect.readout import Readout as Readout
+from taxel.detect.readout import load as load
+from taxel.detect.readout import run as run
+from taxel.detect.recipe import Recipe as Recipe
+from taxel.detect.scoring import Score as Score
+from taxel.detect.scoring import Spread as Spread
+from taxel.detect.scoring import score as score
+from taxel.detect.trained import TrainedNeuron as TrainedNeuron
+from taxel.detect.training import Trained as Trained
+from taxel.detect.training import fit as fit
+from taxel.detect.tuning import tune as tune
 
-__all__ = [
-    "Alignment",
-    "Example",
-    "Fold",
-    "Judged",
-    "Learner",
-    "Outcome",
-    "Part",
-    "PlainRule",
-    "PlainScore",
-    "Readout",
-    "ReadoutStream",
-    "Recipe",
-    "Score",
-    "Spread",
-    "Trained",
-    "TrainedNeuron",
-    "choose",
-    "fit",
-    "judge",
-    "load",
-    "run",
-    "score",
-    "tune",
-]
+# The imports above say what is public.
+__all__ = [name for name, held in sorted(globals().items()) if callable(held)]

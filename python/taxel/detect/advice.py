@@ -26,8 +26,6 @@ from taxel.recording.rest import of_frames
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 
-__all__ = ["Advice", "advised", "drifted", "fallen", "loaded_at_rest"]
-
 #: From which share of the events on missed or false ones are many.
 _MANY = 0.05
 #: So long before a label the sensor is looked at, us: as long as a tare ends before the first label.

@@ -19,8 +19,6 @@ from taxel.encode import Composite, Encoder
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
-__all__ = ["ACTS_AFTER_MS", "Ages", "ages_of", "in_frames", "later_us", "onsets", "silent_windows"]
-
 #: So long after a spike a neuron is trained to fire whose potential jumps by it, ms.
 ACTS_AFTER_MS = to_ms(1.0)
 #: Times that are nearer are the same, ms: stamps are whole us, and since 1970 resolved to a quarter of one.

@@ -13,12 +13,10 @@ from taxel._base.arguments import whole
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
 from taxel.detect.ages import Ages, onsets
-from taxel.detect.followed import Followed
-from taxel.detect.scoring import APART_US, Score, score
+from taxel.detect.followed import off_ms, one_after_another
+from taxel.detect.scoring import Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_us
-
-__all__ = ["WINDOW_MS", "Alignment", "align", "aligned_to"]
 
 #: How far from its label an input spike may lie, either way, ms.
 WINDOW_MS = 50.0
@@ -136,10 +134,7 @@ def align(
     for k, pattern in enumerate(patterns):
         if len(pattern) != len(patterns[0]):
             raise ProblemError(f"example {k} has {counted(len(pattern), 'train')}, example 0 has {len(patterns[0])}")
-    example = np.repeat(np.arange(len(given)), [len(times) for times in given])
-    # One after the other, so far apart that nothing of one pairs with another, wherever the clock of each began.
-    shift = [k * APART_US - round(to_us(pattern.start)) for k, pattern in enumerate(patterns)]
-    truth = np.concatenate([t + by for t, by in zip(given, shift, strict=True)])
+    truth = one_after_another(given, patterns)
     counts = np.sum([pattern.counts for pattern in patterns], axis=0)
     if ages is not None:
         counts[list(ages.trains)] = 0
@@ -151,45 +146,38 @@ def align(
         candidates[ages.trains[0]] = [onsets(pattern, ages) for pattern in patterns]
     scores = {}
     for train, spikes in candidates.items():
-        each = [np.rint(to_us(ms - latency_ms)).astype(np.int64) + by for ms, by in zip(spikes, shift, strict=True)]
-        fired = np.concatenate(each)
+        fired = one_after_another([np.rint(to_us(ms - latency_ms)).astype(np.int64) for ms in spikes], patterns)
         scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, WINDOW_MS)
     best = _best(scores, len(truth))
-    moved = np.zeros(len(truth)) if best is None else np.full(len(truth), np.nan)
-    if best is not None:
-        moved[scores[best].pairs[:, 1]] = scores[best].errors_ms
-    return Alignment(label, best, example, np.concatenate([*given]), moved)
+    return aligned(label, given, None if best is None else (best, scores[best]))
 
 
-def aligned_to(followed: Followed | None, label: str, given: Sequence[NDArray[np.int64]]) -> Alignment:
-    """Return by how much labels move to the onsets of the quantity that follows them; none where there is none.
+def aligned(label: str, given: Sequence[NDArray[np.int64]], by: tuple[int, Score] | None) -> Alignment:
+    """Return by how much labels move to what a train tells of them; none where there is no such train.
 
     Parameters
     ----------
-    followed : Followed, optional
-        Of the patterns that the labels belong to.
     label : str
     given : sequence of int64, shape (events,), us
-        The labels of each pattern, ascending.
+        The labels of each pattern, ascending; one or more in all.
+    by : (int, Score), optional
+        A train, and the score of its detections against all labels, one pattern after the other.
     """
     example = np.repeat(np.arange(len(given)), [len(times) for times in given])
-    moved = np.zeros(len(example)) if followed is None else np.full(len(example), np.nan)
-    if followed is not None:
-        moved[followed.score.pairs[:, 1]] = followed.score.errors_ms
-    return Alignment(label, None if followed is None else followed.train, example, np.concatenate([*given]), moved)
+    if by is None:
+        return Alignment(label, None, example, np.concatenate([*given]), np.zeros(len(example)))
+    (train, found), moved = by, np.full(len(example), np.nan)
+    moved[found.pairs[:, 1]] = found.errors_ms
+    return Alignment(label, train, example, np.concatenate([*given]), moved)
 
 
 def _best(scores: Mapping[int, Score], labels: int) -> int | None:
     """Return the train that tells best when the events were felt; None where that one has no spike near any label."""
-
-    def off(score: Score) -> float:
-        return float(np.median(np.abs(score.errors_ms))) if score.found else np.inf
-
     left = dict(scores)
     criteria: list[tuple[Callable[[Score], float], float]] = [
         (lambda score: score.missed + score.false, max(_ALIKE, _ALIKE_SHARE * labels)),
         (lambda score: -score.found, 0),
-        (off, _ALIKE_MS),
+        (off_ms, _ALIKE_MS),
     ]
     for worth, more in criteria:
         least = min(map(worth, left.values()), default=0.0) + more

@@ -21,8 +21,6 @@ from taxel.recording.rest import FORCE_UNITS
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["ReadoutStream", "detector", "tare_text"]
-
 
 class _Detector(Saved):
     """What a readout and a plain rule have in common: a file, and a stream."""
@@ -231,11 +229,6 @@ class ReadoutStream:
         """
         t = whole("t_us", t_us, -(2**52), 2**52)
         return Detections([], [], []) if self._core is None else Detections._from_parts(self._core.advance(t))
-
-    @property
-    def now_us(self) -> int | None:
-        """The time up to which all detections have been returned, us; None before any input."""
-        return None if self._core is None else self._core.now
 
     @property
     def late(self) -> int:

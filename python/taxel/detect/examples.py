@@ -25,8 +25,6 @@ from taxel.recorded import unit_of as recorded_unit
 from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
 
-__all__ = ["Example", "Outcome", "array_of", "called", "checked", "unit_of"]
-
 
 class Example(NamedTuple):
     """A labelled recording, or a labelled part of one.

@@ -36,8 +36,6 @@ from taxel.neuron import Neuron
 if TYPE_CHECKING:
     from nir import NIRGraph
 
-__all__ = ["Parts", "lost", "read_nir", "write_nir"]
-
 #: Where in the graph's metadata the readout itself lies, and the length of a spike in s (0: a Dirac pulse).
 READOUT, SPIKE = "taxel_readout", "taxel_spike_s"
 

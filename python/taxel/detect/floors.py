@@ -11,8 +11,6 @@ from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.rest import SHARE, TIMES_NOISE
 
-__all__ = ["measured_floor"]
-
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
 

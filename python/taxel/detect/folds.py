@@ -174,7 +174,7 @@ def judge(
             inner = fold.inner or INNER
             chosen = _chosen(examples, patterns.patterns, patterns.plan, inner, fold.train, window, clocks, report)
             plan = replace(recipe, neurons=chosen.neurons)
-        with _quiet():
+        with collected():  # a readout that is only scored: the score shows what it misses
             parts_of = partial(_parts_of, fold.train)
             made = learn(patterns.part(parts_of), plan, array, report)
         of_fold = replace(whole, neurons=plan.neurons)._at(made.recipe.neurons)
@@ -330,7 +330,7 @@ def _marks(
                         raise
                     refused.add(m)
                     continue
-            with _quiet():
+            with collected():  # a readout that is only scored: the score shows what it misses
                 readout = readout_of({label: rows.fit(plan)}, {label: rows.delay_ms}, plan, array)
             for part in fold.test:
                 found = _detected(readout, _read(examples, patterns, readout, part), part, clocks)
@@ -355,11 +355,6 @@ def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Rea
     steps = [trains.start / neuron.neuron.step_ms for neuron in neurons]
     on_grid = all(abs(step - round(step)) < 1e-9 for step in steps)
     return patterns if on_grid and all(len(neuron.weights) == len(trains) for neuron in neurons) else examples
-
-
-def _quiet() -> Any:
-    """Return a context without warnings of readouts that are only scored: their scores show what they miss."""
-    return collected()
 
 
 def _detected(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:

@@ -12,8 +12,6 @@ from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_us
 
-__all__ = ["FOLLOWED_MS", "Followed", "distinct", "follow", "only", "silence"]
-
 #: How far from its label an onset may lie, either way, ms.
 FOLLOWED_MS = 50.0
 #: Thresholds of a quantity: numbers of taxels, or units of noise.
@@ -72,24 +70,29 @@ def follow(
     quantities : sequence of int
         The trains that are compared.
     """
-    truth = np.concatenate([_shifted(t, k, of) for k, (t, of) in enumerate(zip(given, patterns, strict=True))])
+    truth = one_after_another(given, patterns)
     best: dict[int, tuple[tuple[int, float], Followed]] = {}
     for train, edges in _every(patterns, quantities):
         if sum(len(edge.onsets) for edge in edges) > _MOST_A_LABEL * len(truth):
             continue
         each = [np.rint(to_us(edge.onsets - latency_ms)).astype(np.int64) for edge in edges]
-        fired = np.concatenate([_shifted(t, k, of) for k, (t, of) in enumerate(zip(each, patterns, strict=True))])
+        fired = one_after_another(each, patterns)
         scored = score(Detections([label] * len(fired), fired, fired), {label: truth}, FOLLOWED_MS)
-        off = float(np.median(np.abs(scored.errors_ms))) if scored.found else np.inf
-        rank = scored.missed + scored.false, off
+        rank = scored.missed + scored.false, off_ms(scored)
         if scored.found and (train not in best or rank < best[train][0]):
             best[train] = rank, Followed(train, edges, scored)
     return [follower for _, follower in sorted(best.values(), key=lambda ranked: ranked[0])]
 
 
-def _shifted(t: NDArray[np.int64], k: int, pattern: SpikeTrains) -> NDArray[np.int64]:
-    """Return times of pattern k so far from those of others that nothing of one pairs with another."""
-    return t + (k * APART_US - round(float(to_us(pattern.start))))
+def one_after_another(times: Sequence[NDArray[np.int64]], patterns: Sequence[SpikeTrains]) -> NDArray[np.int64]:
+    """Return the times of all patterns, us, so far apart that nothing of one pairs with another."""
+    starts = [round(float(to_us(pattern.start))) for pattern in patterns]
+    return np.concatenate([t + (k * APART_US - start) for k, (t, start) in enumerate(zip(times, starts, strict=True))])
+
+
+def off_ms(scored: Score) -> float:
+    """Return the median distance of detections from their labels, ms; infinite without any."""
+    return float(np.median(np.abs(scored.errors_ms))) if scored.found else np.inf
 
 
 def _every(patterns: Sequence[SpikeTrains], quantities: Sequence[int]) -> Iterator[tuple[int, tuple[_Edges, ...]]]:

@@ -17,8 +17,6 @@ from taxel.detect.loads import Loads, clock_of, lacks_neighbours
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
-__all__ = ["TOUCH", "Off", "held_by_tare", "off_by", "unlabelled"]
-
 #: So many loaded taxels are a touch, the smallest that there is.
 TOUCH = 2.0
 #: Distances between labels and touches are looked at up to this, ms, and are the same that differ by this.

@@ -18,8 +18,6 @@ from taxel.recording import Recording
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.wire import FRAME_US
 
-__all__ = ["Clock", "FoundTimes", "Loads", "Stretch", "clock_of", "frame_ms"]
-
 #: How long a frame lasts (us; None: as the source says), and the wire's version.
 Clock: TypeAlias = tuple[float | None, int]
 #: An example, by its place, and from when to when, us; as `taxel.detect.Part`.

@@ -13,8 +13,6 @@ from taxel.array import Array
 from taxel.detect.detector import _Detector
 from taxel.tare import Tare
 
-__all__ = ["PlainRule"]
-
 #: The labels of onset and end where none are given.
 _USUAL = ("contact", "lift")
 

@@ -22,8 +22,6 @@ from taxel.detections import Detections
 from taxel.encode import Encoder
 from taxel.spikes import SpikeTrains
 
-__all__ = ["PlainScore", "floor_of", "plain_score"]
-
 #: The noise floor of rules where the encoder has none: that of the board's fast presets.
 _FLOOR = 3.0
 

@@ -35,8 +35,6 @@ from taxel.wire import FRAME_US
 #: Detection goes on for so long after the last event, ms.
 SILENCE_MS = 1000.0
 
-__all__ = ["Learner", "Readout", "load", "run", "run_counting"]
-
 
 class Learner(Protocol):
     """What a readout needs of a fitted learner."""

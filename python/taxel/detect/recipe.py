@@ -226,10 +226,6 @@ class Recipe:
         listed = several(f"neurons.{label}.{key}", whole.get(key, ()))
         return [plain, *({**plain, **mapping(f"neurons.{label}.{key}", point)} for point in listed)]
 
-    def _with_point(self, label: str, point: Mapping[str, Any]) -> Recipe:
-        """Return the recipe for one label, with these parameters and without others to try."""
-        return replace(self, neurons={label: point})
-
     def _at(self, points: Mapping[str, Mapping[str, Any]]) -> Recipe:
         """Return the recipe with these parameters of its neurons, and with the points that it lists.
 

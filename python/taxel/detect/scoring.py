@@ -19,8 +19,6 @@ from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.spikes import to_us
 
-__all__ = ["Score", "Spread", "score", "score_together"]
-
 #: So far apart, us, no detection of one recording pairs with an event of another when all are scored together.
 APART_US = 10**12
 
@@ -135,11 +133,6 @@ class Score:
         return self.missed + self.false, float(np.sqrt(np.mean(self.errors_ms**2))) if self.found else np.inf
 
     @property
-    def found_share(self) -> float:
-        """Found events as a share of all; NaN where there are none."""
-        return self.found / self.events if self.events else float("nan")
-
-    @property
     def error(self) -> Spread:
         """Spread of `t` minus reference, ms."""
         return Spread.of(self.errors_ms)
@@ -229,24 +222,14 @@ def score(
     tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
     scores = {}
     for tally in tallies:
-        pairs, missed, false = (
-            np.column_stack([tally.detected, tally.events]),
-            tally.missed_events,
-            tally.false_detections,
-        )
-        scores[tally.label] = Score(
-            tally.label, pairs, missed, false, tally.false_near, tally.errors_ms, tally.delays_ms
-        )
-    return Score(
-        "all" if len(scores) != 1 else next(iter(scores)),
-        np.concatenate([score.pairs for score in scores.values()] or [np.empty((0, 2), np.int64)]),
-        np.concatenate([score.missed_events for score in scores.values()] or [np.empty(0, np.int64)]),
-        np.concatenate([score.false_detections for score in scores.values()] or [np.empty(0, np.int64)]),
-        sum(score.false_near for score in scores.values()),
-        np.concatenate([score.errors_ms for score in scores.values()] or [np.empty(0)]),
-        np.concatenate([score.delays_ms for score in scores.values()] or [np.empty(0)]),
-        scores,
-    )
+        pairs, of = np.column_stack([tally.detected, tally.events]), (tally.missed_events, tally.false_detections)
+        scores[tally.label] = Score(tally.label, pairs, *of, tally.false_near, tally.errors_ms, tally.delays_ms)
+    whole, ms = np.empty(0, np.int64), np.empty(0)
+    every = [Score("all", np.empty((0, 2), np.int64), whole, whole, 0, ms, ms), *scores.values()]
+    names = ("pairs", "missed_events", "false_detections", "errors_ms", "delays_ms")
+    together: dict[str, Any] = {name: np.concatenate([getattr(score, name) for score in every]) for name in names}
+    near = sum(score.false_near for score in every)
+    return Score(every[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
 
 
 def score_together(

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from taxel.spikes import SpikeTrains
 
-__all__ = ["seen"]
-
 
 def seen(patterns: Sequence[SpikeTrains], memory_ms: float, *, graded: bool) -> dict[str, Any]:
     """Return the least and the largest that each input has, as a readout's file holds them.

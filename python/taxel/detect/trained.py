@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from taxel.neuron import Neuron
 
-__all__ = ["TrainedNeuron"]
-
 
 class TrainedNeuron(NamedTuple):
     """A trained neuron: what it is, and the weights with which it fires at a label's events.

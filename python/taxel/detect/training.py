@@ -20,7 +20,7 @@ from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_frames, later_us, silent_windows
-from taxel.detect.alignment import Alignment, align, aligned_to
+from taxel.detect.alignment import Alignment, align, aligned
 from taxel.detect.examples import Example, array_of, called, checked, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.loads import clock_of
@@ -33,9 +33,6 @@ from taxel.encode import Composite, LocalLoad
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
-
-__all__ = ["Trained", "fit"]
-
 
 #: Parameters of a learner that its rows do not depend on. Bounds could be among them, but that those of a train without
 #: a spike must contain 0.
@@ -249,8 +246,12 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
     known: Known = {}
 
     def fitted(point: Mapping[str, Any], place: int) -> _Fit:
-        plan, patterns = examples.receiving(recipe._with_point(label, point))
-        return _fitted(patterns, plan, label, array, report, point, place, known, count=len(points) > 1)
+        plan, patterns = examples.receiving(replace(recipe, neurons={label: point}))
+        with collected() as caught:
+            fitting = Fitting(patterns, plan, label, array, report, place, known)
+            learner = fitting.fit(plan)
+        wrong = fitting.wrong(learner, plan.run_threshold) if len(points) > 1 else 0
+        return _Fit(wrong, fitting, learner, point, caught)
 
     count = sum(len(pattern.labels.get(label, ())) for pattern in examples.patterns)
     best, refused = None, None
@@ -267,7 +268,7 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
         if wrong < fewer:
             continue
         others = []
-        followed = recipe._received(recipe._with_point(label, point)._of(label))._quantities()
+        followed = recipe._received({**recipe.learner, **point})._quantities()
         for place in range(_FOLLOWED if followed else 1):
             with contextlib.suppress(ProblemError):
                 others.append(fitted(point, place))
@@ -280,25 +281,6 @@ def _best(examples: Encoded, recipe: Recipe, label: str, array: Array | None, re
     for caught in best.caught:
         warn(caught, stacklevel=5)
     return best
-
-
-def _fitted(
-    patterns: Sequence[Example],
-    plan: Recipe,
-    label: str,
-    array: Array | None,
-    report: Progress,
-    point: Mapping[str, Any],
-    place: int,
-    known: Known,
-    *,
-    count: bool,
-) -> _Fit:
-    """Fit the point that a recipe has of a label's neuron; `count` what it leaves missed and false."""
-    with collected() as caught:
-        fitting = Fitting(patterns, plan, label, array, report, place, known)
-        learner = fitting.fit(plan)
-    return _Fit(fitting.wrong(learner, plan.run_threshold) if count else 0, fitting, learner, point, caught)
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
@@ -334,14 +316,16 @@ class Fitting:
         place: int = 0,
         known: Known | None = None,
     ) -> None:
-        self._label = label
-        self._needs = rows_of(recipe, label)
+        self._label, self._needs = label, rows_of(recipe, label)
         learner, delay_ms = recipe.learner_of(label)
         received = recipe._received(recipe._of(label))
         ages = ages_of(received, array)
         #: How much later than the event the neuron is trained to fire, ms, the encoder's latency apart. Where an age of
-        #: the touch begins then it is later: a spike at that age acts after its time.
-        self.delay_ms = delay_ms + (0.0 if ages is None else _acts_after_ms(learner._on_grid()))
+        #: the touch begins then it is later: a spike at that age acts after its time, or at once where the potential
+        #: jumps.
+        neuron = learner._on_grid()
+        acts_after_ms = ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
+        self.delay_ms = delay_ms + (0.0 if ages is None else acts_after_ms)
         given = self._given = [_times(k, example, label) for k, example in enumerate(examples)]
         count = sum(map(len, given))
         if not count:
@@ -360,14 +344,14 @@ class Fitting:
             if len(every) <= place and place:
                 raise ProblemError(f"{label}: {counted(len(every), 'quantity', 'quantities')} follow it")
             followed = every[place] if every else None
-            self.alignment = aligned_to(followed, label, given)
+            self.alignment = aligned(label, given, followed and (followed.train, followed.score))
         elif recipe.align:
             self.alignment = align(sources, label, given, received.latency_ms, ages)
         self._names = [called(k, example) for k, example in enumerate(examples)]
         self._sources = sources if followed is None else [only(of, quantities[followed.train]) for of in sources]
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
         for name, times in zip(self._names, felt, strict=True):
-            self._check_apart(name, times, learner._on_grid().refractory)
+            self._check_apart(name, times, neuron.refractory)
         later = [np.zeros(len(times), np.int64) for times in felt]
         if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
             later = [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
@@ -376,10 +360,9 @@ class Fitting:
         self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
         whole = self._until_targets(self._sources)
-        same = self._graded or self.alignment is None
-        trains = whole if same else self._until_targets(distinct(self._sources))
+        trains = whole if self._graded or self.alignment is None else self._until_targets(distinct(self._sources))
         self._check_felt(trains)
-        silent = self._silent(followed, sources, whole, ages, learner._on_grid())
+        silent = self._silent(followed, sources, whole, ages, neuron)
         self._what, self._report = f"learning {label} from {counted(count, 'event')}", report
         report(self._what, 0, 0)
         try:
@@ -389,7 +372,9 @@ class Fitting:
         self._before: ConeR | None = None
 
     def _until_targets(self, sources: Sequence[SpikeTrains]) -> list[SpikeTrains]:
-        return [_until(source, targets) for source, targets in zip(sources, self._targets, strict=True)]
+        """Return trains with an end after the last target, which may come after the last spike."""
+        pairs = zip(sources, self._targets, strict=True)
+        return [trains.lasting(max(trains.stop, *targets, trains.start)) for trains, targets in pairs]
 
     def _silent(
         self,
@@ -467,11 +452,6 @@ class Fitting:
         return cone
 
 
-def _acts_after_ms(neuron: Neuron) -> float:
-    """Return how long after a spike a neuron can be trained to fire by it, ms: at once where its potential jumps."""
-    return ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
-
-
 def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     """Return the events of a label in the encoded example k, us, ascending; refuse one outside the example."""
     source, labels, *_ = example
@@ -544,8 +524,3 @@ def _remarks(
             )
     # The learner names unreachable targets, if any, first.
     yield from caught[bool(missed) :]
-
-
-def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:
-    """Return the trains with an end after the last target, which may come after the last spike."""
-    return trains.lasting(max(trains.stop, *targets, trains.start))

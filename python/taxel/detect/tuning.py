@@ -17,8 +17,6 @@ from taxel.detect.loads import FoundTimes, Loads, Stretch, clock_of
 from taxel.detect.plain_rule import PlainRule
 from taxel.spikes import SpikeTrains, to_us
 
-__all__ = ["AGES_MS", "AREAS", "FRAMES", "LOCAL_LOADS", "QUANTILES", "RELEASES", "best_rules", "tune"]
-
 #: Thresholds of the area, taxels.
 AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 #: Thresholds of the total: these quantiles of all its values above 0.

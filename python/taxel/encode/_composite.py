@@ -21,8 +21,6 @@ from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
-__all__ = ["Composite"]
-
 
 @dataclass(eq=False, repr=False)
 class Composite(Encoder):

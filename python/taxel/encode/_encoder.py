@@ -20,8 +20,6 @@ from taxel.spikes import SpikeTrains
 from taxel.spikes.exchange import Kind
 from taxel.tare import Tare
 
-__all__ = ["Encoder", "EncoderStream"]
-
 
 class Encoder(Value):
     """Turn events or frames into spike trains; the common part of all encoders.

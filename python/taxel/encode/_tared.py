@@ -17,8 +17,6 @@ from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
-__all__ = ["Tared"]
-
 
 class Tared(Encoder):
     """Encode the values above the rest of the taxels; the base class of encoders with the parameter `tare`.

@@ -8,9 +8,6 @@ from typing import Literal
 from taxel._base.parameters import defaults
 from taxel.encode._encoder import Encoder
 
-__all__ = ["ChangeEvents"]
-
-
 _DEFAULT = defaults("change_events")
 
 

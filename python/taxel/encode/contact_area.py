@@ -10,9 +10,6 @@ from taxel._base.parameters import defaults
 from taxel.encode._tared import Tared
 from taxel.tare import Tare
 
-__all__ = ["ContactArea"]
-
-
 _DEFAULT = defaults("contact_area")
 
 

@@ -8,9 +8,6 @@ from typing import Literal
 from taxel._base.parameters import defaults
 from taxel.encode._encoder import Encoder
 
-__all__ = ["FA1"]
-
-
 _DEFAULT = defaults("fa1")
 
 

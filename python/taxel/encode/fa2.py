@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from taxel._base.parameters import defaults
 from taxel.encode._encoder import Encoder
 
-__all__ = ["FA2"]
-
-
 _DEFAULT = defaults("fa2")
 
 

@@ -9,9 +9,6 @@ from typing import ClassVar, Literal
 from taxel._base.parameters import Value, defaults
 from taxel.encode._encoder import Encoder
 
-__all__ = ["LevelCrossing", "RunningRange"]
-
-
 _RANGE = defaults("running_range")
 
 

@@ -18,9 +18,6 @@ from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 from taxel.tare import Tare
 
-__all__ = ["LocalLoad"]
-
-
 _DEFAULT = defaults("local_load")
 
 

@@ -9,9 +9,6 @@ from taxel._base.parameters import defaults
 from taxel.encode._tared import Tared
 from taxel.tare import Tare
 
-__all__ = ["Moments"]
-
-
 _DEFAULT = defaults("moments")
 
 

@@ -8,9 +8,6 @@ from taxel._base.parameters import defaults
 from taxel.encode._tared import Tared
 from taxel.tare import Tare
 
-__all__ = ["SA2"]
-
-
 _DEFAULT = defaults("sa2")
 
 

@@ -9,9 +9,6 @@ from typing import Literal
 from taxel._base.parameters import defaults
 from taxel.encode._encoder import Encoder
 
-__all__ = ["ThresholdIzhikevich"]
-
-
 _DEFAULT = defaults("threshold_izhikevich")
 
 

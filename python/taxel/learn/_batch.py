@@ -16,8 +16,6 @@ from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner
 from taxel.spikes import SpikeTrains
 
-__all__ = ["BatchLearner"]
-
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class BatchLearner(SpikeLearner):

@@ -17,8 +17,6 @@ from taxel.learn.cone_r import ConeR
 from taxel.learn.cone_x import ConeX
 from taxel.spikes import SpikeTrains
 
-__all__ = ["checked_examples", "fitted"]
-
 
 def fitted(cone: object) -> NDArray[np.float64]:
     """Return the weights of a fit; refuse what is none."""

@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, floats, instance
+from taxel._base.arguments import callback, floats, instance, optional
 from taxel._base.parameters import defaults
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner, Status
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
-
-__all__ = ["AfterSpike", "EpochLearner", "Updates", "keep"]
 
 AfterSpike = Literal["subtract", "membrane", "reset"]
 Updates = Literal["batch", "pattern"]
@@ -93,10 +91,8 @@ class EpochLearner(SpikeLearner):
         """
         trains, times = examples(patterns, targets)
         first = None if start is None else floats("start", start)
-        if progress is not None:
-            callback("progress", progress)
         self.neuron_ = self._fitted_neuron()
-        keep(self, _core.fit_rival(self._json(), trains, times, first, progress))
+        keep(self, _core.fit_rival(self._json(), trains, times, first, optional(callback, "progress", progress)))
         return self
 
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:

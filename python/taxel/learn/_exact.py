@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from taxel.learn._statement import AT_EDGE, PatternRows
 
-__all__ = ["ExactPotential"]
-
 #: Times are up to 1e15 kernel lengths from the start, which leaves 35 digits of a sum.
 _CONTEXT = Context(prec=50, Emin=MIN_EMIN, Emax=MAX_EMAX)
 _RELATIVE = Decimal("1e-30")

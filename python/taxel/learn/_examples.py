@@ -13,8 +13,6 @@ from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 
-__all__ = ["examples", "windows"]
-
 
 def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[float64]]]:
     """Return patterns and targets as the compiled part reads them; refuse other types."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 from numpy import float64
 from numpy.typing import ArrayLike, NDArray
@@ -15,8 +14,6 @@ from taxel._core import NotFittedError, ProblemError
 from taxel.learn._examples import examples
 from taxel.metrics import f1
 from taxel.spikes import SpikeTrains
-
-__all__ = ["Learner", "SpikeLearner", "Status", "fired_by_neuron", "patterns_of"]
 
 #: How a fit ended, of all learners; the page on errors has the table.
 Status = Literal["solved", "feasible", "infeasible", "right", "epochs", "stopped", "assigned"]
@@ -57,7 +54,7 @@ class Learner(Parameters):
         return floats("weights_", weights)
 
 
-class SpikeLearner(Learner, ABC):
+class SpikeLearner(Learner):
     """Learn spike times."""
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
@@ -79,9 +76,14 @@ class SpikeLearner(Learner, ABC):
         """
         return self._fired(patterns_of(patterns))
 
-    @abstractmethod
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[float64]]:
-        """Return the output spikes in each pattern."""
+        """Return the output spikes in each pattern: those of `neuron_` with its weights."""
+        weights, fit = self._fitted(), vars(self)
+        if fit.get("status_") == "infeasible":
+            raise ProblemError(
+                "the fit is infeasible: no weights meet its targets (status_, certificate_), so none can be run"
+            )
+        return [fit["neuron_"].run(weights, pattern) for pattern in patterns]
 
     def score(
         self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike], window_ms: float = _DEFAULT.window_ms
@@ -113,13 +115,3 @@ class SpikeLearner(Learner, ABC):
 def patterns_of(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:
     """Return patterns as a list, each of which was checked; an error names the pattern."""
     return [instance(f"pattern {p}", pattern, SpikeTrains) for p, pattern in enumerate(several("patterns", patterns))]
-
-
-def fired_by_neuron(learner: Any, patterns: list[SpikeTrains]) -> list[NDArray[float64]]:
-    """Return the output spikes of a learner's `neuron_` with its weights."""
-    weights = learner._fitted()
-    if getattr(learner, "status_", None) == "infeasible":
-        raise ProblemError(
-            "the fit is infeasible: no weights meet its targets (status_, certificate_), so none can be run"
-        )
-    return [learner.neuron_.run(weights, pattern) for pattern in patterns]

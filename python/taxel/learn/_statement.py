@@ -15,8 +15,6 @@ from taxel.learn.cone_x import ConeX, Margin
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["AT_EDGE", "BLOCK", "PatternRows", "Stated", "pattern_rows"]
-
 #: An input this far from the end of a refractory time counts as at it, and a spike this far from its target, ms.
 AT_EDGE = 1e-6
 #: Grid points that are computed at once.

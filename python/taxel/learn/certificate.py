@@ -21,8 +21,6 @@ from taxel.learn.cone_x import Certificate, ConeX, ConeXProblem, Margin
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["check_certificate", "check_gap"]
-
 
 def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin: bool = True) -> bool:
     """Check a proof of infeasibility, with its rows computed anew from spikes and kernels in plain NumPy.

@@ -8,9 +8,6 @@ from typing import Literal
 from taxel._base.parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
-__all__ = ["Chronotron"]
-
-
 _DEFAULT = defaults("chronotron")
 
 

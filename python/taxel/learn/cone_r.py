@@ -11,19 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, floats, instance, parameters, several
+from taxel._base.arguments import callback, floats, instance, optional, parameters, several
 from taxel._base.errors import refused
 from taxel._base.messages import warn
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError
 from taxel.learn._examples import examples, windows
-from taxel.learn._learner import SpikeLearner, Status, fired_by_neuron
+from taxel.learn._learner import SpikeLearner, Status
 from taxel.learn.cone_x import Multipliers, _multipliers
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
-
-__all__ = ["ConeR", "ConeRProblem"]
-
 
 _DEFAULT = defaults("cone_r")
 #: The most trains with spikes in a fit: their Hessian needs 1.6 GB, and a step half a minute.
@@ -238,9 +235,6 @@ class ConeR(SpikeLearner):
         """
         return ConeRProblem(self, patterns, targets, silence)
 
-    def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
-        return fired_by_neuron(self, patterns)
-
     def _on_grid(self) -> Neuron:
         """Return the neuron that is trained: the given one, on the grid of its step."""
         neuron = Neuron() if self.neuron is None else instance("neuron", self.neuron, Neuron)
@@ -349,9 +343,8 @@ class ConeRProblem:
         ProblemError : a learner that needs other rows
         """
         first = None if start is None else self._start(start, cone)
-        if progress is not None:
-            callback("progress", progress)
-        fit = self._problem.fit(*self._handed(instance("cone", cone, ConeR)), first, progress)
+        report = optional(callback, "progress", progress)
+        fit = self._problem.fit(*self._handed(instance("cone", cone, ConeR)), first, report)
         _keep(cone, fit, self.silent_rows, self._problem.rows, self._for_all)
         _warn(cone)
         return cone
@@ -418,16 +411,12 @@ def _keep(
 ) -> None:
     """Set the results of a fit on the learner, those of trains `for_all`; raise what ended the fit."""
     cone.weights_ = for_all(fit.weights)
-    cone.objective_ = fit.objective
+    for name in ("objective", "gap", "status", "engine", "rounds", "rows", "unreachable", "refires"):
+        setattr(cone, f"{name}_", getattr(fit, name))
     cone.parts_ = dict(zip(("l1", "l2", "B", "C", "D"), fit.parts, strict=True))
-    cone.gap_ = fit.gap
     of_rows, of_behind, pull = fit.proof
     cone.multipliers_ = _multipliers((of_rows, of_behind, for_all(pull)))
-    cone.status_ = fit.status
-    cone.engine_ = fit.engine
-    cone.rounds_, cone.rows_, cone.silent_rows_ = fit.rounds, fit.rows, silent_rows
-    cone.unreachable_ = fit.unreachable
-    cone.refires_ = fit.refires
+    cone.silent_rows_ = silent_rows
     cone.neuron_ = cone._on_grid()
     cone._multipliers = ((all_rows, cone.sides_c), fit.multipliers)
     if fit.raised is not None:

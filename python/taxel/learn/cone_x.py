@@ -12,17 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, flag, floats, instance, number, several, shown, whole
+from taxel._base.arguments import callback, flag, floats, instance, number, optional, several, shown, whole
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError
 from taxel.learn._examples import examples
-from taxel.learn._learner import SpikeLearner, Status, fired_by_neuron
+from taxel.learn._learner import SpikeLearner, Status
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
-
-__all__ = ["Certificate", "ConeX", "ConeXProblem", "Margin", "Multipliers", "Row"]
 
 
 class Row(NamedTuple):
@@ -356,25 +354,17 @@ class ConeX(SpikeLearner):
         ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
-        if progress is not None:
-            callback("progress", progress)
         held = [] if start is None else _held(instance("start", start, ConeX))
         neuron = Neuron() if self.neuron is None else copy.copy(self.neuron)
         problem = ConeXProblem(self, patterns, targets)
         multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
         first = [tuple(row) for row, _ in held]
-        fit = problem._problem.fit(first, multipliers, progress)
-        self.weights_ = fit.weights
-        self.status_ = fit.status
-        self.objective_ = fit.objective
+        fit = problem._problem.fit(first, multipliers, optional(callback, "progress", progress))
+        for name in ("weights", "status", "objective", "gap", "violation", "reason", "engine", "rounds"):
+            setattr(self, f"{name}_", getattr(fit, name))
         self.parts_ = dict(zip(("l1", "l2", "B"), fit.parts, strict=True))
-        self.gap_ = fit.gap
         self.multipliers_ = None if fit.proof is None else _multipliers(fit.proof)
-        self.violation_ = fit.violation
         self.margin_ = Margin(*fit.margin)
-        self.reason_ = fit.reason
-        self.engine_ = fit.engine
-        self.rounds_ = fit.rounds
         rows, values = fit.held
         self.held_ = list(zip(map(_row, rows), values.tolist(), strict=True))
         self.certificate_ = None
@@ -387,9 +377,6 @@ class ConeX(SpikeLearner):
         if fit.raised is not None:
             raise fit.raised
         return self
-
-    def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
-        return fired_by_neuron(self, patterns)
 
 
 class ConeXProblem:

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from taxel._base.parameters import defaults
 from taxel.learn.inst import INST
 
-__all__ = ["FILT"]
-
-
 _DEFAULT = defaults("filt")
 
 

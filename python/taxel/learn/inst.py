@@ -8,9 +8,6 @@ from dataclasses import dataclass
 from taxel._base.parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner, Updates
 
-__all__ = ["INST"]
-
-
 _DEFAULT = defaults("inst")
 
 

@@ -18,9 +18,6 @@ from taxel.learn._examples import windows
 from taxel.learn.cone_r import ConeR, _keep, _warn, _weighed
 from taxel.spikes import SpikeTrains
 
-__all__ = ["OnlineConeR"]
-
-
 _DEFAULT = defaults("online_cone_r")
 
 

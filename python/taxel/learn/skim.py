@@ -16,9 +16,6 @@ from taxel.learn._batch import BatchLearner
 from taxel.learn._learner import patterns_of
 from taxel.spikes import SpikeTrains
 
-__all__ = ["SKIM"]
-
-
 _DEFAULT = defaults("skim")
 
 

@@ -18,8 +18,6 @@ from taxel.learn.cone_r import ConeR
 from taxel.learn.cone_x import ConeX, Margin
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Checked", "check_solution"]
-
 #: A potential this far below the threshold reaches it, in thresholds (1e-12 mV at 0.3 mV).
 _TOUCH = 1e-12 / 0.3
 #: The share of the least room found that is proven.

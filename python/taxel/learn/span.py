@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from taxel._base.parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
-__all__ = ["SPAN"]
-
-
 _DEFAULT = defaults("span")
 
 

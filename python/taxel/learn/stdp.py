@@ -16,9 +16,6 @@ from taxel._base.parameters import defaults
 from taxel.learn._learner import SpikeLearner
 from taxel.spikes import SpikeTrains
 
-__all__ = ["STDP"]
-
-
 _DEFAULT = defaults("stdp")
 
 

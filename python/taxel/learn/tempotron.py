@@ -10,15 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, flag, floats, instance, several
+from taxel._base.arguments import callback, flag, floats, instance, optional, several
 from taxel._base.errors import refused
 from taxel._base.parameters import defaults
 from taxel.learn._epochs import keep
 from taxel.learn._learner import Learner, Status, patterns_of
 from taxel.spikes import SpikeTrains
-
-__all__ = ["Tempotron"]
-
 
 _DEFAULT = defaults("tempotron")
 
@@ -132,9 +129,7 @@ class Tempotron(Learner):
         trains = [pattern._parts() for pattern in patterns_of(patterns)]
         truth = _labels(labels)
         first = None if start is None else floats("start", start)
-        if progress is not None:
-            callback("progress", progress)
-        keep(self, _core.fit_tempotron(self._json(), trains, truth, first, progress))
+        keep(self, _core.fit_tempotron(self._json(), trains, truth, first, optional(callback, "progress", progress)))
         return self
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.bool_]:

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["write_information"]
-
 #: Colours of verdicts.
 _COLOURS = {"keeps": "#2f6690", "open": "#e8b04b", "loses": "#b5423c", "full": "#2b2b2b", "nothing": "#9a9a9a"}
 #: Labels whose names still fit a confusion matrix.

@@ -13,8 +13,6 @@ from taxel._base.messages import escaped_lines
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["INK", "STYLE", "picture"]
-
 #: What pages paint in their own colours, dark or light: text, axes, and lines of no colour of their own; the ground.
 INK, _LINE, _GROUND = "#2b2b2b", "#dedad2", "#fffffe"
 

@@ -19,8 +19,6 @@ from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5
 from taxel._core import FormatError
 
-__all__ = ["read_nwb", "write_nwb"]
-
 Kind = Literal["unsigned", "signed", "graded"]
 
 #: Times (ms) of all trains, their offsets, start, stop, values and their kind: the arguments of `SpikeTrains`.

@@ -27,8 +27,6 @@ from taxel.spikes.exchange import Kind, read_nwb, write_nwb
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SpikeTrains"]
-
 _KINDS: tuple[Kind, ...] = get_args(Kind)
 
 

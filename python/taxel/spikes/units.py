@@ -7,8 +7,6 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["to_ms", "to_us"]
-
 
 @overload
 def to_ms(us: float | np.integer[Any]) -> float: ...

@@ -6,36 +6,28 @@ by its own methods. The command line and the page call these functions; ``python
 process of its own (`taxel.tasks.__main__`).
 """
 
-from taxel.tasks.calibrate import Calibrated, CalibrateOptions, KnownLoad, calibrate, read_loads
-from taxel.tasks.detect import Detected, Detecting, DetectOptions, detect
-from taxel.tasks.encode import Encoded, EncodeOptions, encode
-from taxel.tasks.info import Info, info
-from taxel.tasks.information import Information, InformationOptions, information
-from taxel.tasks.rest import TakenRest, rest
-from taxel.tasks.train import train
-from taxel.tasks.training import Training, TrainOptions
+from taxel.tasks.calibrate import Calibrated as Calibrated
+from taxel.tasks.calibrate import CalibrateOptions as CalibrateOptions
+from taxel.tasks.calibrate import KnownLoad as KnownLoad
+from taxel.tasks.calibrate import calibrate as calibrate
+from taxel.tasks.calibrate import read_loads as read_loads
+from taxel.tasks.detect import Detected as Detected
+from taxel.tasks.detect import Detecting as Detecting
+from taxel.tasks.detect import DetectOptions as DetectOptions
+from taxel.tasks.detect import detect as detect
+from taxel.tasks.encode import Encoded as Encoded
+from taxel.tasks.encode import EncodeOptions as EncodeOptions
+from taxel.tasks.encode import encode as encode
+from taxel.tasks.info import Info as Info
+from taxel.tasks.info import info as info
+from taxel.tasks.information import Information as Information
+from taxel.tasks.information import InformationOptions as InformationOptions
+from taxel.tasks.information import information as information
+from taxel.tasks.rest import TakenRest as TakenRest
+from taxel.tasks.rest import rest as rest
+from taxel.tasks.train import train as train
+from taxel.tasks.training import Training as Training
+from taxel.tasks.training import TrainOptions as TrainOptions
 
-__all__ = [
-    "CalibrateOptions",
-    "Calibrated",
-    "DetectOptions",
-    "Detected",
-    "Detecting",
-    "EncodeOptions",
-    "Encoded",
-    "Info",
-    "Information",
-    "InformationOptions",
-    "KnownLoad",
-    "TakenRest",
-    "TrainOptions",
-    "Training",
-    "calibrate",
-    "detect",
-    "encode",
-    "info",
-    "information",
-    "read_loads",
-    "rest",
-    "train",
-]
+# The imports above say what is public.
+__all__ = [name for name, held in sorted(globals().items()) if callable(held)]

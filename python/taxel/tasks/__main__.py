@@ -144,7 +144,7 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
     left = mapping("the request", request)
     _refuse_unknown(left, ("recordings", "open", *known, *(["overwrite"] if "out" in known else [])), f"key of {name}")
     overwrite = left.pop("overwrite", False) is True
-    save: _Save = _nothing
+    save: _Save = lambda _: None  # noqa: E731
     if "out" in known:
         out = Path(_needed(left, "out"))
         try_whole(out, overwrite=overwrite)
@@ -159,10 +159,6 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
     found["warnings"] = [*dict.fromkeys([*warnings, *found.get("warnings", [])])]
     lines = {"lines": result.lines()} if hasattr(result, "lines") else {}
     return {"type": "result", "result": found, **lines}
-
-
-def _nothing(_: Any) -> None:
-    """Save nothing."""
 
 
 def _fields(options: Callable[..., Any], request: Request, key: str = "options") -> Any:
@@ -210,9 +206,7 @@ def _main() -> NoReturn:
             request = json.load(sys.stdin)
         except ValueError as error:
             raise ProblemError(f"the request is no JSON: {error}") from None
-        _say(
-            run(name, request, lambda step, done, of: _say({"type": "progress", "step": step, "done": done, "of": of}))
-        )
+        _say(run(name, request, _show))
     except KeyboardInterrupt:
         leave(130)
     except (Error, OSError, ImportError, MemoryError) as error:

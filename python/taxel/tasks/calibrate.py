@@ -25,8 +25,6 @@ from taxel.recording import Recording
 from taxel.recording.pressure import readings
 from taxel.tasks.rest import GivenTare, check_tare, given_tare
 
-__all__ = ["CalibrateOptions", "Calibrated", "KnownLoad", "calibrate", "read_loads"]
-
 
 @dataclass(frozen=True)
 class KnownLoad:
@@ -197,43 +195,28 @@ def calibrate(
 
 
 def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: CalibrateOptions) -> Calibration:
-    read = _read(recording, options.tare)
-    how: dict[str, Any] = {
-        "unit": options.unit,
-        "rest": read.rest,
-        "floor": read.floor,
-        "date": options.date,
-        "note": options.note,
-    }
+    frames, rest, floor = _read(recording, options.tare)
+    how: dict[str, Any] = {"unit": options.unit, "rest": rest, "floor": floor}
+    how |= {"date": options.date, "note": options.note}
     calibration: Calibration | None = None
     if options.law:
-        if read.frames.unit != "ticks":
-            raise refused(
-                "law", f": turns ticks of a board into {options.unit}; {recording.path} holds {read.frames.unit}"
-            )
+        if frames.unit != "ticks":
+            raise refused("law", f": turns ticks of a board into {options.unit}; {recording.path} holds {frames.unit}")
         registers = recording.registers
         ramp = 150.0 if registers is None else float(registers.ramp)
         calibration = Calibration.law(recording.array, ramp=ramp, sensor=options.sensor, **how)
     elif options.table is not None:
         points = _points(Path(options.table), recording.array)
-        calibration = Calibration.table(recording.array, *points, of=read.frames.unit, **how)
-    measured = [_load(read.frames, one) for one in known]
+        calibration = Calibration.table(recording.array, *points, of=frames.unit, **how)
+    measured = [_load(frames, one) for one in known]
     if measured:
         calibration = Calibration.fit(measured, start=calibration, exponent=options.exponent, each=options.each, **how)
     assert calibration is not None  # one of the three is given
     return calibration
 
 
-@dataclass(frozen=True)
-class _Read:
-    """The readings, those at rest, and the floor above rest from which a taxel counts as loaded."""
-
-    frames: Frames
-    rest: NDArray[np.float64] | None
-    floor: float
-
-
-def _read(recording: Recording, tare: GivenTare | None) -> _Read:
+def _read(recording: Recording, tare: GivenTare | None) -> tuple[Frames, NDArray[np.float64] | None, float]:
+    """Return the readings, those at rest, and the floor above rest from which a taxel counts as loaded."""
     values = readings(recording, None if tare is None else given_tare(tare, recording))
     if values is None:
         raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
@@ -242,7 +225,7 @@ def _read(recording: Recording, tare: GivenTare | None) -> _Read:
         error = ProblemError(f"{recording.path}: the rest of its taxels is not known, as no half second is quiet")
         raise helped(error, "tare", "give")
     known = rest.source not in ("unit", "none")
-    return _Read(frames, rest.values.reshape(recording.array.shape) if known else None, floor)
+    return frames, rest.values.reshape(recording.array.shape) if known else None, floor
 
 
 def _load(frames: Frames, known: KnownLoad) -> Load:
@@ -305,7 +288,7 @@ def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.f
     if not rows or "x" not in rows[0] or "y" not in rows[0]:
         return pairs[:, 0], pairs[:, 1]
     places = text.numbers([[row["x"], row["y"]] for row in rows], path, 2, ["x", "y"])
-    exists = np.ones(array.shape, bool) if array.exists is None else array.exists
+    exists = array._there()
     values = np.unique(pairs[:, 1])
     # Taxels that do not exist get rising values, which are never used.
     every = np.where(exists, np.nan, np.arange(1.0, len(values) + 1)[:, None, None])

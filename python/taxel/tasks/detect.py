@@ -30,8 +30,6 @@ from taxel.spikes import SpikeTrains
 from taxel.tasks.labels import GivenLabels, references
 from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
 
-__all__ = ["DetectOptions", "Detected", "Detecting", "detect"]
-
 #: No event.
 _NONE = np.empty(0, np.int64)
 

@@ -13,8 +13,6 @@ from taxel.recording.summary import summary
 from taxel.tare import Tare
 from taxel.tasks.rest import GivenTare, given_tare
 
-__all__ = ["Info", "info"]
-
 
 @dataclass(frozen=True, eq=False)
 class Info:

@@ -19,8 +19,6 @@ from taxel.recording import Recording
 from taxel.recording.open_options import sensors_of
 from taxel.tasks.encode import encoder_of
 
-__all__ = ["Information", "InformationOptions", "information"]
-
 
 @dataclass(frozen=True)
 class InformationOptions:

@@ -19,8 +19,6 @@ from taxel.labels import Labels, beside, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
 
-__all__ = ["GivenLabels", "labelled_trials", "references"]
-
 #: "notes" (the recordings' own notes), the path of a table, or times (us) by label, a mapping for each recording.
 GivenLabels: TypeAlias = str | os.PathLike[str] | Sequence[Mapping[str, Any]]
 

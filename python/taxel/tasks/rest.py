@@ -29,8 +29,6 @@ from taxel.recording.rest import NOISE_FLOOR, by_unit, of_quiet
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
-__all__ = ["GivenTare", "TakenRest", "given_or_by_unit", "given_tare", "rest", "tare_before", "tare_if_any"]
-
 #: A tare, the file of one, or how many seconds at the beginning of a recording are at rest.
 GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 

@@ -37,8 +37,6 @@ from taxel.tasks.labels import GivenLabels, labelled_trials, references
 from taxel.tasks.rest import GivenTare, given_tare, tare_before, tare_if_any
 from taxel.tasks.training import Training, TrainOptions
 
-__all__ = ["train"]
-
 
 def train(
     recordings: Recording | Sequence[Recording],
@@ -211,8 +209,7 @@ class _Work:
         a_point_s = None if search else (perf_counter() - begun) * INNER * (count + 1)
         own = _own(outcomes, window_ms)
         if scored is None:
-            own = replace(own, plain=self._plain_score(plan, [one.example.labels for one in outcomes]))
-        scored = own if scored is None else scored
+            scored = replace(own, plain=self._plain_score(plan, [outcome.example.labels for outcome in outcomes]))
         advice = advised(made, self.examples, scored.together, own.together, a_point_s, scored.plain)
         taken = _taken(self.examples) if self.options.tare is None else ()
         return Training(self.options, self.opened, made, scored, why, advice, outcomes, taken)

@@ -18,8 +18,6 @@ from taxel.recording import Recording
 from taxel.spikes import to_ms
 from taxel.tasks.rest import GivenTare, check_tare
 
-__all__ = ["TrainOptions", "Training"]
-
 #: How many labels without a pair a line names.
 _NAMED = 5
 #: Where to find the file of a plain rule.

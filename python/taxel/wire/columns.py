@@ -15,8 +15,6 @@ from taxel._base.messages import counted
 from taxel.array import Array
 from taxel.events import Events
 
-__all__ = ["Columns"]
-
 #: From this number of rows on, NumPy requests large pages (from 4 MB on) for the narrowest column too. The page fault
 #: at the first write to each small page costs more than the write itself.
 _LARGE = 1 << 22
@@ -72,16 +70,7 @@ class Columns:
     def __repr__(self) -> str:
         return f"Columns(room for {counted(len(self), 'event')})"
 
-    def _parts(
-        self,
-    ) -> tuple[
-        NDArray[np.int64],
-        NDArray[np.uint16],
-        NDArray[np.uint16],
-        NDArray[np.uint16],
-        NDArray[np.uint8],
-        NDArray[np.uint8],
-    ]:
+    def _parts(self) -> tuple[Any, Any, Any, Any, Any, Any]:
         p, present = self.p.view(np.uint8), self.present.view(np.uint8)
         return self.t, self.x, self.y, self.intensity, p, present
 
@@ -110,16 +99,8 @@ class Columns:
         t, x, y, p = self.t[:rows], self.x[:rows], self.y[:rows], self.p[:rows]
         return Events._unchecked(t, x, y, p, array, ticks, present, repaired, tuple(markers))
 
-    def _owning(
-        self,
-        array: Array,
-        rows: int,
-        paired: bool,
-        repaired: NDArray[np.bool_] | None,
-        markers: Sequence[tuple[int, bool]],
-    ) -> Events:
-        """Return the first rows as events that own the columns; unused memory is freed."""
+    def _trim(self, rows: int) -> None:
+        """Keep the first rows alone, read-only, for events that own the columns; unused memory is freed."""
         for filled in vars(self).values():
             filled.resize(rows, refcheck=False)
             frozen(filled)
-        return self._first(array, rows, paired, repaired, markers)

@@ -8,8 +8,6 @@ from typing import Any
 from taxel import _core
 from taxel._base.arguments import buffer_bytes, whole
 
-__all__ = ["Command"]
-
 
 @dataclass(frozen=True)
 class Command:

@@ -17,8 +17,6 @@ from taxel.events import Events
 from taxel.wire.columns import Columns
 from taxel.wire.counts import Counts, Received, Status
 
-__all__ = ["Decoder", "decode"]
-
 _PAIRINGS = ("direct", "taxel")
 
 
@@ -78,7 +76,7 @@ def decode(
     """
     decoder = Decoder(version, array=array, pairing=pairing, differences=differences)
     stream = buffer_bytes(data)
-    room, own = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
+    room, fresh = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
     if decoder.version == 2:
         if lengths is not None:
             raise refused("lengths", ": each datagram of version 2 has its own before it; leave them out")
@@ -87,7 +85,9 @@ def decode(
         filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())
     else:
         filled = decoder._core.fill(stream, None, room._parts(), pairing == "direct")
-    events = (room._owning if own else room._first)(decoder.array, **filled)
+    if fresh:
+        room._trim(filled["rows"])
+    events = room._first(decoder.array, **filled)
     if pairing == "taxel":
         markers, events = events.markers, decoder.finish()
         events.markers = markers
@@ -189,7 +189,9 @@ class Decoder:
         """
         stream = buffer_bytes(data)
         columns = Columns._fresh(_core.wire_rows(self.version, len(stream)))
-        return columns._owning(self.array, **self._fill(columns, stream, arrived))
+        filled = self._fill(columns, stream, arrived)
+        columns._trim(filled["rows"])
+        return columns._first(self.array, **filled)
 
     def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
         """Decode into memory that is reused; return the events as views of it.

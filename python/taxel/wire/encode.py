@@ -6,8 +6,6 @@ from taxel import _core
 from taxel._base.arguments import instance
 from taxel.events import Events
 
-__all__ = ["encode"]
-
 
 def encode(events: Events) -> bytes:
     """Return events as bytes: each change followed by its intensity, each marker before the first event not earlier.

@@ -15,8 +15,6 @@ from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.wire.command import Command
 
-__all__ = ["FRAME_US", "PRESETS", "QUOTED_PRESETS", "Registers", "described"]
-
 #: The names of the presets (`Registers.preset`).
 PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
 

@@ -7,8 +7,6 @@ from typing import Any
 from taxel import _core
 from taxel._base.arguments import buffer_bytes
 
-__all__ = ["StreamReader"]
-
 
 class StreamReader:
     """Split a file or stream into datagrams, each preceded by its length (16 bits, little-endian).

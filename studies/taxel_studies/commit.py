@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import NamedTuple
 from uuid import uuid4
 
-__all__ = ["Checkout", "checkout_of", "code_version"]
-
 #: The results that measurements leave in a checkout of taxel: they change no code.
 _RESULTS = "benchmarks/results"
 #: Variables that name another repository; git sets some of them while a hook runs.
@@ -82,7 +80,7 @@ def code_version(*packages: str) -> str:
 
     Examples
     --------
-    >>> from taxel.report import code_version
+    >>> from taxel_studies.commit import code_version
     >>> code_version() == code_version("taxel") or "local changes" in code_version()
     True
     """
