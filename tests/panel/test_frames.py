@@ -198,7 +198,7 @@ def test_an_encoder_that_does_not_fit_frames_is_refused_with_the_reason(tmp_path
 
 def test_frames_without_times_are_numbered(tmp_path):
     frames = Frames(np.arange(12.0).reshape(4, 1, 3), np.arange(4), array=Array(1, 3))
-    trial = taxel.open_all(write_icub(tmp_path))[0]._contents.one
+    trial = taxel.open_all(write_icub(tmp_path))[0]._contents.main
     taxel.convert(taxel.Recording(Contents.of(source_from(frames, trial.origin, untimed=True))), tmp_path / "grasp.npz")
     with Panel(tmp_path / "grasp.npz") as panel, Client(panel) as page:
         about = opened(page, "grasp.npz")

@@ -178,7 +178,7 @@ def same(recording: taxel.Recording, m: Model, where: str) -> None:
     np.testing.assert_array_equal(frames.t, m.t, where)
     np.testing.assert_array_equal(frames.values, m.values, where)
     assert (frames.unit, recording.side, recording.heel, recording.timed) == (m.unit, m.side, m.heel, True), where
-    one = recording._contents.one
+    one = recording._contents.main
     assert isinstance(one, FrameSource)
     assert one.readings.turned == m.turned, where
     assert (recording.columns if recording.is_stream else None) == m.columns, where

@@ -177,7 +177,7 @@ def test_everything_beside_the_frames_is_kept(tmp_path: Path) -> None:
     back = taxel.open(tmp_path / "a.mcap")
     assert back.frames() == frames
     assert [(note.text, note.t) for note in back.notes] == [("heel", 5000), ("bare", None)]
-    assert (back.detections, back.columns, back.lost) == (of.one.marks.detections(), ["hip", "knee"], ("something",))
+    assert (back.detections, back.columns, back.lost) == (of.main.marks.detections(), ["hip", "knee"], ("something",))
     assert (back.source, back.verdict, back.remarks) == (
         "an amplifier",
         "the .npz does not say what was lost",

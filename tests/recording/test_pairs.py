@@ -104,7 +104,7 @@ def test_what_a_recording_holds_is_there_again_or_said(tmp_path: Path, reader: s
         return
     said = taxel.convert(recording, tmp_path / f"new{kind}")
     again = taxel.open(tmp_path / f"new{kind}")
-    before, after = recording._contents.one, again._contents.one
+    before, after = recording._contents.main, again._contents.main
     assert unsaid(before, after, said, STORED) == []
     if kind in (".mcap", ".npz", ".h5"):
         assert again.counts == (recording.counts or again.counts)

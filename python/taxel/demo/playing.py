@@ -34,8 +34,8 @@ _LISTEN_ON_S = 0.3
 class Screen(Protocol):
     """The display while the demo runs."""
 
-    def draw(self, counters: dict[str, Any], picture: Any, detections: list[Detection]) -> None:
-        """Draw counters, picture and detections so far."""
+    def draw(self, counters: dict[str, Any], frame: Any, detections: list[Detection]) -> None:
+        """Draw counters, frame and detections so far."""
 
 
 @dataclass(frozen=True)

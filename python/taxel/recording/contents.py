@@ -205,13 +205,13 @@ class Contents:
 
     Parameters
     ----------
-    one : Source
+    main : Source
         Its only source, the chosen one, the only board beside streams of numbers, or `Several`.
     sources : mapping from str to Source
         All sources of the file by their names.
     """
 
-    one: Source
+    main: Source
     sources: Mapping[str, Source]
 
     @classmethod
@@ -221,12 +221,12 @@ class Contents:
 
     def others(self) -> list[str]:
         """Return what is lost without the other sources."""
-        return [f"the source {name}" for name in self.sources if name != self.one.origin.label]
+        return [f"the source {name}" for name in self.sources if name != self.main.origin.label]
 
     @property
     def is_several(self) -> bool:
         """Whether these are the contents of a file of several boards as a whole."""
-        return isinstance(self.one, Several)
+        return isinstance(self.main, Several)
 
 
 def alone(sources: Mapping[str, Source]) -> Contents:

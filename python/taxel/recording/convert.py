@@ -101,9 +101,9 @@ def convert(
                 {name: as_frames(source, frames_hz, name="frames_hz") for name, source in whole.sources.items()}
             )
         else:
-            whole = Contents(as_frames(whole.one, frames_hz, name="frames_hz"), whole.sources)
+            whole = Contents(as_frames(whole.main, frames_hz, name="frames_hz"), whole.sources)
     written = stored(whole, place)
-    made, lost = written.one, list(written.one.losses.lost())
+    made, lost = written.main, list(written.main.losses.lost())
     match kind:
         case ".lsa":
             _write_lsa(place, made, overwrite)
@@ -115,10 +115,10 @@ def convert(
             write_h5(place, made, overwrite=overwrite)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                before = whole.sources if written.is_several else {made.origin.label: whole.one}
+                before = whole.sources if written.is_several else {made.origin.label: whole.main}
                 counts = {name: _counts(before[name], source) for name, source in written.sources.items()}
                 write_mcap(part, written, compression, counts)
-                lost += _read_otherwise(part, whole.one)
+                lost += _read_otherwise(part, whole.main)
     return lost
 
 

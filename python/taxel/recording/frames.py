@@ -119,10 +119,10 @@ def at_rate(of: Contents, rate_hz: float) -> Contents:
     ProblemError : frames that have times, or an invalid rate
     """
     period_us("rate_hz", rate_hz)
-    if not of.one.untimed:
-        raise ProblemError(f"{of.one.origin.path}: has times of its own; a rate is of frames without times")
+    if not of.main.untimed:
+        raise ProblemError(f"{of.main.origin.path}: has times of its own; a rate is of frames without times")
     sources = {name: _at_rate(source, rate_hz) for name, source in of.sources.items()}
-    return Contents(several(sources) if of.is_several else _at_rate(of.one, rate_hz), sources)
+    return Contents(several(sources) if of.is_several else _at_rate(of.main, rate_hz), sources)
 
 
 def _at_rate(of: Source, rate_hz: float) -> Source:

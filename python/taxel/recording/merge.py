@@ -86,7 +86,7 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
 
 def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
-    sources = [recording.one for recording in recordings]
+    sources = [recording.main for recording in recordings]
     if len({part.has_events for part in sources}) > 1:
         differing = next(part for part in sources if part.has_events != sources[0].has_events)
         events, frames = (sources[0], differing) if sources[0].has_events else (differing, sources[0])

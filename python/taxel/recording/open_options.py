@@ -154,7 +154,7 @@ class OpenOptions:
 def _laid_on(recording: Recording, array: Array) -> Recording:
     """Return a recording on another description of its sensor."""
     contents = recording._contents
-    return type(recording)(Contents(on_array(contents.one, array), contents.sources))
+    return type(recording)(Contents(on_array(contents.main, array), contents.sources))
 
 
 def _is_row_of(recording: Recording, given: Array) -> bool:

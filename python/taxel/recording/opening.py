@@ -275,7 +275,7 @@ def _open_one(place: Path, how: How) -> Recording:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
             contents = Contents.of(read_foreign(place, said))
             if how.array is not None:
-                contents = Contents.of(_on_given(contents.one, instance("array", how.array, Array)))
+                contents = Contents.of(_on_given(contents.main, instance("array", how.array, Array)))
         elif (kind := kind_of(place)) == "ros":
             grid = said.grid() if how.array is None and said is not None else how.array
             contents = read_ros(place, how.topics.but(of_layout), grid)
@@ -418,7 +418,7 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     """Add the reference events of a recording, and of each of its sources, to the notes."""
     contents = recording._contents
     if not contents.is_several:
-        return recording.with_notes(_notes(labels, name, contents.one))
+        return recording.with_notes(_notes(labels, name, contents.main))
     sources = {
         label: source if isinstance(source, Stream) else noted(source, tuple(_notes(labels, name, source)))
         for label, source in contents.sources.items()
@@ -552,14 +552,14 @@ def joined(opened: Sequence[Recording]) -> list[Recording]:
     """
     groups: dict[tuple[str, str], dict[str, Contents]] = {}
     for recording in opened:
-        origin = recording._contents.one.origin
+        origin = recording._contents.main.origin
         # In a folder the path of a trial ends with its name, and so with its foot.
         key = (str(origin.path).removesuffix(f" {origin.label}"), origin.name.removesuffix(f" {origin.label}"))
         groups.setdefault(key, {})[origin.label or origin.name] = recording._contents
     together: list[Recording] = []
     for (path, _), feet in groups.items():
         if set(feet) == set(FEET):
-            sources = {foot: feet[foot].one for foot in FEET}
+            sources = {foot: feet[foot].main for foot in FEET}
             sources = {
                 foot: replace(source, origin=replace(source.origin, path=Path(path)))
                 for foot, source in sources.items()

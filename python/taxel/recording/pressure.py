@@ -282,7 +282,7 @@ class _Drawn:
         taxels, column = np.unique(events.array.index(events.x[there], events.y[there]), return_inverse=True)
         since = np.full(len(taxels), np.iinfo(np.int64).max)
         np.minimum.at(since, column, events.t[there])
-        begins, held = None, recording._contents.one.settings.held()
+        begins, held = None, recording._contents.main.settings.held()
         if held is not None:
             known = held.reshape(-1)[taxels] != UNKNOWN
             begins = np.where(known, held.reshape(-1)[taxels], 0).astype(np.float32)
@@ -406,7 +406,7 @@ def _rate_hz(recording: Recording) -> float:
 def _times(recording: Recording) -> NDArray[np.int64]:
     """Return the times of the frames of `Recording.frames`."""
     t = recording.events.t
-    stretch = recording._contents.one.timing.stretch
+    stretch = recording._contents.main.timing.stretch
     first, stop = (int(t.min()), int(t.max()) + 1) if stretch is None else stretch()
     return np.arange(first, stop, period_us("rate_hz", _rate_hz(recording)), dtype=np.int64)
 

@@ -58,7 +58,7 @@ def stored(of: Contents, place: Path) -> Contents:
     ------
     ProblemError : contents that the kind of file cannot hold at all (frames in a .lsa)
     """
-    ending, main = place.suffix.lower(), of.one
+    ending, main = place.suffix.lower(), of.main
     if of.is_several and ending == ".mcap" and together(of.sources):
         each = {name: _stored(source, ending, place) for name, source in of.sources.items()}
         each = {name: _named(source, f"{place.name} {name}", name) for name, source in each.items()}

@@ -50,7 +50,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     ------
     OSError : the disk is full ...
     """
-    whole = contents.one
+    whole = contents.main
     samples = whole.lines.samples() if isinstance(whole, Stream) else None
     if samples is not None:
         header = {**samples.about, "sources": [], **_told(whole)}

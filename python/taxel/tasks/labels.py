@@ -180,7 +180,7 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         return dict(events)
     first, last = span_us(recording)
     if recording.has_events:
-        held, stretch = recording.events, recording._contents.one.timing.stretch
+        held, stretch = recording.events, recording._contents.main.timing.stretch
         seen = [last, *(t for t, _ in held.markers), *(() if stretch is None else stretch()[1:])]
         # A heartbeat or a frame without events is a sign of life, too.
         end = max(seen if recording.clock is None else [*seen, *recording.clock.board_us[-1:].tolist()])

@@ -19,12 +19,12 @@ pub(super) struct Observers {
     copiers: Vec<Copier>,
     /// Number of datagrams that were received before the next one.
     received: u64,
-    framed: Instant,
+    published_frame: Instant,
 }
 
 impl Observers {
     pub(super) fn new(shared: Arc<Shared>) -> Self {
-        Self { shared, viewers: vec![], copiers: vec![], received: 0, framed: Instant::now() }
+        Self { shared, viewers: vec![], copiers: vec![], received: 0, published_frame: Instant::now() }
     }
 
     /// Adds a viewer of the events, if it is still connected.
@@ -82,10 +82,10 @@ impl Observers {
 
     /// Publishes the low-rate frame if it is due; returns whether it was.
     pub(super) fn frame(&mut self, held: &Held) -> bool {
-        if self.framed.elapsed() < LOW_RATE_EVERY {
+        if self.published_frame.elapsed() < LOW_RATE_EVERY {
             return false;
         }
-        self.framed = Instant::now();
+        self.published_frame = Instant::now();
         self.shared.published().frame.iter_mut().zip(held.frame()).for_each(|(shown, value)| *shown = value);
         true
     }
