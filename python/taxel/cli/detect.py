@@ -137,7 +137,7 @@ def _print(each: Detected, *, given: bool) -> None:
         say(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
     first = detections[:_ROWS]
-    # A plain rule has no slope; levels of pictures come in steps, and may give one for all.
+    # A plain rule has no slope; levels of frames come in steps, and may give one for all.
     sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1
     say(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):

@@ -91,7 +91,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
     JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
     reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
-    which are counted. --panel shows the board in a browser; a slow viewer loses pictures, never data. Exit code 3:
+    which are counted. --panel shows the board in a browser; a slow viewer loses frames, never data. Exit code 3:
     nothing was received, or something was lost after it had arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap

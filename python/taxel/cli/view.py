@@ -41,7 +41,7 @@ def view(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Show pictures in N or kPa by this calibration (taxel calibrate). Default: that beside the recording.",
+            help="Show frames in N or kPa by this calibration (taxel calibrate). Default: that beside the recording.",
         ),
     ] = None,
     panel_host: PanelHostOption = "127.0.0.1",

@@ -108,9 +108,9 @@ def maps(evaluation: Evaluation, contact: Contact) -> Figure:
     seen = [h[top : top + _CROP, left : left + _CROP] for h in held]
     most = max(1.0, *(float(s.max()) for s in seen))
     image = None
-    for axis, picture, after in zip(axes[0], seen, moments, strict=True):
+    for axis, frame, after in zip(axes[0], seen, moments, strict=True):
         edges = (left - 0.5, left + _CROP - 0.5, top + _CROP - 0.5, top - 0.5)
-        image = axis.imshow(picture, cmap="magma", vmin=0.0, vmax=most, interpolation="nearest", extent=edges)
+        image = axis.imshow(frame, cmap="magma", vmin=0.0, vmax=most, interpolation="nearest", extent=edges)
         axis.set(title=f"{after:+.1f} ms", xlabel="column", ylabel="row")
     if image is not None:
         figure.colorbar(image, ax=list(axes[0]), label="ticks above rest", shrink=0.9)

@@ -88,7 +88,7 @@ def play_live(
                     ended = time.monotonic()
                 if time.monotonic() > drawn + _DRAW_EVERY_S:
                     drawn = time.monotonic()
-                    shown.draw(live.counters, live.picture, detections)
+                    shown.draw(live.counters, live.frame, detections)
             printed, complaint = board.communicate()
         finally:
             board.end()

@@ -22,7 +22,7 @@ from taxel.encode import ContactArea, Encoder, Moments
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.rest import of_pictures
+from taxel.recording.rest import of_frames
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 
@@ -34,7 +34,7 @@ _BEFORE_US = 20_000
 _LABELS = 4
 #: Of fewer labels no five folds can be made.
 _FIVE_FOLDS = 10
-#: Into so many parts a recording is divided to see a drift, at so many pictures of each.
+#: Into so many parts a recording is divided to see a drift, at so many frames of each.
 _PARTS, _LOOKS = 8, 40
 #: A touched taxel reads so many times its drift.
 _TIMES = 4
@@ -238,7 +238,7 @@ def _advice(
     if chance and any(isinstance(encoder, Moments) for encoder in made.recipe.encoder._each()):
         return Advice(
             "other kinds",
-            f"{chance}: the inputs of this recipe are moments of the picture, as area and load, and its centre, which "
+            f"{chance}: the inputs of this recipe are moments of the frame, as area and load, and its centre, which "
             "is tried where these tell too few; where kinds differ otherwise, --recipe gait_plate, whose inputs are "
             "the taxels, may tell them, and taxel information says whether they differ; or labels are few or mixed up",
             "--recipe",
@@ -294,7 +294,7 @@ def fallen(examples: Sequence[Example]) -> str:
     """Return that the values of an example fall from their rest, and what turns them; "" where none do."""
     for example in examples:
         source = recorded(example.source, hold=False)
-        if isinstance(source, Frames) and (rest := of_pictures(source)).falls:
+        if isinstance(source, Frames) and (rest := of_frames(source)).falls:
             return f"{example.name}: " * bool(example.name) + rest.fall(getattr(example.source, "path", None))
     return ""
 
@@ -324,7 +324,7 @@ def _loaded(example: Example, encoder: Encoder) -> int:
 
 
 def _at(source: Events | Frames, t_us: int) -> Frames:
-    """Return the picture at a time."""
+    """Return the frame at a time."""
     if isinstance(source, Events):
         return Frames.from_events(source, 1, t_us, t_us + 1)
     place = max(0, int(np.searchsorted(source.t, t_us, side="right")) - 1)
@@ -335,7 +335,7 @@ def drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
     """Return how many taxels drifted above a tare by more than the noise floor; 0 where it may be a load.
 
     A taxel counts that reads no more in the first eighth of the recording and more in the last, in nine of ten
-    pictures, came there little by little, and reads four times as much while it is touched: a load that stays comes at
+    frames, came there little by little, and reads four times as much while it is touched: a load that stays comes at
     once, or is all that a taxel reads. A quarter of the taxels that were touched must do so, and two at least.
 
     Parameters
@@ -349,12 +349,12 @@ def drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
         return 0
     if isinstance(source, Events):
         source = Frames.from_events(source, max(1, int(after[-1] - after[0]) // (_PARTS * _LOOKS)), int(after[0]))
-    pictures = source.between(tare.stop_us, np.inf)
-    pictures = pictures[:: max(1, len(pictures) // (_PARTS * _LOOKS))]
-    looks = len(pictures) // _PARTS
+    frames = source.between(tare.stop_us, np.inf)
+    frames = frames[:: max(1, len(frames) // (_PARTS * _LOOKS))]
+    looks = len(frames) // _PARTS
     if looks < _LOOKS // 4:
         return 0
-    values = tare.off(pictures).values[: _PARTS * looks]
+    values = tare.off(frames).values[: _PARTS * looks]
     above, most = _core.touched_above(noise_floor), values.max(axis=0)
     least = np.quantile(values.reshape(_PARTS, looks, *most.shape), 0.1, axis=1)
     slowly = np.diff(least, axis=0).max(axis=0) <= least[-1] / 2

@@ -64,7 +64,7 @@ def tune(
     releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
     where exactly two are nearer to onsets than to ends, or where there are only two: then thresholds of the area at
     each of `AGES_MS` are tried too, on a logarithmic scale, and hold for both where they are better for both together.
-    Of pictures each counts once that holds at one of these ages.
+    Of frames each counts once that holds at one of these ages.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def sensor(place: str, array: Array) -> Array:
 
 
 def table(place: Path | str, held: Events | Frames) -> Events | Frames:
-    """Return events or pictures of a file, if their sensor and their times are within the limits.
+    """Return events or frames of a file, if their sensor and their times are within the limits.
 
     Raises
     ------

@@ -189,7 +189,7 @@ def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.
             raise FormatError(
                 f"{path.name}: {size} bytes; {samples} samples of format 212 are {3 * ((samples + 1) // 2)}"
             )
-        # A picture of one channel has 12 bytes.
+        # A frame of one channel has 12 bytes.
         unpacked(path.name, 12 * samples)
         read = Growing(path.name, values=((), np.int16))
         while data := file.read(3 * _AT_ONCE):

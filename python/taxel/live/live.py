@@ -218,7 +218,7 @@ class Live:
     def copies(self) -> _core.Copies:
         """Return what copies everything that arrives from now on, for other computers.
 
-        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("picture", JSON) ten
+        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("frame", JSON) ten
         times a second, ("detection", JSON); ``is_over()`` says whether the pipeline has ended and all were taken.
         """
         return self._core.copy()
@@ -290,9 +290,9 @@ class Live:
         return self._core.counters()
 
     @property
-    def picture(self) -> NDArray[np.uint16]:
+    def frame(self) -> NDArray[np.uint16]:
         """Values that the taxels hold, ticks, shape (rows, columns), ten times a second; 0 without any event so far."""
-        return self._core.picture().reshape(self.array.shape)
+        return self._core.frame().reshape(self.array.shape)
 
     @property
     def tare(self) -> Tare | None:

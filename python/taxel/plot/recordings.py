@@ -85,7 +85,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         over.plot((frames.t - begin_us) / 1e6, frames.total(), color="black", linewidth=0.8)
         over.set_ylabel(escaped(f"sum of taxels ({frames.unit})"))
         above = above_rest(recording)
-        assert above is not None  # of pictures
+        assert above is not None  # of frames
         pressed, _, rest = above
         if rest.falls:
             # Above the rest of readings that fall is nothing but noise.

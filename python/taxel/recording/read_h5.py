@@ -1,4 +1,4 @@
-"""Reads events or pictures of a .h5 that taxel wrote (`taxel.recording.write_h5`)."""
+"""Reads events or frames of a .h5 that taxel wrote (`taxel.recording.write_h5`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reads chosen topics of a ROS bag: each as a source of pictures."""
+"""Reads chosen topics of a ROS bag: each as a source of frames."""
 
 from __future__ import annotations
 

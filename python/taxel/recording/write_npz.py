@@ -1,6 +1,6 @@
-"""Writes events or pictures as named columns, the common layout of .npz and .h5.
+"""Writes events or frames as named columns, the common layout of .npz and .h5.
 
-Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and ``markers``; pictures are
+Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and ``markers``; frames are
 ``values t unit``. ``held`` is the values of the taxels at the beginning; ``about`` is JSON with all other fields.
 ``digest`` is a checksum over all of these, by which damage is found that the formats themselves do not notice.
 """

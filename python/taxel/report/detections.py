@@ -46,7 +46,7 @@ _MOMENTS, _AROUND = 4, 6.0
 _MISSED_MS = 50.0
 #: Files that `taxel view` shows, and the largest number of them that the page lists.
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
-#: Recordings of pictures whose sums are drawn, and stretches of a curve, each with its greatest value.
+#: Recordings of frames whose sums are drawn, and stretches of a curve, each with its greatest value.
 _MOST_SUMS, _STRETCHES = 4, 1000
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
@@ -187,9 +187,9 @@ def _drawn(figure: Figure | None) -> Markup | None:
 
 
 def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
-    """Draw the sum of each recording of pictures over time, so of each foot, and what was detected."""
-    pictures = [(outcome, recorded(outcome.example.source, hold=False)) for outcome in listened]
-    shown = [(outcome, of) for outcome, of in pictures if isinstance(of, Frames) and len(of)][:_MOST_SUMS]
+    """Draw the sum of each recording of frames over time, so of each foot, and what was detected."""
+    of_outcomes = [(outcome, recorded(outcome.example.source, hold=False)) for outcome in listened]
+    shown = [(outcome, of) for outcome, of in of_outcomes if isinstance(of, Frames) and len(of)][:_MOST_SUMS]
     if not shown:
         return None
     figure, axes = plt.subplots(
@@ -197,7 +197,7 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
     )
     for axis, (outcome, frames) in zip(axes[:, 0], shown, strict=True):
         of = series(Recording(Contents.of(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare)
-        assert of is not None  # pictures have values
+        assert of is not None  # frames have values
         total, unit = (of.total, of.unit) if of.force is None else (of.force, "N")
         begins = np.arange(0, len(total), 1 + len(total) // _STRETCHES)
         seconds, most = (of.t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total, begins)

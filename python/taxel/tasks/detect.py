@@ -25,7 +25,7 @@ from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.open_options import sensors_of
-from taxel.recording.rest import FORCE_UNITS, of_pictures
+from taxel.recording.rest import FORCE_UNITS, of_frames
 from taxel.spikes import SpikeTrains
 from taxel.tasks.labels import GivenLabels, references
 from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
@@ -259,7 +259,7 @@ def _naming(recording: str) -> Iterator[None]:
 
 def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
     source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
-    if isinstance(source, Frames) and (quiet := of_pictures(source)).falls:
+    if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         return f"rest: {quiet.text(getattr(outcome.example.source, 'path', None))}"
     # The local load tracks the rest.
     floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []

@@ -34,7 +34,7 @@ class EncodeOptions:
     parameters : mapping of str to value
     tare : Tare, path or float (s), optional
         The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of the recording. Default: 0
-        of pictures in a unit of force or pressure, else none.
+        of frames in a unit of force or pressure, else none.
 
     Raises
     ------
@@ -128,6 +128,6 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
         encoder = encoder if rest is None else encoder.with_tare(rest)
         events = recording.has_events
         count = len(recording.events) if events else len(recording.frames())
-        show(f"encoding {counted(count, 'event' if events else 'picture')}", 0, 0)
+        show(f"encoding {counted(count, 'event' if events else 'frame')}", 0, 0)
         trains = encoder.encode(recording)
     return Encoded(trains, encoder, tuple(warnings))

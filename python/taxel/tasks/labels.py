@@ -162,7 +162,7 @@ def _within(table: Labels, recording: Recording, argument: str) -> dict[str, NDA
 
 def _span(recording: Recording) -> str:
     first, last = span_us(recording)
-    more = "" if recording.timed else ", whose pictures are numbered (rate_hz gives them times)"
+    more = "" if recording.timed else ", whose frames are numbered (rate_hz gives them times)"
     begin = beginning_us(np.array([first]))
     if begin:
         more = f"; it begins {begun(begin)}, {begin} us since 1970, and labels must count from 1970 too"
@@ -172,7 +172,7 @@ def _span(recording: Recording) -> str:
 def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where: str) -> dict[str, NDArray[np.int64]]:
     """Return the events that lie within a recording; say which are left out as they do not, and which may not.
 
-    A picture holds until the next one would come. A board sends nothing where nothing changes, so that the end of its
+    A frame holds until the next one would come. A board sends nothing where nothing changes, so that the end of its
     recording may lie behind its last event: an event soon after that counts, and is named.
     """
     total = sum(map(len, events.values()))
@@ -180,14 +180,14 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         return dict(events)
     first, last = span_us(recording)
     if recording.has_events:
-        held, stretch = recording.events, recording._contents.one.timing.stretch
+        held, stretch = recording.events, recording._contents.main.timing.stretch
         seen = [last, *(t for t, _ in held.markers), *(() if stretch is None else stretch()[1:])]
         # A heartbeat or a frame without events is a sign of life, too.
         end = max(seen if recording.clock is None else [*seen, *recording.clock.board_us[-1:].tolist()])
         near_us, late_us = _NEAR_US, _LATE_US
     else:
-        pictures = recording.frames().t
-        end = last + (int(np.median(np.diff(pictures))) if len(pictures) > 1 else 0)
+        frames = recording.frames().t
+        end = last + (int(np.median(np.diff(frames))) if len(frames) > 1 else 0)
         near_us, late_us = 0, 0
     inside = {label: t[(t >= first) & (t <= end + late_us)] for label, t in events.items()}
     behind = sorted((int(one), label) for label, t in inside.items() for one in t[t > end + near_us])

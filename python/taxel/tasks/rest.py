@@ -34,8 +34,8 @@ GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
-#: Of fewer pictures the noise is not known.
-_LEAST_PICTURES = 20
+#: Of fewer frames the noise is not known.
+_LEAST_FRAMES = 20
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
@@ -81,7 +81,7 @@ class TakenRest:
 def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     """Return the rest of a recording's taxels as each detection takes it: the page's, the shell's and Python's.
 
-    It is the given one; else 0 of pictures in a unit of force or pressure; else that of the first quiet stretch of half
+    It is the given one; else 0 of frames in a unit of force or pressure; else that of the first quiet stretch of half
     a second in which nothing lies on the array, for a board's events on their held values. Labels and notes never
     count.
 
@@ -182,7 +182,7 @@ def seconds_of(tare: GivenTare) -> float | None:
 
 
 def given_or_by_unit(tare: GivenTare | None, recording: Recording) -> Tare | None:
-    """Return the tare that is given; without one 0 of pictures in a unit of force or pressure, else none."""
+    """Return the tare that is given; without one 0 of frames in a unit of force or pressure, else none."""
     if tare is not None:
         return given_tare(tare, recording)
     source = recorded(recording, hold=False)
@@ -203,8 +203,8 @@ def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frame
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
     """Return the tare of the time before a recording's first label, or before the board's start marker.
 
-    Of pictures in a unit of force or pressure it is 0, as everywhere (`taxel.recording.rest`).
-    A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 pictures come before
+    Of frames in a unit of force or pressure it is 0, as everywhere (`taxel.recording.rest`).
+    A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 frames come before
     it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
     away, the tare is of the longest time without it, before the label if there is one; a warning says so.
     """
@@ -217,7 +217,7 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
         warn(said, stacklevel=2)
     if tare is not None:
         return tare
-    if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_PICTURES <= len(source):
+    if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_FRAMES <= len(source):
         quiet = of_quiet(source).quiet_us
         if quiet is not None:
             return Tare.take(source, start_us=quiet[0], stop_us=quiet[1], note=str(recording.path))

@@ -93,7 +93,7 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     many = array.taxels > _MOST_CHANNELS
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
         if unit in of:
-            return of[unit], f"pictures in {source.unit}"
+            return of[unit], f"frames in {source.unit}"
     if grids is not None and many and not known:
         # The levels of `_ANY`, 22 trains a taxel, take minutes.
         return grids, what
