@@ -194,12 +194,13 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
 
     capture, wire, earlier = now["capture"], now["wire"], before["capture"]
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
-    damage, lost = f"{damaged:,} bytes and words, {wire['back']:,} events out of order", ""
+    damage = f"{damaged:,} bytes and words, {wire['back']:,} events out of order"
+    lost = f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue"
     if now["wire_version"] == 2:
         second = now["wire_v2"]
         damaged = second["checksum"] + second["short"] + second["foreign"] + second["malformed"]
         damage = f"{damaged:,} datagrams, {second['outside']:,} words, {now['wire_refused']:,} bytes of version 1"
-        lost = f", {second['missing']:,} on the way"
+        lost += f", {second['missing']:,} on the way"
     board = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
     drift = ""
     pace = now["pace"]
@@ -211,11 +212,7 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),
         ("bytes", f"{capture['bytes']:,}", rate(capture["bytes"], earlier["bytes"])),
         ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
-        (
-            "lost",
-            f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue{lost}",
-            "",
-        ),
+        ("lost", lost, ""),
         *_bridged(now["bridged"]),
         ("damaged", damage, ""),
         ("arrival to decoded", delays(now["decode_latency"]), ""),

@@ -17,7 +17,16 @@ from taxel._base.messages import collected
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import READ_HELP, SET_HELP, assignments, progress, say_warnings, tare_option, try_report
+from taxel.cli._recordings import (
+    READ_HELP,
+    SET_HELP,
+    ReportOption,
+    assignments,
+    progress,
+    say_warnings,
+    tare_option,
+    try_report,
+)
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
@@ -81,9 +90,7 @@ def train(
             "--search", help="Choose each neuron's parameters among those that the recipe lists, on held-out data."
         ),
     ] = False,
-    report: Annotated[
-        Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
-    ] = None,
+    report: ReportOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Train neurons to detect labelled events, and save them as a readout.

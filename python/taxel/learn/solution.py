@@ -158,11 +158,6 @@ class _Least(NamedTuple):
     silent: bool | None
 
 
-def _decided(excess: float, rounding: float) -> bool | None:
-    """Return whether an excess is 0 or more; None where its rounding leaves that open."""
-    return None if abs(excess) < rounding else bool(excess >= 0)
-
-
 def _vague(excess: _Floats, rounding: _Floats) -> NDArray[np.bool_]:
     """Return where rounding is a considerable part of an excess, or either is no number."""
     return ~(rounding < _VAGUE * np.abs(excess))

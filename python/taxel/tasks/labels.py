@@ -77,10 +77,7 @@ def _mapped(
 
 def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
     """Warn of events of recordings that are not there: their names may be misspelt."""
-    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
-    known = {
-        name for path, trial, label in trials for name in (table.named(path), table.named(path, trial, label), trial)
-    }
+    known = {name for _, names in _named(table, recordings) for name in names}
     strange = [name for name in table.recordings if name not in known]
     if strange:
         count = counted(sum(row.recording in strange for row in table.rows), "event")
@@ -90,6 +87,12 @@ def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
             f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
             stacklevel=3,
         )
+
+
+def _named(table: Labels, recordings: Sequence[Recording]) -> list[tuple[str, set[str | None]]]:
+    """Return the source of each recording, and the names by which the table may name it."""
+    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
+    return [(label, {table.named(path), table.named(path, trial, label), trial}) for path, trial, label in trials]
 
 
 def _few(names: Iterable[str]) -> str:
@@ -122,8 +125,7 @@ def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> lis
 
 def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]) -> None:
     """Refuse labels of a source that their recording does not have."""
-    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
-    names = [(label, (table.named(path), table.named(path, trial, label), trial)) for path, trial, label in trials]
+    names = _named(table, recordings)
     for row in table.rows:
         labels = {label for label, every in names if row.recording in every}
         if row.source and labels and row.source not in labels:

@@ -16,7 +16,7 @@ from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Judged, Outcome, PlainScore, Recipe, choose, judge, recipes, score
+from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.advice import advised, fallen
 from taxel.detect.examples import checked
 from taxel.detect.floors import measured_floor
@@ -209,16 +209,12 @@ class _Work:
         a_point_s = None if search else (perf_counter() - begun) * INNER * (count + 1)
         own = _own(outcomes, window_ms)
         if scored is None:
-            scored = replace(own, plain=self._plain_score(plan, [outcome.example.labels for outcome in outcomes]))
+            truths, sound = [outcome.example.labels for outcome in outcomes], checked(self.examples)
+            what = sound, list(truths[0]), [clock_of(example) for example in self.examples], floor_of(plan.encoder)
+            scored = replace(own, plain=plain_score(*what, [], truths, window_ms, self.update))
         advice = advised(made, self.examples, scored.together, own.together, a_point_s, scored.plain)
         taken = _taken(self.examples) if self.options.tare is None else ()
         return Training(self.options, self.opened, made, scored, why, advice, outcomes, taken)
-
-    def _plain_score(self, plan: Recipe, truths: Sequence[Mapping[str, Any]]) -> PlainScore:
-        """Return how plain rules do on the recordings that they were tuned on."""
-        clocks = [clock_of(one) for one in self.examples]
-        rest = checked(self.examples), list(truths[0]), clocks, floor_of(plan.encoder)
-        return plain_score(*rest, [], truths, self.options.window_ms, self.update)
 
     def _outcomes(self, made: Trained) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""
