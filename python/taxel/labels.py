@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import path as checked_path
-from taxel._base.arguments import shown, text
+from taxel._base.arguments import checked_path, shown, text
 from taxel._base.errors import refused
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named, whole_file

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, numbers, shown, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, finite, flag, numbers, shown, text, whole
 from taxel._base.errors import refused
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped

@@ -9,8 +9,7 @@ from pathlib import Path
 from types import TracebackType
 
 from taxel import _core
-from taxel._base.arguments import callback, flag, instance, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import callback, checked_path, flag, instance, text, whole
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detect import load

@@ -8,8 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import instance, several, text
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, instance, several, text
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array, of_size

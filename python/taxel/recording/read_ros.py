@@ -43,7 +43,7 @@ class Topics:
         for name in ("topic", "field"):
             _texts(name, getattr(self, name))
         if self.types is not None:
-            arguments.path("types", self.types)
+            arguments.checked_path("types", self.types)
         if self.ros is not None:
             arguments.text("ros", self.ros)
 

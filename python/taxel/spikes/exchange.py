@@ -12,8 +12,7 @@ from uuid import uuid4
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import number, shown, text
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, number, shown, text
 from taxel._base.errors import refused
 from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5

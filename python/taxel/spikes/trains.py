@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.archive import read_arrays
-from taxel._base.arguments import bare, column, floats, instance, nth, number, several, shown, window
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import bare, checked_path, column, floats, instance, nth, number, several, shown, window
 from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused

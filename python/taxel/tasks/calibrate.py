@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import finite, flag, instance, mapping, several
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, finite, flag, instance, mapping, several
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected

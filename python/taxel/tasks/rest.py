@@ -10,8 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, instance, number
 from taxel._base.errors import helped, refused
 from taxel._base.messages import warn
 from taxel._base.number_text import float_of

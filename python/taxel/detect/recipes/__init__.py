@@ -16,8 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import path as checked_path
-from taxel._base.arguments import shown, text
+from taxel._base.arguments import checked_path, shown, text
 from taxel._base.documents import read_json, read_toml
 from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
