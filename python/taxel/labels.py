@@ -149,9 +149,9 @@ class Labels:
         text("source", source)
         place = Path(checked_path("recording", recording))
         names = {row.recording for row in (*self.rows, *self.removed)}
-        own = (trial, "", str(recording), place.name, place.stem)
-        of_source = [f"{name} {source}" for name in own if name] if source else []
-        return next((name for name in (*of_source, *own) if name in names), None)
+        possible = (trial, "", str(recording), place.name, place.stem)
+        of_source = [f"{name} {source}" for name in possible if name] if source else []
+        return next((name for name in (*of_source, *possible) if name in names), None)
 
     def of(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
         """Return the events of a `taxel.Recording` by label, us on its own clock; empty if the table does not name it.
@@ -193,8 +193,8 @@ class Labels:
     def _rows(self, path: Path, source: str, trial: str, among: Sequence[Note] | None = None) -> list[Note]:
         """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own."""
         every = self.rows if among is None else among
-        own = trial in ("", path.name, path.stem)
-        names = {self.named(path), self.named(path, "" if own else trial, source), None if own else trial} - {None}
+        whole = trial in ("", path.name, path.stem)
+        names = {self.named(path), self.named(path, "" if whole else trial, source), None if whole else trial} - {None}
         return [row for row in every if row.recording in names and row.source in ("", source)]
 
     def _replaced(self, path: Path, source: str, trial: str) -> set[int | None]:
@@ -374,8 +374,8 @@ def _others(path: str | os.PathLike[str], rows: Sequence[tuple[Any, ...]]) -> li
     for k in sorted(range(len(rows)), key=lambda k: not rows[k][3]):
         text, t, source, recording, replaces, _ = rows[k]
         same = (text, t, source, replaces)
-        own = (n for n in before if (n.text, n.t, n.source, n.replaces) == same and recording in ("", n.recording))
-        note = next(own, None)
+        alike = (n for n in before if (n.text, n.t, n.source, n.replaces) == same and recording in ("", n.recording))
+        note = next(alike, None)
         if note is None:
             new.append(k)
             continue

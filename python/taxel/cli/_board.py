@@ -52,29 +52,30 @@ CongestionOption = Annotated[
 _TYPES = {"int": int, "float": float, "bool": bool, "str": str}
 
 
-def _parameter(one: Field[Any]) -> inspect.Parameter:
+def _parameter(field: Field[Any]) -> inspect.Parameter:
     """Return the option of the command line that sets an option of `Live`."""
-    words, kind, described = one.metadata["typed"], str(one.type), about(StatedOptions, one.name)
-    flag = words.get("flag", "--" + one.name.replace("_", "-"))
+    words, kind, described = field.metadata["typed"], str(field.type), about(StatedOptions, field.name)
+    flag = words.get("flag", "--" + field.name.replace("_", "-"))
     help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
-    read, default = _TYPES.get(kind, str | None), one.default if kind in _TYPES else None
+    read, default = _TYPES.get(kind, str | None), field.default if kind in _TYPES else None
     if "PathLike" in kind:
         read = Path | None
     elif "Sequence" in kind or "Mapping" in kind:
         read = list[str] | None
     option = typer.Option(flag, metavar=words.get("metavar"), help=help_, **described)
     return inspect.Parameter(
-        one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[read, option]
+        field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[read, option]
     )
 
 
 def with_live_options(command: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that gives a command the options of `Live` that it has, in its argument `options`, by name."""
-    chosen = [one for one in fields(StatedOptions) if command in one.metadata["typed"].get("commands", "live").split()]
+    every = {field: field.metadata["typed"].get("commands", "live") for field in fields(StatedOptions)}
+    chosen = [field for field, commands in every.items() if command in commands.split()]
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
         def call(**typed: Any) -> None:
-            options = {one.name: typed.pop(one.name) for one in chosen}
+            options = {field.name: typed.pop(field.name) for field in chosen}
             work(options=options, **typed)
 
         given = inspect.signature(work, eval_str=True).parameters.items()
@@ -105,8 +106,8 @@ def _registers(
     if rate_hz is None or bits is None:
         raise ProblemError("--rate-hz and --bits belong together: both are those of the taxel.live.Source that sends")
     if preset is not None or address is not None:
-        other = "--preset" if preset is not None else "--from"
-        raise ProblemError(f"--rate-hz and {other}: both state the board's registers; give one of them")
+        option = "--preset" if preset is not None else "--from"
+        raise ProblemError(f"--rate-hz and {option}: both state the board's registers; give one of them")
     return Registers._of_source(Array._of(array), rate_hz, bits)[0]
 
 
@@ -152,15 +153,15 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
 def doubted(counters: dict[str, Any]) -> Iterator[str]:
     """Yield why the drift or the delays of a board and of each other source cannot be, where they cannot."""
     every = {"": counters, **counters["sources"]}
-    for name, one in every.items():
-        if (one.get("pace") or {}).get("doubt"):
-            yield f"{name}: {one['pace']['doubt']}" if name else one["pace"]["doubt"]
+    for name, counts in every.items():
+        if (counts.get("pace") or {}).get("doubt"):
+            yield f"{name}: {counts['pace']['doubt']}" if name else counts["pace"]["doubt"]
 
 
 def exit_code(summary: Summary, array: Array) -> int:
     """Return the exit code for what was received and lost."""
-    unsent = any(one["lost"] for one in summary.counters["sent"])
-    left_out = any(one.get("bytes_in_no_line") for one in summary.counters["sources"].values())
+    unsent = any(counts["lost"] for counts in summary.counters["sent"])
+    left_out = any(counts.get("bytes_in_no_line") for counts in summary.counters["sources"].values())
     if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent or left_out:
         return OUTSIDE
     return WRONG_INPUT if outside(summary.counters, array) else 0

@@ -107,11 +107,11 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     # All recordings share one header.
-    repaired = any(one.found.repaired.any() for one in outcomes)
-    for one in outcomes:
+    repaired = any(outcome.found.repaired.any() for outcome in outcomes)
+    for outcome in outcomes:
         # A label may hold line breaks.
-        head, *rows = csv.reader(io.StringIO(one.found._csv(repaired=repaired), newline=""))
-        name = '"' + Path(one.name).name.replace('"', '""') + '"'
+        head, *rows = csv.reader(io.StringIO(outcome.found._csv(repaired=repaired), newline=""))
+        name = '"' + Path(outcome.name).name.replace('"', '""') + '"'
         if not text.tell():
             table.writerow(["recording", *head])
         for row in rows:

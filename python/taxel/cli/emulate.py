@@ -163,14 +163,14 @@ def _together(typed: _Typed) -> None:
         raise ProblemError("--scene: leave out --replay, --pipe and --rest")
     if others and (typed.scenes is not None or typed.labels is not None or typed.rest):
         raise ProblemError("--scenes, --truth and --rest belong to scenes: leave them out with --replay or --pipe")
-    for name, value, other, there in (
+    for name, value, needed, there in (
         ("--speed", typed.speed, "--replay", typed.replay is not None),
         ("--limit", typed.limit, "--replay", typed.replay is not None),
         ("--noise-floor", typed.noise_floor, "--pipe", typed.pipe),
         ("--baud", typed.baud, "--line", typed.line is not None),
     ):
         if value is not None and not there:
-            raise ProblemError(f"{name} without {other}")
+            raise ProblemError(f"{name} without {needed}")
 
 
 def _played(typed: _Typed) -> tuple[Any, str, dict[str, Any]]:

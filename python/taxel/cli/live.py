@@ -220,10 +220,10 @@ def _print_summary(summary: Summary, guard_frames: float) -> None:
 
 def _unsent(summary: Summary) -> None:
     """Report lines that did not reach their destination."""
-    for one in summary.counters["sent"]:
-        if one["lost"]:
-            why = one["trouble"] or "read too slowly"
-            say(f"taxel: lines not sent to {one['to']}: {one['lost']} of {one['sent'] + one['lost']}: {why}", err=True)
+    for line in summary.counters["sent"]:
+        if lost := line["lost"]:
+            why = line["trouble"] or "read too slowly"
+            say(f"taxel: lines not sent to {line['to']}: {lost} of {line['sent'] + lost}: {why}", err=True)
 
 
 def _together(options: dict[str, Any], typed: _Typed) -> None:
@@ -356,6 +356,8 @@ def _state(now: dict[str, Any], place: str) -> Text:
         return Text(silence)
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
-    sent = "".join(f"\n{counted(one['lost'], 'line')} lost to {one['to']}" for one in now["sent"] if one["lost"])
+    sent = "".join(
+        f"\n{counted(counts['lost'], 'line')} lost to {counts['to']}" for counts in now["sent"] if counts["lost"]
+    )
     dropped = f"\n{counted(now['events_dropped'], 'event')} dropped before the readout" if now["events_dropped"] else ""
     return Text((dropped + sent).lstrip())

@@ -138,7 +138,7 @@ def train(
     lines = [*training.lines(), "", f"written to {out}; next: {_next(training, out, tare)}"]
     lines += [f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()]
     lines += [] if report is None else [f"report: {report / 'report.html'}"]
-    say(*lines, *(f"warning: {one}" for one in training.unreliable()))
+    say(*lines, *(f"warning: {warning}" for warning in training.unreliable()))
 
 
 def _try_rules(place: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:
@@ -149,8 +149,8 @@ def _try_rules(place: Path | None, labels: str, recordings: Sequence[Recording],
         return
     with collected():  # the training warns of the same
         names = {label for events in references(labels, recordings) for label in events}
-    for one in (place, *(_of_label(place, label) for label in sorted(names))):
-        try_whole(one, overwrite=overwrite)
+    for path in (place, *(_of_label(place, label) for label in sorted(names))):
+        try_whole(path, overwrite=overwrite)
 
 
 def _write_rules(plain: PlainScore | None, place: Path | None, *, overwrite: bool) -> dict[Path, list[str]]:
@@ -183,6 +183,6 @@ def _are_quiet(recordings: Sequence[Recording]) -> bool:
     """Return whether a detection finds the rest of each recording by itself."""
     try:
         with collected():
-            return all(taxel.tasks.rest(one) for one in recordings)
+            return all(taxel.tasks.rest(recording) for recording in recordings)
     except ProblemError:
         return False

@@ -252,8 +252,8 @@ def _advice(
 def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:
     """Return how many of a kind of touch are told, where neuron and rule tell no more than chance would; else ""."""
     by = {"the neuron": scored} | ({} if plain is None or plain.together is None else {"the rule": plain.together})
-    said = [_by_chance(label, who, score) for who, score in by.items()]
-    return ", ".join(said) + ", as by chance" if all(said) else ""
+    shares = [_by_chance(label, who, score) for who, score in by.items()]
+    return ", ".join(shares) + ", as by chance" if all(shares) else ""
 
 
 def _by_chance(label: str, who: str, together: Score) -> str:
@@ -266,13 +266,15 @@ def _by_chance(label: str, who: str, together: Score) -> str:
     others = sum(kind.events for kind in kinds) - kind.events
     if kind not in kinds or not others:
         return ""
-    told, taken = kind.found, min(kind.false, others)
+    right, taken = kind.found, min(kind.false, others)
     ways = sum(
-        comb(kind.events, k) * comb(others, told + taken - k) for k in range(told, kind.events + 1) if k <= told + taken
+        comb(kind.events, k) * comb(others, right + taken - k)
+        for k in range(right, kind.events + 1)
+        if k <= right + taken
     )
-    if ways <= _CHANCE * comb(kind.events + others, told + taken):
+    if ways <= _CHANCE * comb(kind.events + others, right + taken):
         return ""
-    return f"{who} tells {told} of {kind.events} and takes {taken} of {others} others for {label}"
+    return f"{who} tells {right} of {kind.events} and takes {taken} of {others} others for {label}"
 
 
 def _for_touch(made: Trained) -> bool:

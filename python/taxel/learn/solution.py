@@ -146,8 +146,8 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
             if not rows.on_grid:
                 slope = min(slope, float(-rows.slope(k)[0] @ w + rows.fall(k)))
         exponentials = exact.left
-    said = (wrong[0] if wrong else None, unproven[0] if unproven else None)
-    return Checked(not wrong and not unproven, missed, float(room), slope, *said)
+    reasons = (wrong[0] if wrong else None, unproven[0] if unproven else None)
+    return Checked(not wrong and not unproven, missed, float(room), slope, *reasons)
 
 
 class _Least(NamedTuple):

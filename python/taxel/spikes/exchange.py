@@ -46,8 +46,8 @@ def write_nwb(
         raise refused("begun", f" is {begun}: must be a date that this machine's clock knows") from None
     if "\0" in text("description", description):
         raise refused("description", f" is {shown(description)}: NWB takes no zero in a text")
-    told = (description, str(uuid4()), begun, times, values, kind, np.array([window_ms]) / 1000.0)
-    write_h5(path, _write, lambda pipe: pickle.dump(told, pipe), overwrite=overwrite)
+    sent = (description, str(uuid4()), begun, times, values, kind, np.array([window_ms]) / 1000.0)
+    write_h5(path, _write, lambda pipe: pickle.dump(sent, pipe), overwrite=overwrite)
     return Path(path)
 
 

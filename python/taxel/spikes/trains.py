@@ -160,8 +160,8 @@ class SpikeTrains(Columns):
         if len(self) != len(other):
             raise ProblemError(f"{counted(len(self), 'train')} and {len(other)}: only equally many are merged")
         if self.signed != other.signed:
-            one, two = sorted((self.kind, other.kind))
-            raise ProblemError(f"{one} and {two} trains: only alike ones are merged; see split_by_sign")
+            first, second = sorted((self.kind, other.kind))
+            raise ProblemError(f"{first} and {second} trains: only alike ones are merged; see split_by_sign")
         times = np.concatenate([self.times, other.times])
         train = np.concatenate(
             [np.repeat(np.arange(len(self)), self.counts), np.repeat(np.arange(len(self)), other.counts)]

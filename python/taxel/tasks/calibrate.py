@@ -189,7 +189,7 @@ def calibrate(
     if not known and (asked.each or asked.exponent is not None):
         raise helped(ProblemError("each and exponent belong to a fit"), "loads", "give")
     with collected() as warnings:
-        made = _calibrated(recording, [instance("loads", one, KnownLoad) for one in known], asked)
+        made = _calibrated(recording, [instance("loads", load, KnownLoad) for load in known], asked)
     return replace(Calibrated(made), warnings=tuple(warnings))
 
 
@@ -207,7 +207,7 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     elif options.table is not None:
         points = _points(Path(options.table), recording.array)
         calibration = Calibration.table(recording.array, *points, of=frames.unit, **how)
-    measured = [_load(frames, one) for one in known]
+    measured = [_load(frames, load) for load in known]
     if measured:
         calibration = Calibration.fit(measured, start=calibration, exponent=options.exponent, each=options.each, **how)
     assert calibration is not None  # one of the three is given

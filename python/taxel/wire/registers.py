@@ -262,8 +262,8 @@ class Registers:
         >>> now.commands_to(now.replace(noise_floor=7))
         [Command(register=5, value=4130560)]
         """
-        other = instance("target", target, Registers)
-        commands = _core.registers_commands(self._json(), other._json(), self.array._parts())
+        wanted = instance("target", target, Registers)
+        commands = _core.registers_commands(self._json(), wanted._json(), self.array._parts())
         return [Command(register, value) for register, value in commands]
 
     def _json(self) -> str:
