@@ -8,8 +8,6 @@ from typing import Any, Protocol
 
 from taxel.live.client import Item, Subject
 
-__all__ = ["KINDS", "Disconnected", "ExternalViewer", "ViewerKind"]
-
 
 class Disconnected(Exception):  # noqa: N818  an expected event, not an error
     """The viewer does not run any more."""

@@ -17,8 +17,6 @@ from taxel.detections import Detection
 from taxel.labels import Note
 from taxel.live.client import Curves, Item, Picture, Spikes, Subject
 
-__all__ = ["ToFoxglove"]
-
 #: Messages that wait for each client; beyond them the server drops the oldest.
 _BACKLOG = 512
 

@@ -17,8 +17,6 @@ from taxel.live._external_viewer import Disconnected
 from taxel.live.client import Curves, Item, Picture, Spikes, Subject
 from taxel.spikes import to_ms
 
-__all__ = ["ToRerun"]
-
 #: Name of the time line, which has the board's times.
 _TIME = "board"
 

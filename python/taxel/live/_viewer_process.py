@@ -23,8 +23,6 @@ from taxel.labels import Note
 from taxel.live._external_viewer import KINDS, Disconnected, ExternalViewer
 from taxel.live.client import Curves, Item, PanelClient, Picture, Spikes, Subject
 
-__all__ = ["BoundedQueue", "main"]
-
 #: The largest numbers of waiting pictures and of other waiting items: curves, spikes, detections, notes.
 MOST_PICTURES, MOST_OTHERS = 32, 1024
 

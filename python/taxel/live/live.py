@@ -28,8 +28,6 @@ from taxel.live.summary import Summary, summary_of
 from taxel.recording.changes import Zeroing
 from taxel.tare import Tare
 
-__all__ = ["Live"]
-
 #: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"
 

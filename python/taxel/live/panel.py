@@ -26,8 +26,6 @@ from taxel.recording.opening import check_recording, recordings_in
 from taxel.recording.pictures import period_us
 from taxel.tare import Tare
 
-__all__ = ["Panel"]
-
 
 class Panel:
     """Serve the live panel, until it is stopped. A context manager.

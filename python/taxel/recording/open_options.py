@@ -19,8 +19,6 @@ from taxel.recording.layout import on_array
 from taxel.recording.opening import joined, sensors
 from taxel.recording.read_foreign import is_lone_array
 
-__all__ = ["OpenOptions", "sensors_of"]
-
 
 @dataclass(frozen=True)
 class OpenOptions:

@@ -42,18 +42,6 @@ from taxel.recording.recording import Recording, noted
 from taxel.recording.sidecars import labels_of, with_sidecars
 from taxel.recording.without_layout import refuse_without_layout
 
-__all__ = [
-    "check_recording",
-    "is_recording",
-    "joined",
-    "open_all",
-    "open_joined",
-    "open_one",
-    "open_recording",
-    "recordings_in",
-    "sensors",
-]
-
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
 

@@ -20,8 +20,6 @@ from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, S
 from taxel.recording.once import UNKNOWN, Once, known
 from taxel.tare import Tare
 
-__all__ = ["FRAMES_HZ", "at_rate", "calibrated", "period_us", "pictures", "times_at"]
-
 #: The default rate of pictures of a recording of events, Hz.
 FRAMES_HZ = 100.0
 

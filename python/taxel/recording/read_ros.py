@@ -22,8 +22,6 @@ from taxel.recording.once import known
 from taxel.recording.parts import Losses, Origin
 from taxel.recording.read_mcap import ascending
 
-__all__ = ["Topics", "read_ros"]
-
 
 @dataclass(frozen=True)
 class Topics:
