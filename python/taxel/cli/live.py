@@ -40,7 +40,6 @@ from taxel.cli._say import say
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout
-from taxel.detections import Detection
 from taxel.device import Cable
 from taxel.encode import Encoder
 from taxel.live import Live, Panel, Summary, Viewer, delays
@@ -289,10 +288,7 @@ def _watch(
                     pipeline, before = panel.live, None
                 if before is None:
                     before = pipeline.counters
-                detection = pipeline.next(REDRAW_S)
-                if detection is not None:
-                    _print(detection, console, echo)
-                _drain(pipeline, console, echo)
+                _drain(pipeline, console, echo, REDRAW_S)
                 now = pipeline.counters
             except ProblemError:
                 if panel is None or panel.live is pipeline:
@@ -320,17 +316,16 @@ def _watch(
                 before = now
 
 
-def _print(detection: Detection, console: Console, echo: Callable[[str], None]) -> None:
-    """Print a detection, with its delay after `known`; with --json the readout's thread has written it."""
-    if not console.quiet:
-        delay = to_ms(detection.latency or 0)
-        echo(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} output {delay:.2f} ms after it was known")
+def _drain(pipeline: Live, console: Console, echo: Callable[[str], None], wait_s: float = 0.0) -> None:
+    """Wait for a detection; print it and all that wait, each with its delay after `known`.
 
-
-def _drain(pipeline: Live, console: Console, echo: Callable[[str], None]) -> None:
-    """Print all detections that wait."""
-    while (detection := pipeline.next(0.0)) is not None:
-        _print(detection, console, echo)
+    With --json the readout's thread has written them.
+    """
+    while (detection := pipeline.next(wait_s)) is not None:
+        wait_s = 0.0
+        if not console.quiet:
+            delay = to_ms(detection.latency or 0)
+            echo(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} output {delay:.2f} ms after it was known")
 
 
 def _silence(now: dict[str, Any], place: str) -> str:

@@ -257,7 +257,10 @@ class SpikeTrains(Columns):
         SpikeTrains(2 trains, 1 spike, 2 to 5 ms)
         """
         start, stop = window("ms", start, stop)
-        return self._where((self.times >= start) & (self.times < stop), start, stop)
+        inside = (self.times >= start) & (self.times < stop)
+        offsets = np.concatenate([[0], np.cumsum(inside)])[self.offsets]
+        values = None if self.values is None else self.values[inside]
+        return self._of_own(self.times[inside], offsets, start, stop, values, self.kind)
 
     def select(self, trains: ArrayLike) -> SpikeTrains:
         """Return the named trains, in the order given.
@@ -364,11 +367,6 @@ class SpikeTrains(Columns):
         if self.kind == "graded":
             raise ProblemError(f"{reader} takes no graded trains: their spikes have values, which it does not read")
         return self
-
-    def _where(self, keep: NDArray[np.bool_], start: float, stop: float) -> SpikeTrains:
-        offsets = np.concatenate([[0], np.cumsum(keep)])[self.offsets]
-        values = None if self.values is None else self.values[keep]
-        return self._of_own(self.times[keep], offsets, start, stop, values, self.kind)
 
     def to_numpy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return times (ms) and train numbers of all spikes, by train."""
