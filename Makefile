@@ -9,7 +9,7 @@ SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-br
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
 	@echo "make test   the product's tests but the slow ones      make slow   the slow ones of all"
-	@echo "make test-studies  the tests of studies and benchmarks  make rtl-test  those of the FPGA logic"
+	@echo "make test-studies  the tests of the distributions beside it  make rtl-test  those of the FPGA logic"
 	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
@@ -25,10 +25,10 @@ check:
 	@command -v cc >/dev/null || { echo "taxel needs a C compiler: on Debian, apt install build-essential"; exit 1; }
 
 # What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
-# Of studies and benchmarks, distributions of their own in this repository, that is what they need beside taxel.
-BESIDE := studies benchmarks
+# Of the distributions of their own in this repository, that is what they need beside taxel.
+BESIDE := studies benchmarks viewers
 PROJECTS := pyproject.toml $(BESIDE:%=%/pyproject.toml)
-wanted = $(BIN)/python -c 'import sys, tomllib; p, s, b = (tomllib.load(open(f, "rb"))["project"] for f in "$(PROJECTS)".split()); extras = p["optional-dependencies"] | s["optional-dependencies"] | b["optional-dependencies"] | {"studies": s["dependencies"]}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), p["dependencies"]) if not x.startswith("taxel")))'
+wanted = $(BIN)/python -c 'import sys, tomllib; projects = [tomllib.load(open(f, "rb"))["project"] for f in "$(PROJECTS)".split()]; extras = {"beside": [x for p in projects[1:] for x in p["dependencies"]]} | {k: v for p in projects for k, v in p["optional-dependencies"].items()}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), projects[0]["dependencies"]) if not x.startswith("taxel")))'
 # Python compiles a module when it is first imported; compiling all of them at once takes ten seconds of the first minutes.
 # Where it may not store what it compiled, each start would compile them all again.
 install = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile)
@@ -41,7 +41,7 @@ $(VENV)/.installed: $(PROJECTS) | check
 	@touch $@
 
 # One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-dist.
-EXTRAS_test := test studies foxglove neo nir nwb cluster bench
+EXTRAS_test := test beside foxglove neo nir nwb cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist
@@ -107,7 +107,8 @@ test-studies: released $(VENV)/.for-test
 slow: released $(VENV)/.for-test dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
-	$(BIN)/python -m pytest -q -m slow tests $(BESIDE)
+	$(BIN)/python -m pytest -q -m slow
+	$(BIN)/python -m pytest -q -m slow $(BESIDE)
 
 # Either build of the extension does.
 lint: $(VENV)/.for-test $(VENV)/.for-lint
@@ -187,7 +188,7 @@ PEERS := .venv-peers
 $(PEERS)/.installed: $(PROJECTS) | $(VENV)/.installed
 	@echo "taxel: installing its peers into $(PEERS)"
 	@$(PYTHON) -m venv $(PEERS)
-	@$(wanted) bench test studies peers > $(PEERS)/wanted.txt
+	@$(wanted) bench test beside peers > $(PEERS)/wanted.txt
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -r $(PEERS)/wanted.txt
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps $(BESIDE:%=--editable %)
 	@touch $@

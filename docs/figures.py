@@ -16,8 +16,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from taxel.report import code_version
 from taxel_studies import STUDIES, load
+from taxel_studies.commit import code_version
 from taxel_studies.kept import keep_coarse
 from taxel_studies.study import drawn
 

@@ -111,6 +111,17 @@ def test_the_studies_install_beside_the_wheel(tmp_path: Path) -> None:
     assert (tmp_path / "report" / "index.html").exists()
 
 
+def test_the_viewers_install_beside_the_wheel(tmp_path: Path) -> None:
+    bare = Bare(tmp_path)
+    bare.install("--find-links", str(DIST), str(the("taxel_viewers-*.whl")))
+    assert "\n  show  " in bare.run("taxel", "--help").stdout
+    ended = bare.run("taxel", "show", "walk.mcap", "foxglove")
+    assert (ended.returncode, ended.stderr) == (
+        2,
+        "taxel: foxglove is not installed: pip install 'taxel[foxglove]'\n",
+    )
+
+
 def test_the_benchmarks_install_beside_the_wheel(tmp_path: Path) -> None:
     bare = Bare(tmp_path)
     bare.install("--find-links", str(DIST), str(the("taxel_benchmarks-*.whl")))

@@ -89,10 +89,8 @@ THOUSANDS = {
     "taxel.detect.exchange": "NIR counts in seconds and volts",
     "taxel.demo": "seconds, kbit/s, seeds",
     "taxel.information.answers": "bits a thousand events",
-    "taxel.information.codes": "Hz",
     "taxel.information.wire_rate": "kbit/s",
     "taxel.report.detections": "seconds",
-    "taxel.live._to_foxglove": "ns",
 }
 
 

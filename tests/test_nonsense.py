@@ -262,7 +262,6 @@ MEANS = [
     ("infinity", "to the end", ["Events.between(stop)", "Frames.between(stop)", "Detections.between(stop)"]),
     ("infinity", "to the end", ["Recording.between(stop)", "cut(stop_us)", "detect.Part(stop)"]),
     ("infinity", "for ever", ["device.Cable.reopen(within)", "device.Device(patience)"]),
-    ("infinity", "no neighbour", ["information.NearestNeighbours.predict(distances)"]),
     ("infinity", "no spike is moved", ["metrics.victor_purpura(q)"]),
     ("infinity", "no spike is moved", ["metrics.victor_purpura_multi_unit(q)", "metrics.victor_purpura_multi_unit(k)"]),
     ("NaN", "its reader has checked the row", ["Note(t)", "Note(at_ns)", "Note(replaces)"]),

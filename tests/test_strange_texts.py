@@ -199,7 +199,11 @@ def view(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
     yield ["view", places[".mcap"], "--no-open", "--seconds", "0.3"]
     yield ["view", shutil.copy(places[".mcap"], out / f"{CELL}\ntaxel: forged.mcap"), "--no-open", "--seconds", "0.3"]
     yield ["view", places["layout"], "--no-open", "--seconds", "0.3"]
-    yield ["view", places["table"].parent, "--no-open", "--seconds", "0.3", "--to", NAME]
+
+
+def show(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
+    yield ["show", places[".mcap"], NAME]
+    yield ["show", NAME, "foxglove:0"]
 
 
 def demo(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
@@ -218,7 +222,7 @@ COMMANDS: dict[str, Commands] = {
     one.__name__: one
     for one in (
         bench, bridge, calibrate, convert, cut, demo, detect, device, emulate, encode, export, info, information, live,
-        merge, record, simulate, study, train, view,
+        merge, record, show, simulate, study, train, view,
     )
 }  # fmt: skip
 

@@ -18,7 +18,11 @@ PARTS = {
     "border": "crates/taxel-python/src",
     "python/taxel": "python/taxel",
 }
-BESIDE = {"studies": "studies/taxel_studies", "benchmarks": "benchmarks/taxel_benchmarks"}
+BESIDE = {
+    "studies": "studies/taxel_studies",
+    "benchmarks": "benchmarks/taxel_benchmarks",
+    "viewers": "viewers/taxel_viewers",
+}
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\(\w+\))?\s+)?mod\s+\w+\s*(;|\{)")
 
 

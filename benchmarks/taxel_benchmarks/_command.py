@@ -62,7 +62,8 @@ def bench(
 
     Example: taxel bench wire_decode
     """
-    from taxel.report import code_version, write_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel.report import write_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel_studies.commit import code_version  # noqa: PLC0415
 
     # The modules that benchmarks share have names that begin with an underscore.
     files = {path.stem: path for folder in taxel_benchmarks.__path__ for path in sorted(Path(folder).glob("[!_]*.py"))}

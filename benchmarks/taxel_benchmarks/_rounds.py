@@ -94,7 +94,7 @@ def thread_seconds() -> dict[str, float]:
 
 def stamp(*packages: str) -> dict[str, Any]:
     """Return machine, versions and commit; `taxel bench` writes a result of a clean commit only."""
-    from taxel.report import code_version  # noqa: PLC0415  what a benchmark measures is loaded by itself
+    from taxel_studies.commit import code_version  # noqa: PLC0415  what a benchmark measures is loaded by itself
 
     versions = {"python": platform.python_version()}
     versions |= {package: version(package) for package in ("taxel", "numpy", *packages)}

@@ -14,11 +14,10 @@ import time
 import numpy as np
 
 from taxel import Array, SpikeTrains
-from taxel.information.neighbours import distances_of
 from taxel.metrics import pairwise
 from taxel_benchmarks._goals import at_most, not_slower
 from taxel_benchmarks._rounds import compared, measure, stamp
-from taxel_studies.dropped import REGION, smoothed, spatial_grams
+from taxel_studies.dropped import REGION, distances_of, smoothed, spatial_grams
 
 PERIOD_MS, SAMPLES, SPIKES = 1.0, 50, 740
 TAUS_MS = [round(0.1 * k, 1) for k in range(1, 21)]

@@ -12,19 +12,18 @@ and the same predictions.
 """
 
 import resource
-import sys
 import time
-import warnings
 from functools import partial
 
 import numpy as np
 
 from taxel import Array, Frames
 from taxel.encode import FA1
-from taxel.information import LDA, fold_predictions, folds
+from taxel.information import folds
 from taxel_benchmarks._goals import at_least, not_slower
 from taxel_benchmarks._peer import missing
 from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_studies.discriminants import LDA, fold_predictions
 
 FOLDS = 10
 PARTS = "against scikit-learn"
@@ -94,15 +93,10 @@ def against_scikit_learn(table, absent, quick):
         predicted[solver] = discriminant.predict(small[test])
 
     peers = {} if absent else {f"scikit-learn {solver}, one fold": partial(theirs, solver) for solver in SOLVERS}
-    with warnings.catch_warnings():
-        # Ours warns of the number of directions that it uses; the result lists that number as `rank`.
-        warnings.simplefilter("ignore", UserWarning)
-        results = measure(
-            {"taxel, one fold": ours, **peers, "taxel, ten folds": ten},
-            rounds=1 if quick else 3,
-            warm_up=quick,
-        )
-        rank = LDA().fit(x[train], y[train]).rank_
+    results = measure(
+        {"taxel, one fold": ours, **peers, "taxel, ten folds": ten}, rounds=1 if quick else 3, warm_up=quick
+    )
+    rank = LDA().fit(x[train], y[train]).rank_
     found = {
         "size": [trials, features, classes],
         "features that fire": int(np.count_nonzero(x[train].any(0))),
@@ -130,9 +124,7 @@ def full_size(share, features=5000):
     x, y = rasters(trials, features, classes, 2)
     fold = folds(y, count=FOLDS, seed=1)
     wall, cpu = time.perf_counter(), time.process_time()
-    predicted = fold_predictions(
-        x, y, fold, progress=lambda done, of: print(f"step {done} of {of}", file=sys.stderr, flush=True)
-    )
+    predicted = fold_predictions(x, y, fold)
     return {
         "size": [trials, features, classes],
         "share": share,

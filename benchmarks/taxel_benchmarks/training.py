@@ -3,7 +3,7 @@
 *As the board plays them*: ten trainings, each a recording of ten scenes of `taxel emulate` (some 25 touches), judged on
 45 other scenes of its own (some 100 touches, so some 1000 in all); the first recordings are also sent over
 loopback to a live readout. *Worn*: noise of .3, .6, 1.2 and 2.4 ticks, a tare 10 minutes old that drifts by 1 tick a
-minute, and bad taxels (3 stuck, 2 flickering, a flickering pair: `taxel.simulate.worn`), each with a training on ten
+minute, and bad taxels (3 stuck, 2 flickering, a flickering pair: `_worn.worn`), each with a training on ten
 such scenes and 20 others to judge. *An object stays*: a ball falls and lies for 2.9 s, another falls beside it, and the
 first is pressed; a training on ten scenes, judged on 40. Neuron and rule are tuned on the same recording. A touch is
 found within 50 ms of its true begin or end. The seeds that tuned the recipe (300 to 304) are others. *Time*: folds,
@@ -35,9 +35,10 @@ from taxel.detect.folds import count_of_folds
 from taxel.detections import Detections
 from taxel.encode import Composite, LocalLoad
 from taxel.live import Live
-from taxel.simulate import Contact, Scene, emulate, play, truth, worn
+from taxel.simulate import Contact, Scene, emulate, play, truth
 from taxel_benchmarks._goals import Goal, at_least, at_most
 from taxel_benchmarks._rounds import stamp
+from taxel_benchmarks._worn import worn
 
 LABELS = ("contact", "lift")
 WINDOW_MS = 50.0

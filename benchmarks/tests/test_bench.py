@@ -61,7 +61,7 @@ def test_a_result_of_changed_code_is_refused(folder: Path, capsys, monkeypatch: 
     place = folder / "results" / "fast.json"
     before = place.read_text()
     for code, refused in (("0123abc with local changes, 1", True), ("0123abc", False)):
-        monkeypatch.setattr("taxel.report.code_version", lambda *packages, code=code: code)
+        monkeypatch.setattr("taxel_studies.commit.code_version", lambda *packages, code=code: code)
         assert call(capsys, "bench", "fast", "--quick", "--results", folder / "results")[0] == 0
         assert place.read_text() == before
         ended, _, err = call(capsys, "bench", "fast", "--results", folder / "results")
@@ -176,7 +176,7 @@ def test_a_result_with_peers_is_not_replaced_by_one_without(
         "_run",
         lambda name, quick: {"ratios": {"of the run": 1.0}, "machine": {"cores": 2}, "left out": {"peer": "absent"}},
     )
-    monkeypatch.setattr("taxel.report.code_version", lambda *packages: "0123abc")
+    monkeypatch.setattr("taxel_studies.commit.code_version", lambda *packages: "0123abc")
     place = folder / "results" / "fast.json"
     place.unlink()
     if saved is not None:

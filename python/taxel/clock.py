@@ -83,11 +83,6 @@ class Clock:
         own, host = self._knots
         return float((host[-2] - host[1]) / ((own[-2] - own[1]) * 1000) - 1) * 1e6
 
-    @property
-    def offset_ns(self) -> int:
-        """The host's time at time 0 of the source, ns since 1970."""
-        return int(self.host_ns(0))
-
     def host_ns(self, board_us: int | NDArray[np.int64]) -> Any:
         """Return the host's time (ns since 1970) at times of the source (us).
 

@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import checked_path, shown, text
 from taxel._base.errors import refused
 from taxel._base.files import beside as beside_file
-from taxel._base.files import named, whole_file
+from taxel._base.files import named
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import counted, escaped
 from taxel._base.number_text import int_of
@@ -35,7 +34,6 @@ __all__ = [
     "source_of",
     "text_with",
     "trial_of",
-    "write_labels",
 ]
 
 #: The period after which the board's 16-bit clock of 100 us wraps, us.
@@ -320,70 +318,6 @@ def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n"
     table.writerow(header)
     table.writerows([[row.get(name, "") for name in header] for row in cells])
     return text.getvalue()
-
-
-def write_labels(
-    path: str | os.PathLike[str],
-    labels: Iterable[tuple[Any, ...]],
-) -> None:
-    r"""Write a table `label,t_us` in the order of time; an existing one is replaced atomically.
-
-    Columns of the existing table that taxel does not know stay with their labels; of a single label that changed too.
-
-    Parameters
-    ----------
-    path : path
-    labels : iterable of (label, us), and behind them the source, the trial, the time of the note that it replaces (us),
-        and its time by the host's clock (ns since 1970)
-        The table has a column `source`, and one `recording` with the trials of a file that holds several, if any label
-        has one that is not "", `replaces_us` if any replaces a note of the recording, and `host_ns` if any has a time
-        by the host's clock.
-
-    Raises
-    ------
-    FormatError : the existing one is no table of labels (names the line)
-    OSError : the disk is full, the table is write-protected
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> place = Path(tempfile.mkdtemp()) / "walk.notes.csv"
-    >>> write_labels(place, [("lift", 900), ("contact", 400)])
-    >>> place.read_text()
-    'label,t_us\ncontact,400\nlift,900\n'
-    """
-    rows: list[tuple[Any, ...]] = sorted(labels, key=lambda row: row[1])
-    full = [(*row, *("", "", None, None)[len(row) - 2 :]) for row in rows]
-    notes = [
-        Note(text, t, host_ns or 0, trial, source, replaces, tuple(others.items()))
-        for (text, t, source, trial, replaces, host_ns), others in zip(full, _others(path, full), strict=True)
-    ]
-    with whole_file(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
-        file.write(text_with(notes))
-
-
-def _others(path: str | os.PathLike[str], rows: Sequence[tuple[Any, ...]]) -> list[dict[str, str]]:
-    """Return what the columns of an existing table that taxel does not know say of each label to write."""
-    before = []
-    if Path(checked_path("path", path)).is_file():
-        table = Labels(path)
-        before = [*table.rows, *table.removed]
-    found: list[dict[str, str]] = [{} for _ in rows]
-    new = []
-    # A row of the table's own recording may have lost its name: those with one are found first.
-    for k in sorted(range(len(rows)), key=lambda k: not rows[k][3]):
-        text, t, source, recording, replaces, _ = rows[k]
-        same = (text, t, source, replaces)
-        alike = (n for n in before if (n.text, n.t, n.source, n.replaces) == same and recording in ("", n.recording))
-        note = next(alike, None)
-        if note is None:
-            new.append(k)
-            continue
-        before.remove(note)
-        found[k] = dict(note.others)
-    if len(new) == len(before) == 1:
-        found[new[0]] = dict(before[0].others)
-    return found
 
 
 def _row(place: str, cells: Mapping[str, str]) -> Note:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from taxel import information
 from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
+from taxel_studies import spike_codes
 from taxel_studies.codes import drop_tasks, kinds_of
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
@@ -110,11 +110,11 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
         trials = [SpikeTrains.from_lists(r.result[array]["first_ms"], start=0.0, stop=longest + 1.0) for r in rows]
         summary["bits"][array] = {}
         for window in p["windows_ms"]:
-            codes: dict[str, information.Code] = {
-                "first": information.FirstSpikeLatency(window_ms=window),
-                "relative": information.RelativeLatency(window_ms=window),
+            codes: dict[str, spike_codes.Code] = {
+                "first": spike_codes.FirstSpikeLatency(window_ms=window),
+                "relative": spike_codes.RelativeLatency(window_ms=window),
             }
-            bits = information.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
+            bits = spike_codes.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
             summary["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in bits.items()}
         results = [r.result[array] for r in rows]
         touched_s = np.array([1e-3 * r.result["touched_ms"] for r in rows])

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from taxel import information
 from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
+from taxel_studies import spike_codes
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
 
@@ -51,15 +51,15 @@ NAMES = {
 }
 
 
-def codes(window_ms: float) -> dict[str, information.Code]:
+def codes(window_ms: float) -> dict[str, spike_codes.Code]:
     """Return the four codes over a window."""
     resolution = PERIOD_US * 1e-3
     return {
         # At most one spike falls into a frame.
-        "rate": information.RateCode(window_ms=window_ms, most_hz=1e6 / PERIOD_US),
-        "first": information.FirstSpikeLatency(window_ms=window_ms, resolution_ms=resolution),
-        "relative": information.RelativeLatency(window_ms=window_ms, resolution_ms=resolution),
-        "rank": information.RankOrder(window_ms=window_ms, resolution_ms=resolution),
+        "rate": spike_codes.RateCode(window_ms=window_ms, most_hz=1e6 / PERIOD_US),
+        "first": spike_codes.FirstSpikeLatency(window_ms=window_ms, resolution_ms=resolution),
+        "relative": spike_codes.RelativeLatency(window_ms=window_ms, resolution_ms=resolution),
+        "rank": spike_codes.RankOrder(window_ms=window_ms, resolution_ms=resolution),
     }
 
 
@@ -126,7 +126,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     for window in p["windows_ms"]:
         every = codes(window)
         for name, onsets in (("bits", np.zeros(len(rows))), ("slipped", -slips)):
-            estimates = information.compare_codes(trials, labels, every, onsets_ms=onsets, folds=folds, seed=p["seed"])
+            estimates = spike_codes.compare_codes(trials, labels, every, onsets_ms=onsets, folds=folds, seed=p["seed"])
             summary[name][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in estimates.items()}
         counted = np.mean([[np.count_nonzero(np.asarray(t) < window) for t in row.result] for row in rows])
         summary["spikes"][f"{window:g}"] = float(counted)

@@ -17,7 +17,7 @@ from taxel.array import Array
 from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.information import NearestNeighbours
+from taxel.information.nested import majority, squared_distances
 from taxel.report import write_whole
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
@@ -39,6 +39,7 @@ __all__ = [
     "Rig",
     "absolute_distances",
     "conditions",
+    "distances_of",
     "named",
     "named_by_neighbours",
     "pictures",
@@ -378,6 +379,11 @@ def spatial_grams(
     return grams
 
 
+def distances_of(gram: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the Euclidean distances of trials from their inner products."""
+    return np.asarray(np.sqrt(np.maximum(squared_distances(gram), 0.0)))
+
+
 def absolute_distances(
     spikes: NDArray[np.uint8], period_ms: float, tau: float, kernel: NDArray[np.float32]
 ) -> NDArray[np.float64]:
@@ -402,4 +408,6 @@ def named_by_neighbours(distances: NDArray[np.float64], y: NDArray[np.int64], ne
     """Return the class that each pattern's nearest neighbours vote for; no pattern is its own neighbour."""
     apart = distances.copy()
     np.fill_diagonal(apart, np.inf)
-    return np.asarray(NearestNeighbours(neighbours=neighbours).fit(distances, y).predict(apart))
+    near = np.argsort(apart, axis=1, kind="stable")[:, :neighbours]
+    classes, row = np.unique(y, return_inverse=True)
+    return np.asarray(classes[majority(row[near], len(classes))])

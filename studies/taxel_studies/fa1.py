@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from taxel import information
 from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
+from taxel_studies import spike_codes
 from taxel_studies.codes import PERIOD_US, SIDE, drop, drop_tasks, kinds_of, since_contact
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table
@@ -93,10 +93,10 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
         summary["bits"][without], summary["events"][without] = {}, {}
         for window in p["windows_ms"]:
             codes = {
-                "rate": information.RateCode(window_ms=window, most_hz=1e6 / PERIOD_US),
-                "first": information.FirstSpikeLatency(window_ms=window, resolution_ms=resolution),
+                "rate": spike_codes.RateCode(window_ms=window, most_hz=1e6 / PERIOD_US),
+                "first": spike_codes.FirstSpikeLatency(window_ms=window, resolution_ms=resolution),
             }
-            bits = information.compare_codes(
+            bits = spike_codes.compare_codes(
                 trials, labels, codes, onsets_ms=np.zeros(len(rows)), folds=folds, seed=p["seed"]
             )
             best = max(bits.values(), key=lambda one: one.bits)

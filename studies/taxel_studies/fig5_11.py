@@ -10,11 +10,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.array import Array
-from taxel.information.neighbours import distances_of
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
-from taxel_studies.dropped import LENGTH_MS, REGION
+from taxel_studies.dropped import LENGTH_MS, REGION, distances_of
 from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 

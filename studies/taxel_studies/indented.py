@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1
 from taxel.frames import Frames
-from taxel.information import FoldSums, folds
+from taxel.information import folds
+from taxel_studies.discriminants import FoldSums
 from taxel_studies.fem import TABLE_5_1, Condition, Course, Indentation, KeptCourses, SamplingGrid, Table, paths
 from taxel_studies.kept_bits import information
 from taxel_studies.runner import SharedFolder, Task
@@ -140,10 +140,8 @@ def bits_of(
     sums: FoldSums, samples: int, merge: Mapping[int, Any] | None = None, features: int | None = None
 ) -> dict[str, float]:
     """Return the information of the discriminants' answers: corrected, as counted, and the share that is right."""
-    with warnings.catch_warnings():
-        # Taxels that never fire, or always with others, are left out by LDA, as scikit-learn does.
-        warnings.simplefilter("ignore", UserWarning)
-        answers = sums.predictions(merge=None if merge is None else dict(merge), features=features)
+    # Taxels that never fire, or always with others, are left out by LDA, as scikit-learn does.
+    answers = sums.predictions(merge=merge, features=features)
     truth = np.repeat(sums.classes, samples)
     if merge is not None:
         truth = np.array([merge[k] for k in truth.tolist()])

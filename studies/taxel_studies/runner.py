@@ -105,7 +105,7 @@ class Results:
     path : Path
         Made at the first result. A last line that a kill cut short is dropped.
     code : str
-        Which code runs (`taxel.report.code_version`): results of other code stay in the file, but count no more.
+        Which code runs (`commit.code_version`): results of other code stay in the file, but count no more.
     """
 
     def __init__(self, path: Path, code: str) -> None:

@@ -22,7 +22,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from taxel import FormatError, ProblemError, __version__
-from taxel.report import code_version, write_whole
+from taxel.report import write_whole
+from taxel_studies.commit import code_version
 from taxel_studies.runner import HERE, Results, SharedFolder, Task, Workers, one_of, run, whole
 
 __all__ = [

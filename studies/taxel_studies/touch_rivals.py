@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel.encode import ContactArea
 from taxel.frames import Frames
-from taxel.information import LDA, folds
+from taxel.information import folds
+from taxel_studies.discriminants import LDA
 
 __all__ = ["around", "best_rule", "lda", "numbers"]
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from taxel.demo.script import SLANTS_DEG, TRAINING_SEED, drawn, fall_ms
 from taxel.encode import ContactArea
 from taxel.events import Events
-from taxel.information import LDA
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
+from taxel_studies.discriminants import LDA
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 

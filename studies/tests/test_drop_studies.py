@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from taxel import Array, ProblemError, SceneError, SpikeTrains
-from taxel.information.neighbours import distances_of
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
@@ -49,7 +48,7 @@ def test_inner_products_give_the_distances_of_metrics(tau, sigma):
     kernel = dropped.smoothed(SIDE, array.pitch_mm, sigma)
     gram = dropped.spatial_grams(spikes, PERIOD_MS, tau, [kernel], [spikes.shape[1]])[0][0]
     wanted = pairwise("van_rossum_spatial", trains, array=array, tau=tau, sigma=sigma, normalisation="none")
-    np.testing.assert_allclose(distances_of(gram), wanted, atol=2e-3 * wanted.max())
+    np.testing.assert_allclose(dropped.distances_of(gram), wanted, atol=2e-3 * wanted.max())
 
 
 def test_an_end_leaves_out_what_comes_after_it():

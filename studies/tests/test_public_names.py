@@ -1,4 +1,4 @@
-"""Studies and benchmarks stand on public names of taxel alone, and nothing of taxel on them."""
+"""The distributions beside taxel stand on its public names alone, and nothing of taxel on them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import taxel_studies
 ROOT = Path(taxel_studies.__file__).parents[2]
 FILES = sorted(
     file
-    for package in ("studies/taxel_studies", "benchmarks/taxel_benchmarks")
+    for package in ("studies/taxel_studies", "benchmarks/taxel_benchmarks", "viewers/taxel_viewers")
     for file in (ROOT / package).rglob("*.py")
 )
 
@@ -41,7 +41,7 @@ def wrong(source: str, taken: str) -> str | None:
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(ROOT)))
-def test_a_study_or_a_benchmark_takes_public_names_of_taxel_alone(file: Path) -> None:
+def test_a_distribution_takes_public_names_of_taxel_alone(file: Path) -> None:
     found = []
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "taxel":
@@ -54,8 +54,8 @@ def test_a_study_or_a_benchmark_takes_public_names_of_taxel_alone(file: Path) ->
             ]
         elif isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
             own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls", "other")
-            # A named tuple's own methods have such names.
-            named = node.attr in ("_replace", "_asdict", "_fields", "_make")
+            # A named tuple's own methods have such names, and how a process ends at once.
+            named = node.attr in ("_replace", "_asdict", "_fields", "_make") or ast.unparse(node) == "os._exit"
             found += [] if own or named else [f"line {node.lineno}: {ast.unparse(node)}"]
     assert [why for why in found if why] == []
 
@@ -69,19 +69,22 @@ def test_what_is_private_or_unnamed_is_found() -> None:
     assert wrong("taxel.neuron", "np") == "taxel.neuron does not name np in __all__"
 
 
-def test_taxel_imports_neither() -> None:
-    importing = re.compile(r"^\s*(from|import) (taxel_studies|taxel_benchmarks)\b", re.MULTILINE)
+def test_taxel_imports_none() -> None:
+    importing = re.compile(r"^\s*(from|import) (taxel_studies|taxel_benchmarks|taxel_viewers)\b", re.MULTILINE)
     product = (ROOT / "python").rglob("*.py")
     assert [str(file.relative_to(ROOT)) for file in product if importing.search(file.read_text())] == []
 
 
 def test_all_distributions_have_one_version_and_want_each_other() -> None:
-    ours, benchmarks, theirs = (
-        tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"]
-        for folder in ("studies", "benchmarks", "")
+    version, beside = taxel.__version__, ("studies", "benchmarks", "viewers")
+    ours, *theirs = (
+        tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"] for folder in ("", *beside)
     )
-    assert ours["version"] == benchmarks["version"] == theirs["version"] == taxel.__version__
-    assert f"taxel=={theirs['version']}" in ours["dependencies"]
-    assert {f"taxel=={theirs['version']}", f"taxel_studies=={theirs['version']}"} <= {*benchmarks["dependencies"]}
-    assert theirs["optional-dependencies"]["studies"] == [f"taxel_studies=={theirs['version']}"]
-    assert theirs["optional-dependencies"]["cluster"] == [f"taxel_studies[cluster]=={theirs['version']}"]
+    assert {project["version"] for project in (ours, *theirs)} == {version}
+    assert all(f"taxel=={version}" in project["dependencies"] for project in theirs)
+    assert f"taxel_studies=={version}" in theirs[1]["dependencies"]
+    extras = {"studies": "taxel_studies", "cluster": "taxel_studies[cluster]"}
+    extras |= {name: f"taxel_viewers[{name}]" for name in ("rerun", "foxglove")}
+    assert {name: ours["optional-dependencies"][name] for name in extras} == {
+        name: [f"{distribution}=={version}"] for name, distribution in extras.items()
+    }

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from taxel.report import code_version
 from taxel_studies import load
+from taxel_studies.commit import code_version
 from taxel_studies.runner import Workers
 
 #: A package that no test imports.

@@ -16,7 +16,6 @@ from shell import run
 import taxel
 from taxel import Array, Frames
 from taxel.cli._commands import OWN, added
-from taxel.live import Viewer
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 
@@ -112,6 +111,7 @@ def commands(folder: Path) -> dict[str, list[list[object]]]:
         "export": [["nir", folder / "readout.json", "graph.nir"]],
         "information": [[folder / "a.h5", "--labels", folder / "labels.csv", "--window-ms", 50, "--report", "r.html"]],
         "bridge": [live],
+        "show": [[folder / "a.h5", "foxglove:0", "--seconds", 0.5]],
         "bench": [["encode_contact_area", "--quick"]],
         "study": [["fig6.2", "--size", "toy", "--jobs", 2, "--report", "report"]],
     }
@@ -141,16 +141,6 @@ def test_a_training_of_the_page_runs_no_code_of_a_strange_folder(
     monkeypatch.chdir(here)
     handler = TrainingRequests(Opening(), ShownFiles())
     assert "contact, neuron: " in handler.train(beside / "a.h5", here / "r.json")[0]
-    check_nothing_ran(here, beside)
-
-
-def test_a_viewers_process_runs_no_code_of_a_strange_folder(
-    here: Path, beside: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("foxglove")
-    monkeypatch.chdir(here)
-    with Viewer(beside / "a.npz", "foxglove:0") as viewer:
-        assert viewer.place.startswith("Foxglove at ")
     check_nothing_ran(here, beside)
 
 

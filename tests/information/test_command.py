@@ -12,7 +12,7 @@ from taxel import ProblemError
 from taxel.cli import app, main
 from taxel.cli._bar import bar, duration
 from taxel.information import read_trials
-from taxel.labels import beside, write_labels
+from taxel.labels import Note, beside, text_with
 
 from .touches import folder, ordered
 
@@ -94,6 +94,11 @@ def test_json_holds_all_figures(tmp_path):
     assert said["report"].endswith("page.html")
 
 
+def note(recording, labels):
+    """Write notes (label, us) beside a recording."""
+    beside(recording).write_text(text_with([Note(label, t, 0) for label, t in labels]))
+
+
 def test_notes_are_trials_as_rows_of_a_table_are(tmp_path):
     recording, labels = folder(tmp_path, 40)
     rows = [line.split(",")[1:] for line in labels.read_text().splitlines()[1:]]
@@ -102,14 +107,14 @@ def test_notes_are_trials_as_rows_of_a_table_are(tmp_path):
     done = run(recording, "--labels", "notes", *asked)
     assert isinstance(done.exception, ProblemError)
     assert str(done.exception) == f"{recording}: has no notes; leave it out, or give a table of trials"
-    write_labels(beside(recording), [(label, int(t)) for t, label in rows])
+    note(recording, [(label, int(t)) for t, label in rows])
     assert json.loads(run(recording, "--labels", "notes", *asked).stdout) == expected
     done = run(recording, "--labels", "notes", "--report", tmp_path / "other.html")
     assert "--window-ms: must say how long the trials are that notes begin" in str(done.exception)
-    write_labels(beside(recording), [("left first", int(rows[0][0])), ("right first", int(rows[0][0]) + 100)])
+    note(recording, [("left first", int(rows[0][0])), ("right first", int(rows[0][0]) + 100)])
     done = run(recording, "--labels", "notes", *asked)
     assert f"note at {int(rows[0][0]) + 100} us begins 0.1 ms after note at {rows[0][0]} us" in str(done.exception)
-    write_labels(beside(recording), [("left first", 10**12), ("right first", 100_000)])
+    note(recording, [("left first", 10**12), ("right first", 100_000)])
     assert "lies outside touches.npz" in str(run(recording, "--labels", "notes", *asked).exception)
 
 

@@ -84,3 +84,31 @@ def wait_until(done: Callable[[], bool]) -> None:
     while not done():
         assert time.monotonic() < until
         time.sleep(0.005)
+
+
+def spikes_of(events: Events) -> list[tuple[int, int, float]]:
+    """The spikes of a recording."""
+    trains = ChangeEvents().encode(events)
+    numbers = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
+    return sorted(zip(np.round(trains.times * 1000).astype(int), numbers, trains.values, strict=True))
+
+
+def above_rest(events: Events) -> np.ndarray:
+    """What the taxels hold at last above their first values, which are the rest (more than the noise floor of 3)."""
+    held, rest = np.zeros(SMALL.shape, int), np.zeros(SMALL.shape, int)
+    for x, y, ticks in zip(events.x, events.y, events.intensity, strict=True):
+        rest[y, x] = rest[y, x] or ticks
+        held[y, x] = ticks
+    above = held - rest
+    return np.where(above > 3, above, 0)
+
+
+def force(events: Events, times: np.ndarray) -> list[int]:
+    """Ticks above rest over all taxels just before times: what one taxel of `presses` holds above its first value."""
+    found, n = [], 0
+    for t in times:
+        while n < len(events) and events.t[n] < t:
+            n += 1
+        above = int(events.intensity[n - 1]) - int(events.intensity[0]) if n else 0
+        found.append(above if above > 3 else 0)
+    return found

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import _core
-from taxel.labels import TURN_US, write_labels
+from taxel.labels import TURN_US
 from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
 from taxel.recording.opening import is_recording
@@ -139,8 +139,7 @@ def test_a_label_replaces_a_note_of_the_recording_and_one_without_a_name_removes
 
 def test_a_replaced_note_is_that_of_its_source_alone(tmp_path: Path) -> None:
     place = tmp_path / "walk.notes.csv"
-    taxel.labels.write_labels(place, [("heel", 5, "left", "", 4), ("", 9, "", "", 9), ("toe", 7)])
-    assert place.read_text() == "label,t_us,source,replaces_us\nheel,5,left,4\ntoe,7,,\n,9,,9\n"
+    place.write_text("label,t_us,source,replaces_us\nheel,5,left,4\ntoe,7,,\n,9,,9\n")
     labels = taxel.Labels(place)
     assert [(row.text, row.t, row.replaces) for row in labels.rows] == [("heel", 5, 4), ("toe", 7, None)]
     assert [row.replaces for row in labels.removed] == [9]
@@ -224,5 +223,3 @@ def test_an_empty_table_has_no_labels(text: bytes, name: str, tmp_path: Path) ->
     # It is no recording of its folder.
     assert [one.path for one in taxel.open_all(tmp_path)] == [made.path]
     assert not is_recording(place)
-    write_labels(place, [("heel", 5)])
-    assert [row.text for row in taxel.Labels(place).rows] == ["heel"]

@@ -6,12 +6,10 @@ from typing import Any
 import numpy as np
 
 import taxel
-from sound.things import ARRAY, EVENTS, PLAIN, UNSIGNED, Sound, method, plain
+from sound.things import ARRAY, EVENTS, PLAIN, Sound, method, plain
 
 FOUND_BITS = taxel.information.estimate(["a", "b"] * 4, ["a", "b"] * 4, redraws=2)
 CLOUD = np.array([[0.0, 1.0], [3.0, 2.0], [0.5, 0.0], [2.0, 2.5], [1.0, 1.0], [3.5, 3.0], [0.2, 0.4], [2.5, 2.0]])
-LDA = taxel.information.LDA().fit(CLOUD, [0, 1] * 4)
-GRAM_LDA = taxel.information.GramLDA(features=2).fit(CLOUD @ CLOUD.T, [0, 1] * 4)
 NESTED = taxel.information.nested_predictions([CLOUD @ CLOUD.T], [2], [0, 1] * 4, count=2, inner=2)
 READOUTS = [
     taxel.information.ConeRReadout(tau=5.0, bound=1.0).fit([PLAIN, PLAIN], [0, 1]),
@@ -63,46 +61,6 @@ SOUND: dict[str, Sound] = {
     "taxel.information.keeps": plain(
         taxel.information.keeps, cheap=FOUND_BITS, dear=FOUND_BITS, share=0.9, groups=["x", "y"] * 4
     ),
-    "taxel.information.LDA": plain(taxel.information.LDA, ridge=0.1, priors="equal"),
-    "taxel.information.LDA.fit": method(taxel.information.LDA(), "fit", x=CLOUD, y=[0, 1] * 4),
-    "taxel.information.LDA.predict": method(LDA, "predict", x=CLOUD),
-    "taxel.information.LDA.decision_function": method(LDA, "decision_function", x=CLOUD),
-    "taxel.information.fold_predictions": plain(
-        taxel.information.fold_predictions,
-        x=CLOUD,
-        y=[0, 1] * 4,
-        folds=[0, 0, 0, 0, 1, 1, 1, 1],
-        ridge=0.1,
-        priors="training",
-        keep="folds",
-        progress=lambda *_: None,
-    ),
-    "taxel.information.FoldSums": plain(
-        taxel.information.FoldSums, x=CLOUD, y=[0, 1] * 4, folds=[0, 0, 0, 0, 1, 1, 1, 1], keep="folds", progress=print
-    ),
-    "taxel.information.FoldSums.predictions": method(
-        taxel.information.FoldSums(CLOUD, ["a", "b"] * 4, [0, 0, 0, 0, 1, 1, 1, 1]),
-        "predictions",
-        merge={"a": "x", "b": "y"},
-        features=1,
-        ridge=0.1,
-        priors="training",
-        progress=lambda *_: None,
-    ),
-    "taxel.information.GramLDA": plain(taxel.information.GramLDA, features=2, ridge=0.1, priors="equal"),
-    "taxel.information.GramLDA.fit": method(
-        taxel.information.GramLDA(features=2), "fit", gram=CLOUD @ CLOUD.T, y=[0, 1] * 4
-    ),
-    "taxel.information.GramLDA.predict": method(GRAM_LDA, "predict", gram=CLOUD @ CLOUD.T),
-    "taxel.information.GramLDA.decision_function": method(GRAM_LDA, "decision_function", gram=CLOUD @ CLOUD.T),
-    "taxel.information.NearestNeighbours": plain(taxel.information.NearestNeighbours, neighbours=1),
-    "taxel.information.NearestNeighbours.fit": method(
-        taxel.information.NearestNeighbours(), "fit", distances=CLOUD @ CLOUD.T, y=[0, 1] * 4
-    ),
-    "taxel.information.NearestNeighbours.predict": method(
-        taxel.information.NearestNeighbours().fit(CLOUD @ CLOUD.T, [0, 1] * 4), "predict", distances=CLOUD @ CLOUD.T
-    ),
-    "taxel.information.distances_of": plain(taxel.information.distances_of, gram=CLOUD @ CLOUD.T),
     "taxel.information.nested_predictions": plain(
         taxel.information.nested_predictions,
         grams=[CLOUD @ CLOUD.T],
@@ -122,27 +80,6 @@ SOUND: dict[str, Sound] = {
         y=[0, 1] * 4,
         nested=NESTED,
         sizes=[2],
-        seed=1,
-    ),
-    "taxel.information.RateCode": plain(taxel.information.RateCode, window_ms=10.0, resolution_ms=0.0, most_hz=100.0),
-    **{
-        f"taxel.information.{name}": plain(getattr(taxel.information, name), window_ms=10.0, resolution_ms=0.5)
-        for name in ("FirstSpikeLatency", "RelativeLatency", "RankOrder")
-    },
-    "taxel.information.Code.encode": method(
-        taxel.information.RankOrder(window_ms=10.0), "encode", values=[0.5, 1.0], onset_ms=1.0
-    ),
-    "taxel.information.Code.decode": method(
-        taxel.information.RateCode(window_ms=10.0), "decode", trains=UNSIGNED, onset_ms=1.0
-    ),
-    "taxel.information.compare_codes": plain(
-        taxel.information.compare_codes,
-        trials=[UNSIGNED] * 8,
-        labels=[0, 1] * 4,
-        codes={"rank": taxel.information.RankOrder(window_ms=10.0)},
-        onsets_ms=[0.0] * 8,
-        groups=list(range(8)),
-        folds=2,
         seed=1,
     ),
     "taxel.information.ConeRReadout": plain(taxel.information.ConeRReadout, tau=5.0, bound=1.0, max_seconds=1.0),
@@ -205,7 +142,6 @@ SOUND: dict[str, Sound] = {
 #: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.information.Answer": answer,
-    "taxel.information.Code": lambda: taxel.information.RankOrder(window_ms=10.0),
     "taxel.information.Control": lambda: answer().controls[0],
     "taxel.information.Estimate": lambda: FOUND_BITS,
     "taxel.information.Nested": lambda: NESTED,

@@ -123,7 +123,4 @@ LEFT_OUT: dict[str, str] = {
     "taxel.live.Remote": "needs a wheel of its own; tried in tests/bridge",
     "taxel.live.PanelClient": "connects to a panel; tried in tests/live/test_client.py",
     "taxel.live.PanelClient.play": "asks a panel; tried in tests/live/test_client.py",
-    "taxel.live.Viewer": "needs an extra and begins a process; tried in tests/live",
-    "taxel.live.Viewing": "a result of taxel.live.Viewer, which needs an extra",
-    "taxel.live.Viewer.wait": "waits for a process; tried in tests/live/test_viewer.py",
 }

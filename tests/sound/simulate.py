@@ -84,17 +84,6 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.Faults": plain(
         taxel.simulate.Faults, lost=0.1, repeated=0.1, reordered=0.1, cut=0.1, corrupted=0.1, seed=1
     ),
-    "taxel.simulate.worn": plain(
-        taxel.simulate.worn,
-        events=EVENTS,
-        since_us=int(EVENTS.t[-1]) + 1,
-        seed=1,
-        drift=1.0,
-        age_min=10.0,
-        stuck=1,
-        flickering=0,
-        pairs=0,
-    ),
     "taxel.simulate.Replay": plain(taxel.simulate.Replay, source=EVENTS, speed=1.0),
     "taxel.simulate.Replay.registers": method(taxel.simulate.Replay(EVENTS), "registers", preset="5.2 kHz"),
     "taxel.simulate.Board.command": fresh(taxel.simulate.Board, "command", data=bytes.fromhex("e000000000")),

@@ -235,12 +235,6 @@ impl ReadoutStream {
         Ok(from_detections(py, found))
     }
 
-    /// The time up to which all detections have been returned, us.
-    #[getter]
-    fn now(&self, py: Python<'_>) -> Option<i64> {
-        self.0.with(py, |readout| readout.now())
-    }
-
     /// How many events came late.
     #[getter]
     fn late(&self, py: Python<'_>) -> u64 {

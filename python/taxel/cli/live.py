@@ -37,12 +37,10 @@ from taxel.cli._board import (
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import try_report
 from taxel.cli._say import say
-from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout
 from taxel.device import Cable
-from taxel.encode import Encoder
-from taxel.live import Live, Panel, Summary, Viewer, delays
+from taxel.live import Live, Panel, Summary, delays
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers
@@ -82,30 +80,24 @@ class _Typed:
         Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: this folder.")
     ] = None
     opens: OpenOption = False
-    to: ToOption = None
-    encoder: SpikesOption = None
-    values: SpikesSetOption = None
 
 
 @app.command()
 @with_live_options("live")
 def live(options: dict[str, Any], typed: _Typed) -> None:
-    """Receive a board's events and print what a readout detects, live; with --panel or --to, show them.
+    """Receive a board's events and print what a readout detects, live; with --panel, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
     JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
     reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
-    which are counted. --panel shows the board in a browser, --to in Rerun or Foxglove; a slow viewer loses pictures,
-    never data. Exit code 3: nothing was received, or something was lost after it had arrived; 2: the board has more
-    taxels than the array.
+    which are counted. --panel shows the board in a browser; a slow viewer loses pictures, never data. Exit code 3:
+    nothing was received, or something was lost after it had arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
     Example: taxel live --panel --control 127.0.0.1:5209
-    Example: taxel live --to rerun --to foxglove --encoder fa1
     Example: taxel live --from zenoh:192.168.1.5:7447/left --panel
     """
-    spikes = spikes_of(typed.to, typed.encoder, typed.values)
     _together(options, typed)
     given_tare = options["tare"]
     options = for_live(options, typed.rate_hz, typed.bits)
@@ -130,9 +122,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
                 soft_wrap=True,
             )
         with Live(**options | {"remote": board}) as pipeline:
-            if spikes is not None and isinstance(rest, Tare):
-                spikes = spikes.with_tare(rest)
-            last, external = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
+            last = _shown(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
             _drain(last, console, say)
@@ -144,7 +134,6 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
         _report(typed.report, trained, summary.path, tare if tare is not None else rest)
         console.print(f"report: {typed.report / 'report.html'}", soft_wrap=True)
     _unsent(summary)
-    report_viewers(external, quiet=lines)
     if not lines:
         _print_summary(summary, options["guard_frames"])
     elif summary.verdict.status in ("damaged", "lost", "nothing arrived"):
@@ -160,15 +149,13 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
 def _shown(
     typed: _Typed,
     pipeline: Live,
-    spikes: Encoder | None,
     console: Console,
     at_rest: contextlib.ExitStack,
     *,
     fresh: bool,
-) -> tuple[Live, list[Viewer]]:
-    """Show the board in terminal, panel and viewers until the end; return the last receiver, and the viewers."""
+) -> Live:
+    """Show the board in terminal and panel until the end; return the last receiver."""
     shows: Panel | None = None
-    external: list[Viewer] = []
     # A serial line has one user at a time: first the tare, then the panel.
     later = typed.control if fresh and typed.panel else None
     # A reader of the lines that ends (BrokenPipeError) ends the command as Ctrl-C does.
@@ -180,9 +167,8 @@ def _shown(
             )
             # Standard output has the lines of --json; whoever reads them needs the address too.
             announce(shows, typed.opens, Console(stderr=True))
-        external = viewers(shown, pipeline if shows is None else shows, typed.to or (), spikes)
-        _watch(pipeline, shows, external, typed.seconds, console, at_rest, fresh=fresh, control=later)
-    return pipeline if shows is None or shows.live is None else shows.live, external
+        _watch(pipeline, shows, typed.seconds, console, at_rest, fresh=fresh, control=later)
+    return pipeline if shows is None or shows.live is None else shows.live
 
 
 def _report(folder: Path, readout: Readout | PlainRule, path: Path, tare: Tare | float | None) -> None:
@@ -228,8 +214,8 @@ def _unsent(summary: Summary) -> None:
 def _together(options: dict[str, Any], typed: _Typed) -> None:
     """Refuse options that would have no effect."""
     readout, tare, send = (options[name] for name in ("readout", "tare", "send"))
-    if readout is None and not typed.panel and not typed.to:
-        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel or --to VIEWER to show the board")
+    if readout is None and not typed.panel:
+        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
     if readout is None and (tare or typed.report or send):
         raise ProblemError("--tare, --report and --send belong to a readout: give --readout FILE")
     if typed.folder is not None and not typed.panel:
@@ -262,7 +248,6 @@ def _warn_of_unknown(tare: Tare) -> None:
 def _watch(
     pipeline: Live,
     panel: Panel | None,
-    external: list[Viewer],
     seconds: float | None,
     console: Console,
     at_rest: contextlib.ExitStack,
@@ -311,8 +296,7 @@ def _watch(
                 say(f"taxel: {wrong}", err=True)
                 warned = True
             if now["seconds"] - before["seconds"] >= REDRAW_S:
-                lines = [Text(state_of(viewer)) for viewer in external]
-                display.update(Group(counters_table(before, now), _state(now, pipeline.place), *lines))
+                display.update(Group(counters_table(before, now), _state(now, pipeline.place)))
                 before = now
 
 

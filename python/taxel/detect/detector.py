@@ -231,11 +231,6 @@ class ReadoutStream:
         return Detections([], [], []) if self._core is None else Detections._from_parts(self._core.advance(t))
 
     @property
-    def now_us(self) -> int | None:
-        """The time up to which all detections have been returned, us; None before any input."""
-        return None if self._core is None else self._core.now
-
-    @property
     def late(self) -> int:
         """How many events came later than others with a later time, or later than time was moved on."""
         return 0 if self._core is None else self._core.late

@@ -133,11 +133,6 @@ class Score:
         return self.missed + self.false, float(np.sqrt(np.mean(self.errors_ms**2))) if self.found else np.inf
 
     @property
-    def found_share(self) -> float:
-        """Found events as a share of all; NaN where there are none."""
-        return self.found / self.events if self.events else float("nan")
-
-    @property
     def error(self) -> Spread:
         """Spread of `t` minus reference, ms."""
         return Spread.of(self.errors_ms)

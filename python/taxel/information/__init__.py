@@ -11,50 +11,27 @@ from taxel.information.bits import (
     quadratic_extrapolation,
     relevant_responses,
 )
-from taxel.information.codes import (
-    Code,
-    FirstSpikeLatency,
-    RankOrder,
-    RateCode,
-    RelativeLatency,
-    compare_codes,
-)
 from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
-from taxel.information.fold_sums import FoldSums, fold_predictions
 from taxel.information.folds import folds
 from taxel.information.keeping import Verdict, keeps
-from taxel.information.lda import LDA, GramLDA
-from taxel.information.neighbours import NearestNeighbours, distances_of
 from taxel.information.nested import Nested, nested_predictions, training_curve
 from taxel.information.spiking import ConeRReadout, TempotronReadout
 from taxel.information.trials import LabelledTrial, notes_as_trials, read_trials, recordings_as_trials
 
 __all__ = [
-    "LDA",
     "Answer",
-    "Code",
     "ConeRReadout",
     "Control",
     "Estimate",
-    "FirstSpikeLatency",
-    "FoldSums",
-    "GramLDA",
     "LabelledTrial",
-    "NearestNeighbours",
     "Nested",
     "Point",
-    "RankOrder",
-    "RateCode",
-    "RelativeLatency",
     "TempotronReadout",
     "Verdict",
     "ZeroTest",
     "answer",
-    "compare_codes",
     "confusion_matrix",
-    "distances_of",
     "estimate",
-    "fold_predictions",
     "folds",
     "keeps",
     "label_entropy",

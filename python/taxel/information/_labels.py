@@ -11,7 +11,7 @@ from taxel._base.errors import refused
 #: Labels that one call of NumPy sorts or looks up (30 ms for texts): Ctrl-C is answered between calls.
 _AT_ONCE = 1 << 17
 
-__all__ = ["belonging", "distinct", "numbered", "one_label_a_group", "words"]
+__all__ = ["belonging", "distinct", "labelled", "numbered", "one_label_a_group", "words"]
 
 
 def words(name: str, values: ArrayLike) -> NDArray[np.generic]:
@@ -54,3 +54,19 @@ def one_label_a_group(row: NDArray[np.int64], groups: NDArray[np.int64]) -> bool
     """Return whether all trials of a group have the same label."""
     first = np.unique(groups, return_index=True)[1]
     return bool((row[first][groups] == row).all())
+
+
+def labelled(y: ArrayLike, trials: int) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+    """Return the classes and each trial's number among them.
+
+    Raises
+    ------
+    ProblemError : another number of labels than trials, or one class
+    """
+    labels = words("y", y)
+    if len(labels) != trials:
+        raise refused("y", f" has {len(labels)} entries: must be {trials}, one a trial")
+    classes, row = np.unique(labels, return_inverse=True)
+    if len(classes) < 2:
+        raise refused("y", f" names {len(classes)} class: must be two at least")
+    return classes, row

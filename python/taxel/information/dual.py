@@ -1,4 +1,4 @@
-"""The dual solver of `LDA`: from the trials' inner products, for more features than trials."""
+"""Linear discriminants from the trials' inner products, for more features than trials."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import finite_numbers
 from taxel._base.errors import refused
 
-__all__ = ["LARGEST_RIDGE", "Regressions", "gram_matrix", "residual", "solved_without_ridge"]
+__all__ = ["LARGEST_RIDGE", "Regressions", "discriminant", "gram_matrix", "residual"]
 
 #: The largest ridge, in units of the mean variance.
 LARGEST_RIDGE = 1e100
 #: The largest inner product: squares of sums of them do not overflow.
 _LARGEST = 1e140
-#: Directions in which classes vary less than this share of the largest count as none.
-_CUT = 1e-10
 #: Decimal digits to which the regression's predictions and the discriminants are rounded.
 _DIGITS = 9
 #: Numbers of residual matrices that are solved in one call of NumPy: Ctrl-C is answered between calls.
@@ -57,7 +55,7 @@ def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
 
 
 class Regressions:
-    """Ridge regressions on the classes, one for each residual matrix, and their discriminants.
+    """Ridge regressions on the classes, one for each residual matrix, as linear discriminants.
 
     Parameters
     ----------
@@ -76,19 +74,6 @@ class Regressions:
         self._residuals, self._which = residuals, which
         self._left: NDArray[np.float64] = residuals @ which
         self._sums: NDArray[np.float64] = which.T @ self._left
-
-    def discriminants(self, level: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the first regression's weights (trials, classes), and what is added to a class (without its prior).
-
-        Parameters
-        ----------
-        level : float, above 0
-            Its ridge.
-        """
-        counts = self._which.sum(0)
-        sums = np.diag(counts) - np.outer(counts, counts) / counts.sum() - self._sums[0]
-        turn, offset = _discriminant(sums, counts)
-        return self._left[0] / level @ turn, offset
 
     def left_out(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the classes that all other trials' discriminants predict for trials that are left out.
@@ -118,7 +103,7 @@ class Regressions:
         share = counts / counts.sum(1, keepdims=True)
         # Predictions of the regression on the other trials, summed by class, less the classes' shares.
         sums = counts[:, :, None] * np.eye(counts.shape[1]) - self._sums[number[:, 0]] + np.swapaxes(left, 1, 2) @ off
-        turn, offset = _discriminant(sums - counts[:, :, None] * share[:, None, :], counts)
+        turn, offset = discriminant(sums - counts[:, :, None] * share[:, None, :], counts)
         # Rounding errors depend on the trial's own label, so without this they would decide ties correctly.
         predicted = np.round(which - off - share[:, None, :], _DIGITS)
         with np.errstate(divide="ignore"):
@@ -126,43 +111,7 @@ class Regressions:
         return np.asarray(np.round(scores, _DIGITS).argmax(-1))
 
 
-def solved_without_ridge(
-    square: NDArray[np.float64], which: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Return discriminants that leave out the directions in which no class varies.
-
-    Parameters
-    ----------
-    square : float64, shape (trials, trials)
-    which : float64, shape (trials, classes)
-
-    Returns
-    -------
-    tuple
-        The weights of the trials (trials, classes), what is added to a class (without its prior), and the number of
-        directions that are weighed.
-
-    Raises
-    ------
-    ProblemError : nothing varies within classes
-    """
-    trials, mean = len(which), which / which.sum(0)
-    within = square - mean @ (which.T @ square)
-    within -= (within @ mean) @ which.T
-    values, vectors = np.linalg.eigh((within + within.T) / 2)
-    varying = values > _CUT * max(values[-1], np.finfo(float).tiny)
-    if not varying.any():
-        raise refused("gram", ": nothing varies within classes")
-    vectors = vectors[:, varying]
-    across = square @ (mean - 1 / trials)
-    across -= mean @ (which.T @ across)
-    weights = (vectors / values[varying] ** 2) @ (vectors.T @ across) * trials
-    weights -= mean @ (which.T @ weights)
-    reach = square @ weights
-    return weights, -np.diag((mean + 1 / trials).T @ reach) / 2, int(varying.sum())
-
-
-def _discriminant(
+def discriminant(
     sums: NDArray[np.float64], counts: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return what turns ridge regressions on classes into linear discriminants.

@@ -11,8 +11,7 @@ from taxel._base.arguments import shown, whole
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.information._estimator import labelled
-from taxel.information._labels import belonging, words
+from taxel.information._labels import belonging, labelled, words
 
 __all__ = ["Part", "Split", "folds", "split"]
 

@@ -11,13 +11,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import instance, numbers, several, shown, whole
 from taxel._base.errors import refused
-from taxel.information._estimator import labelled
+from taxel.information._labels import labelled
 from taxel.information._threads import threads
 from taxel.information.dual import LARGEST_RIDGE, Regressions, gram_matrix, residual
 from taxel.information.folds import Split, split
-from taxel.information.neighbours import majority, squared_distances
 
-__all__ = ["RIDGES", "WORTH_THREADS", "Matrices", "Nested", "nested_predictions", "predictions", "training_curve"]
+__all__ = [
+    "RIDGES",
+    "WORTH_THREADS",
+    "Matrices",
+    "Nested",
+    "majority",
+    "nested_predictions",
+    "predictions",
+    "squared_distances",
+    "training_curve",
+]
 
 #: Ridges that are tried, in units of the mean variance.
 RIDGES = (10.0, 1.0, 0.1)
@@ -88,7 +97,8 @@ def nested_predictions(
 
     Notes
     -----
-    The discriminants are those of `GramLDA`. Leaving trials out of a ridge regression is a small solve with their part
+    The discriminants are linear, with one covariance of all classes (Hastie, Tibshirani and Buja 1994, J. Am. Stat.
+    Assoc. 89:1255). Leaving trials out of a ridge regression is a small solve with their part
     of its residual matrix, so all folds and inner folds cost one inverse a matrix and ridge.
     """
     matrices = Matrices(grams, features)
@@ -289,3 +299,20 @@ class _Neighbours(_Ways):
             near = order[training[order]].reshape(len(mine), -1)[:, : int(neighbours)]
             predicted[case] = majority(self._row[near], self._classes)
         return predicted
+
+
+def squared_distances(square: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the squared distances of inner products; rounding errors may leave some below 0."""
+    length = np.diag(square)
+    return np.asarray(length + length[:, None] - 2 * square)
+
+
+def majority(near: NDArray[np.int64], classes: int) -> NDArray[np.int64]:
+    """Return the most frequent class of each row; on a tie, the class whose members come first."""
+    votes = np.zeros((len(near), classes))
+    rows = np.repeat(np.arange(len(near)), near.shape[1])
+    np.add.at(votes, (rows, near.ravel()), 1.0)
+    # One vote outweighs all differences in place.
+    place = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
+    np.add.at(votes, (rows, near.ravel()), -place / near.shape[1])
+    return np.asarray(votes.argmax(1))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+import sys
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, Self
 
@@ -11,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import instance, number, several, shown, text
 from taxel._base.errors import refused
-from taxel.information._estimator import Classifier, labelled
+from taxel._base.parameters import Parameters
+from taxel._core import NotFittedError
+from taxel.information._labels import labelled, words
 from taxel.information.sampling import Spikes
 from taxel.learn import ConeR, Tempotron
 from taxel.neuron import Neuron
@@ -20,10 +23,17 @@ from taxel.spikes import SpikeTrains, to_ms
 __all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
 
 
-class _NeuronPerClass(Classifier):
-    """Classify by one neuron per class: the class of the highest potential is predicted."""
+class _NeuronPerClass(Parameters, ABC):
+    """Classify by one neuron per class: the class of the highest potential is predicted.
 
+    scikit-learn's `clone` and `cross_val_score` accept it; Python checks the parameters.
+    """
+
+    classes_: NDArray[np.generic]
     learners_: list[Any]
+
+    def __init__(self) -> None:
+        self._check()
 
     def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
         """Train one neuron per class.
@@ -37,6 +47,12 @@ class _NeuronPerClass(Classifier):
         Raises
         ------
         ProblemError : patterns or labels that are invalid
+
+        Examples
+        --------
+        >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
+        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).classes_.tolist()
+        ['a', 'b']
         """
         trains = _listed(self, patterns)
         self.classes_, row = labelled(y, len(trains))
@@ -54,10 +70,11 @@ class _NeuronPerClass(Classifier):
         ------
         ProblemError : not fitted, or patterns that are invalid
         """
-        learners = self._fitted("learners_")
+        if not hasattr(self, "learners_"):
+            raise NotFittedError(f"{type(self).__name__} was not fitted yet; call fit first")
         trains = _listed(self, patterns)
-        return np.array([[self._potential(learner, s) for learner in learners] for s in trains]).reshape(
-            len(trains), len(learners)
+        return np.array([[self._potential(learner, s) for learner in self.learners_] for s in trains]).reshape(
+            len(trains), len(self.learners_)
         )
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
@@ -74,8 +91,45 @@ class _NeuronPerClass(Classifier):
         Raises
         ------
         ProblemError : not fitted, or patterns that are invalid
+
+        Examples
+        --------
+        >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
+        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).predict(patterns).tolist()
+        ['a', 'b', 'a', 'b']
         """
-        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
+        best = self.decision_function(patterns).argmax(1)
+        return np.asarray(self.classes_[best])
+
+    def score(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> float:
+        """Return the share of patterns that are classified correctly.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+        y : labels, shape (patterns,)
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that are invalid
+
+        Examples
+        --------
+        >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
+        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
+        1.0
+        """
+        return float(np.mean(self.predict(patterns) == words("y", y)))
+
+    def __sklearn_tags__(self) -> Any:
+        # Only scikit-learn calls this, so it is installed.
+        tags = sys.modules["sklearn.utils"]
+        return tags.Tags(
+            estimator_type="classifier",
+            target_tags=tags.TargetTags(required=True),
+            classifier_tags=tags.ClassifierTags(),
+            input_tags=tags.InputTags(),
+        )
 
     @abstractmethod
     def _trained(self, trains: list[SpikeTrains], is_of_class: NDArray[np.bool_]) -> Any:

@@ -9,7 +9,6 @@ from taxel.live.sending import PORT, send
 from taxel.live.source import Source
 from taxel.live.summary import Summary
 from taxel.live.summary import delays as delays
-from taxel.live.viewer import Viewer, Viewing
 
 __all__ = [
     "PORT",
@@ -20,7 +19,5 @@ __all__ = [
     "Remote",
     "Source",
     "Summary",
-    "Viewer",
-    "Viewing",
     "send",
 ]

@@ -161,10 +161,6 @@ class PanelClient:
     OSError : no server listens there
     ProblemError : arguments that are invalid; an address whose token the server refuses
 
-    See Also
-    --------
-    Viewer : shows the same in Rerun or Foxglove.
-
     Examples
     --------
     >>> from taxel.live import Live, Panel, PanelClient, send

@@ -15,7 +15,6 @@ from taxel.simulate.pipe import Pipe
 from taxel.simulate.replay import Replay
 from taxel.simulate.scene_file import SceneFile
 from taxel.simulate.trouble import Faults, Flaws
-from taxel.simulate.wear import worn
 
 __all__ = [
     "NOT_RETURNED",
@@ -41,5 +40,4 @@ __all__ = [
     "emulate",
     "play",
     "truth",
-    "worn",
 ]

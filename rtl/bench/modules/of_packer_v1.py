@@ -40,7 +40,7 @@ async def events_become_words_in_datagrams(dut):
     came, queue = [], deque()
     entries, expected = drawn(300, valued)
     expected = [datagram for words in expected for datagram in datagrams_1(words, most)]
-    entries = deque(entries)
+    entries, last = deque(entries), entries[-1][0]
     cocotb.start_soon(vary(dut.clk, 400, push_pace, ready_pace, link_pace))
 
     def byte():
@@ -69,8 +69,10 @@ async def events_become_words_in_datagrams(dut):
             shown = False
         if entries and push_pace() and entries[0][0] == frame:
             queue.append(entries.popleft()[1])
-        elif not entries or (entries[0][0] != frame and random.random() < 0.3):
-            frame = entries[0][0] if entries else frame ^ (since == 0)
+        elif not entries:
+            frame = last ^ 1
+        elif entries[0][0] != frame and random.random() < 0.3:
+            frame = entries[0][0]
         since = 0 if entries or queue else since + 1
         await FallingEdge(dut.clk)
     while int(dut.busy.value):

@@ -6,7 +6,7 @@ import hashlib
 import json
 from pathlib import Path
 
-from taxel.report import code_version
+from taxel_studies.commit import code_version
 from taxel_studies.fem.indentation import Course, Indentation, press
 
 __all__ = ["KeptCourses"]
@@ -20,7 +20,7 @@ class KeptCourses:
     folder : path
         Must be there.
     code : str, optional
-        Which code runs: courses of other code are not found. As `taxel.report.code_version` returns it, also where this
+        Which code runs: courses of other code are not found. As `code_version` returns it, also where this
         is not given; in a checkout with local changes each `KeptCourses` then has courses of its own.
 
     Raises

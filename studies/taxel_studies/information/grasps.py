@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from taxel.encode import ChangeEvents
 from taxel.formats import icub
 from taxel.frames import Frames
-from taxel.information import GramLDA, estimate, nested_predictions, zero_test
+from taxel.information import estimate, nested_predictions, zero_test
+from taxel_studies.discriminants import GramLDA
 from taxel_studies.study import Parameters, Statement, Summary, Table
 
 __all__ = ["ASKS", "USES", "draw", "realise", "statements", "tables"]

@@ -24,7 +24,6 @@ from taxel import Calibration, Detections, Frames, Neuron, Readout, Tare, _core
 from taxel.calibration import Load
 from taxel.detect import Example, PlainRule, Recipe, train
 from taxel.encode import FA1, Composite, ContactArea
-from taxel.labels import write_labels
 from taxel.live import Live
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
@@ -135,13 +134,11 @@ def made() -> None:
 
 def texts() -> None:
     """Write labels, a readout, a plain rule, a tare, a calibration, a recipe, an encoder and a table of detections."""
-    write_labels(
-        HERE / "walk.notes.csv",
-        [
-            ("contact", 400, "left", "", None, None),
-            ("lift", 900, "", "trial 2", 800, 1_700_000_000_900_000_000),
-            ("", 1000, "", "", 1000, None),
-        ],
+    (HERE / "walk.notes.csv").write_text(
+        "label,t_us,source,recording,replaces_us,host_ns\n"
+        "contact,400,left,,,\n"
+        "lift,900,,trial 2,800,1700000000900000000\n"
+        ",1000,,,1000,\n"
     )
     (HERE / "labels.csv").write_text("recording,label,t_us,comment\nwalk,contact,400,late\nrun,lift,900,\n")
     rest = Frames(np.full((3, 4, 4), 20.0) + np.arange(3)[:, None, None], [0, 500, 1000], unit="ticks", array=SMALL)

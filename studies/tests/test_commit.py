@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from taxel._base.commit import checkout_of
-from taxel.report import code_version
+from taxel_studies.commit import checkout_of, code_version
 
 #: A package that no test imports.
 NAME = "taxel_toy_code"
@@ -117,7 +116,7 @@ def test_packages_of_one_checkout_are_one_commit_and_of_several_named_each(
     assert code_version(NAME, NAME) == code_version(NAME)
     first = repository.version()
     folder = tmp_path_factory.mktemp("alone")
-    monkeypatch.setattr("taxel._base.commit.metadata.version", lambda name: "3")
+    monkeypatch.setattr("taxel_studies.commit.metadata.version", lambda name: "3")
     (folder / f"{NAME}_other.py").write_text("")
     monkeypatch.syspath_prepend(str(folder))
     assert code_version(NAME, f"{NAME}_other") == f"{first} + {NAME}_other 3"

@@ -6,12 +6,10 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy  # its modules load when they are first used
+import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import numbers
-from taxel._base.errors import refused
-from taxel._core import ProblemError
+from taxel import ProblemError
 
 __all__ = ["ClassMoments", "Primal", "blocks", "feature_table", "is_exact", "solved"]
 
@@ -141,24 +139,21 @@ class Primal(NamedTuple):
         Minus infinity for a class without trials.
     rank : int
         In how many directions the covariance within classes was inverted.
-    weighed : int
-        How many features vary within classes.
     """
 
     coef: NDArray[np.float64]
     intercept: NDArray[np.float64]
     rank: int
-    weighed: int
 
 
-def solved(moments: ClassMoments, ridge: float, priors: str, shift: NDArray[np.float64] | None = None) -> Primal:
+def solved(moments: ClassMoments, ridge: float, shift: NDArray[np.float64] | None = None) -> Primal:
     """Return the discriminants of sums over trials from which `shift` was taken off.
 
     Parameters
     ----------
     moments : ClassMoments
-    ridge, priors
-        As in `taxel.information.LDA`.
+    ridge
+        As in `LDA`.
     shift : float64, shape (features,), optional
 
     Raises
@@ -176,7 +171,7 @@ def solved(moments: ClassMoments, ridge: float, priors: str, shift: NDArray[np.f
     rounding = 1e-13 * squares
     varying = squares - trials * centre**2 > rounding
     if not varying.any():
-        raise refused("x", ": no feature varies")
+        raise ProblemError("x: no feature varies")
     variance = np.where(within.diagonal() > rounding, within.diagonal(), 0.0)
     variance += ridge * variance[varying].mean()
     # A feature that varies between classes alone cannot be weighed: left out, as scikit-learn's svd does.
@@ -192,13 +187,12 @@ def solved(moments: ClassMoments, ridge: float, priors: str, shift: NDArray[np.f
         del factor, within
         values, rank = _where_classes_vary(_scaled(_within(moments)[0], scale), weighed, right)
     weights = values.T * scale * trials
-    prior = counts / trials if priors == "training" else np.full(len(counts), 1 / len(counts))
     coef = np.zeros((len(there), weights.shape[1]))
     intercept = np.full(len(there), -np.inf)
     coef[there] = weights
     off = centre if shift is None else centre + shift
-    intercept[there] = -(weights * (means - centre)).sum(1) / 2 - weights @ off + np.log(prior)
-    return Primal(coef, intercept, rank, int(weighed.sum()))
+    intercept[there] = -(weights * (means - centre)).sum(1) / 2 - weights @ off + np.log(counts / trials)
+    return Primal(coef, intercept, rank)
 
 
 def _within(moments: ClassMoments) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -295,15 +289,16 @@ def blocks(
 
 
 def feature_table(x: ArrayLike) -> NDArray[Any]:
-    """Return trials by features; raise `ProblemError` for what is no such table."""
-    table = x if isinstance(x, np.ndarray) and x.dtype.kind in "biuf" else numbers("x", x, np.float64)
-    if table.ndim != 2 or 0 in table.shape:
-        raise refused("x", f" has shape {table.shape}: must be (trials, features)")
+    """Return trials by features.
+
+    Raises
+    ------
+    ProblemError : a value that is not finite, or whose square overflows
+    """
+    table = np.asarray(x)
     if table.dtype.kind == "f":
         for first in range(0, len(table), _ROWS):
             wrong = np.argwhere(~(np.abs(table[first : first + _ROWS]) <= _LARGEST))
             if len(wrong):
-                place = first + wrong[0][0], wrong[0][1]
-                fault = f"beyond {_LARGEST:g}" if np.isfinite(table[place]) else "not finite"
-                raise refused("x", f"[{place[0]}, {place[1]}] is {fault}")
+                raise ProblemError(f"x[{first + wrong[0][0]}, {wrong[0][1]}] is not finite, or beyond {_LARGEST:g}")
     return table

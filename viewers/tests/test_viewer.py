@@ -9,7 +9,6 @@ import os
 import signal
 import struct
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,16 +16,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.live.boards import (
+    LOOPBACK,
+    SMALL,
+    above_rest,
+    command,
+    force,
+    play,
+    presses,
+    spikes_of,
+    touch,
+    wait_for,
+)
 
 import taxel
 from taxel import Detection, Note, ProblemError
 from taxel.cli import main
-from taxel.encode import ChangeEvents, ContactArea
-from taxel.live import Live, Panel, Viewer
-from taxel.live._viewer_process import MOST_OTHERS, MOST_PICTURES, BoundedQueue
+from taxel.encode import ChangeEvents
+from taxel.live import Live, Panel
 from taxel.live.client import Picture, Subject
-
-from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
+from taxel_viewers import Viewer
+from taxel_viewers.viewer import MOST_OTHERS, MOST_PICTURES, BoundedQueue
 
 client = pytest.importorskip("websockets.sync.client", reason="the test extra brings websockets")
 
@@ -52,9 +62,9 @@ def eventually(what: Any) -> Any:
 class Foxglove:
     """Somebody else's client: Foxglove's public protocol, and protobuf by the schema that the server tells."""
 
-    def __init__(self, viewer: Viewer) -> None:
+    def __init__(self, place: str) -> None:
         self.door = client.connect(
-            viewer.place.split()[-1], subprotocols=["foxglove.sdk.v1"], max_size=None, close_timeout=1
+            place.rsplit(maxsplit=1)[-1], subprotocols=["foxglove.sdk.v1"], max_size=None, close_timeout=1
         )
         self.socket = self.door.__enter__()
         self.channels: dict[int, dict[str, Any]] = {}
@@ -119,8 +129,8 @@ def receiver(folder: Path, port: int) -> Iterator[subprocess.Popen[bytes]]:
     kept = folder / f"heard{len(list(folder.iterdir()))}.rrd"
     # A fresh home folder, so that the viewer finds no user settings.
     environment = {**os.environ, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder), "RUST_LOG": "off"}
-    command = [str(program), "--bind", LOOPBACK, "--port", str(port), "--save", str(kept)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
+    words = [str(program), "--bind", LOOPBACK, "--port", str(port), "--save", str(kept)]
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
     try:
         yield process
     finally:
@@ -172,40 +182,12 @@ def recorded(path: Path, touches: int = 20) -> tuple[taxel.Recording, list[Detec
     return taxel.open(path), said
 
 
-def spikes_of(events: taxel.Events) -> list[tuple[int, int, float]]:
-    """The spikes of a recording."""
-    trains = ChangeEvents().encode(events)
-    numbers = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
-    return sorted(zip(np.round(trains.times * 1000).astype(int), numbers, trains.values, strict=True))
-
-
-def above_rest(events: taxel.Events) -> np.ndarray:
-    """What the taxels hold at last above their first values, which are the rest (more than the noise floor of 3)."""
-    held, rest = np.zeros(SMALL.shape, int), np.zeros(SMALL.shape, int)
-    for x, y, ticks in zip(events.x, events.y, events.intensity, strict=True):
-        rest[y, x] = rest[y, x] or ticks
-        held[y, x] = ticks
-    above = held - rest
-    return np.where(above > 3, above, 0)
-
-
-def force(events: taxel.Events, times: np.ndarray) -> list[int]:
-    """Ticks above rest over all taxels just before times: what one taxel of `presses` holds above its first value."""
-    found, n = [], 0
-    for t in times:
-        while n < len(events) and events.t[n] < t:
-            n += 1
-        above = int(events.intensity[n - 1]) - int(events.intensity[0]) if n else 0
-        found.append(above if above > 3 else 0)
-    return found
-
-
 @foxglove
 def test_foxglove_hears_a_recording_as_it_is(tmp_path: Path) -> None:
     # All messages fit into the 512 that Foxglove's server keeps for a client, which on a busy machine reads late.
     recording, said = recorded(tmp_path / "one.mcap", touches=8)
     viewer = Viewer(tmp_path / "one.mcap", "foxglove:0", encoder=ChangeEvents(), speed=5.0)
-    with viewer, Foxglove(viewer) as page:
+    with viewer, Foxglove(viewer.place) as page:
         page.meet()
         page.listen(lambda: viewer.state.over, quiet=True)
         state = viewer.stop()
@@ -241,12 +223,13 @@ def test_foxglove_hears_a_recording_as_it_is(tmp_path: Path) -> None:
 
 
 @foxglove
-def test_foxglove_hears_a_board_with_what_is_detected(tmp_path: Path) -> None:
+def test_foxglove_hears_a_board_with_what_is_detected() -> None:
     said: list[Detection] = []
     with (
         Live(0, host=LOOPBACK, array=SMALL, readout=touch(), say=said.append) as live,
-        Viewer(live, "foxglove:0") as viewer,
-        Foxglove(viewer) as page,
+        Panel(live) as panel,
+        Viewer(panel.url, "foxglove:0") as viewer,
+        Foxglove(viewer.place) as page,
     ):
         page.meet()
         eventually(lambda: viewer.state.there)
@@ -307,6 +290,32 @@ def listens(process: int) -> set[str]:
     return found
 
 
+class Show:
+    """The command ``taxel show``, which ends by Ctrl-C."""
+
+    def __init__(self, folder: Path, panel: Panel, to: str, *more: str) -> None:
+        words = command("show", panel.url, to, "--json", *more)
+        self.errors = folder / "errors.txt"
+        with self.errors.open("w") as errors:
+            self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=errors, text=True)
+        assert self.process.stdout is not None
+        self.place = json.loads(self.process.stdout.readline())["place"]
+
+    def __enter__(self) -> Show:
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+    def end(self) -> dict[str, Any]:
+        """Return the last state."""
+        self.process.send_signal(signal.SIGINT)
+        said, _ = self.process.communicate(timeout=SOON)
+        assert self.process.returncode == 0
+        return dict(json.loads(said))
+
+
 @foxglove
 @pytest.mark.slow
 def test_foxglove_is_served_on_loopback_alone_and_one_that_never_reads_holds_nobody_up(tmp_path: Path) -> None:
@@ -314,17 +323,18 @@ def test_foxglove_is_served_on_loopback_alone_and_one_that_never_reads_holds_nob
     events = presses(150)
     with (
         Live(0, host=LOOPBACK, array=SMALL, record=path) as live,
-        Viewer(live, "foxglove:0", encoder=ChangeEvents(), rate_hz=60.0) as viewer,
-        Foxglove(viewer) as page,
+        Panel(live) as panel,
+        Show(tmp_path, panel, "foxglove:0", "--encoder", "change_events") as show,
+        Foxglove(show.place) as page,
     ):
         page.meet()
-        eventually(lambda: viewer.state.there)
-        before = memory_mb(viewer._process.pid)
+        eventually(lambda: ": connected" in show.errors.read_text())
+        before = memory_mb(show.process.pid)
         # The client reads nothing from here on.
         wait_for(live, play(events, live.address[1], pace=0.001))
-        eventually(lambda: viewer.state.sent.get("spikes", 0) >= SEEN * len(events))
-        assert listens(viewer._process.pid) == {"0100007F"}
-        assert memory_mb(viewer._process.pid) < before + 100
+        assert listens(show.process.pid) == {"0100007F"}
+        assert memory_mb(show.process.pid) < before + 100
+        assert show.end()["sent"]["spikes"] >= SEEN * len(events)
     assert live.stop().lost == 0
     assert taxel.open(path).events == events
 
@@ -337,22 +347,22 @@ def test_whatever_becomes_of_rerun_nothing_recorded_is_lost(fate: str, tmp_path:
     with (
         receiver(tmp_path, port) if fate != "missing" else contextlib.nullcontext() as process,
         Live(0, host=LOOPBACK, array=SMALL, record=path) as live,
-        Viewer(live, f"rerun:{LOOPBACK}:{port}", encoder=ChangeEvents(), rate_hz=60.0) as viewer,
+        Panel(live) as panel,
+        Show(tmp_path, panel, f"rerun:{LOOPBACK}:{port}", "--encoder", "change_events") as show,
     ):
+        before = 0
         if process is not None:
-            eventually(lambda: viewer.state.there)
+            eventually(lambda: ": connected" in show.errors.read_text())
+            before = show.errors.stat().st_size
             process.send_signal(signal.SIGSTOP if fate == "stopped" else signal.SIGKILL)
         wait_for(live, play(events, live.address[1], pace=0.001))
-        assert listens(viewer._process.pid) == set()
+        assert listens(show.process.pid) == set()
         if fate != "stopped":
-            eventually(lambda: "no viewer at" in (viewer.state.trouble or ""))
-        # The viewer process reports its state 60 times a second.
-        time.sleep(0.5)
-        assert memory_mb(viewer._process.pid) < 600
-        state = viewer.stop()
-        assert viewer._process.returncode == 0
+            eventually(lambda: "no viewer at" in show.errors.read_text()[before:])
+        assert memory_mb(show.process.pid) < 600
+        state = show.end()
         # All spikes of the encoder were sent, or are counted as lost.
-        total = state.sent.get("spikes", 0) + state.lost.get("spikes", 0)
+        total = state["sent"].get("spikes", 0) + state["lost"].get("spikes", 0)
         assert SEEN * len(events) <= total <= len(events)
     assert live.stop().lost == 0
     assert taxel.open(path).events == events
@@ -361,7 +371,11 @@ def test_whatever_becomes_of_rerun_nothing_recorded_is_lost(fate: str, tmp_path:
 @rerun
 @pytest.mark.slow
 def test_a_rerun_that_comes_back_is_shown_what_comes_then(tmp_path: Path, port: int) -> None:
-    with Live(0, host=LOOPBACK, array=SMALL) as live, Viewer(live, f"rerun:{LOOPBACK}:{port}") as viewer:
+    with (
+        Live(0, host=LOOPBACK, array=SMALL) as live,
+        Panel(live) as panel,
+        Viewer(panel.url, f"rerun:{LOOPBACK}:{port}") as viewer,
+    ):
         for n in range(2):
             with receiver(tmp_path, port):
                 before = viewer.state.sent.get("pictures", 0)
@@ -378,32 +392,14 @@ def test_what_waits_is_bounded_and_what_goes_is_counted() -> None:
     for t in range(3000):
         queue.put(one, Picture(t, zero, zero == 0, zero.astype(np.int8), 1, 1))
         queue.put(one, Note("here", t))
-    assert len(queue) == MOST_PICTURES + MOST_OTHERS
+    assert queue.waiting() == {"pictures": MOST_PICTURES, "notes": MOST_OTHERS}
     assert queue.lost == {"pictures": 3000 - MOST_PICTURES, "notes": 3000 - MOST_OTHERS}
     items = queue.take_all(0.0)
     assert [item.t for _, item in items if isinstance(item, Picture)] == list(range(3000 - MOST_PICTURES, 3000))
     assert [item.t for _, item in items if isinstance(item, Note)] == list(range(3000 - MOST_OTHERS, 3000))
-    assert len(queue) == len(items)
+    assert queue.waiting().total() == len(items)
     queue.done()
-    assert (len(queue), queue.take_all(0.0)) == (0, [])
-
-
-@foxglove
-def test_who_is_killed_leaves_no_process_behind() -> None:
-    script = (
-        "import os, taxel.live as l; live = l.Live(0, host='127.0.0.1'); v = l.Viewer(live, 'foxglove:0'); "
-        "print(v._process.pid, flush=True); os.kill(os.getpid(), 9)"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    process = Path(f"/proc/{int(done.stdout)}/stat")
-
-    def is_over() -> bool:
-        try:
-            return process.read_text().rpartition(")")[2].split()[0] == "Z"
-        except OSError:
-            return True
-
-    eventually(is_over)
+    assert (queue.waiting(), queue.take_all(0.0)) == ({}, [])
 
 
 @pytest.mark.parametrize("to", ["", "foxglove:", "foxglove:65536", "foxglove:8o", "rerun:here", "rerun::1", "ros", 3])
@@ -422,14 +418,14 @@ def test_nonsense_is_refused_by_name(tmp_path: Path) -> None:
     ):
         with pytest.raises(ProblemError, match=said):
             Viewer(tmp_path / "one.mcap", "foxglove:0", **{name: value})
-    with Live(0, host=LOOPBACK) as live, pytest.raises(ProblemError, match="without a tare"):
-        Viewer(live, "foxglove:0", encoder=ContactArea())
+    with Panel(tmp_path / "one.mcap") as panel, pytest.raises(ProblemError, match="refuses the connection"):
+        Viewer(panel.url.replace("token=", "token=0"), "foxglove:0")
     with pytest.raises(FileNotFoundError):
         Viewer(tmp_path / "none.mcap", "foxglove:0")
-    with Panel(tmp_path / "one.mcap") as panel, Viewer(panel, "foxglove:0") as first:
+    with Panel(tmp_path / "one.mcap") as panel, Viewer(panel.url, "foxglove:0") as first:
         taken = first.place.rpartition(":")[2]
         with pytest.raises(OSError, match=f"127.0.0.1:{taken}: Foxglove's server cannot listen there"):
-            Viewer(panel, f"foxglove:{taken}")
+            Viewer(panel.url, f"foxglove:{taken}")
 
 
 @pytest.mark.parametrize("what", ["rerun", "foxglove"])
@@ -439,6 +435,6 @@ def test_an_extra_that_is_not_installed_is_named(
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == what else find(name, *rest))
     with pytest.raises(SystemExit) as ended:
-        main(["live", "--host", LOOPBACK, "--port", "0", "--to", what])
+        main(["show", "walk.mcap", what])
     assert ended.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1] == f"taxel: {what} is not installed: pip install 'taxel[{what}]'"

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from taxel.detections import Detection
-from taxel.labels import Note
-from taxel.live._external_viewer import Disconnected
+from taxel import Detection, Note
 from taxel.live.client import Curves, Item, Picture, Spikes, Subject
 from taxel.spikes import to_ms
+from taxel_viewers.kinds import Disconnected
 
 #: Name of the time line, which has the board's times.
 _TIME = "board"
@@ -40,7 +39,7 @@ class ToRerun:
         self._address, self._name = (host.strip("[]"), port), f"{host}:{port}"
         self._stream: Any = None
         self._tried = -_CONNECT_EVERY_S
-        self._connected = False
+        self._connected = self._closed = False
         self._known: Any = None
 
     def is_connected(self) -> bool:
@@ -107,12 +106,22 @@ class ToRerun:
             try:
                 self._stream.flush(timeout_sec=_FLUSH_S)
             except (RuntimeError, ValueError) as error:
-                # A viewer that only reads slowly still accepts connections.
-                if "timed out" in str(error) and self._answers():
+                # A viewer that only reads slowly still accepts connections. Its stream is kept: to drop it would wait.
+                if "timed out" not in str(error) or not self._answers():
+                    self._stream, self._connected = None, False
+                elif not self._closed:
                     continue
-                self._stream, self._connected = None, False
                 raise Disconnected(str(error)) from None
             return
+
+    def close(self) -> bool:
+        """End a `flush` that waits; return whether the viewer reads: else the library waits for it at its end."""
+        self._closed = True
+        with contextlib.suppress(Disconnected):
+            if self._stream is not None:
+                self.flush()
+            return True
+        return False
 
     def _answers(self) -> bool:
         with contextlib.suppress(OSError), socket.create_connection(self._address, _CONNECT_S):

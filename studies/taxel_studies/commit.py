@@ -80,7 +80,7 @@ def code_version(*packages: str) -> str:
 
     Examples
     --------
-    >>> from taxel.report import code_version
+    >>> from taxel_studies.commit import code_version
     >>> code_version() == code_version("taxel") or "local changes" in code_version()
     True
     """

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.detections import Detection
-from taxel.labels import Note
+from taxel import Detection, Note
 from taxel.live.client import Curves, Item, Picture, Spikes, Subject
 
 #: Messages that wait for each client; beyond them the server drops the oldest.
@@ -145,6 +144,11 @@ class ToFoxglove:
 
     def flush(self) -> None:
         """Return at once: Foxglove's server never waits for a slow client."""
+
+    def close(self) -> bool:
+        """End the server."""
+        self._server.stop()
+        return True
 
     def _stamp(self, t_us: int) -> Any:
         return self._messages.Timestamp(*divmod(_ns(t_us), 10**9))

@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import finite, instance, whole
-from taxel._core import ProblemError
-from taxel.events import Events
+from taxel import Events, ProblemError
 
 __all__ = ["worn"]
 
@@ -20,8 +18,6 @@ _FLICKER_US = 20_000
 #: The largest value of an event, ticks; one more means unknown.
 _MOST = 65_534
 _MINUTE_US = 60_000_000
-#: The oldest tare, min: a year.
-_OLDEST_MIN = 525_600
 
 
 class _Added(NamedTuple):
@@ -57,9 +53,9 @@ def worn(
         When the tare ends.
     seed : int, 0 or more
         Draws drifts, taxels and values.
-    drift : float, ticks a minute, from 0 to 65 534
+    drift : float, ticks a minute
         Standard deviation over taxels.
-    age_min : float, min, from 0 to 525 600, a year
+    age_min : float, min
         How old the tare is at `since_us`: for so long taxels have drifted.
     stuck, flickering, pairs : int, 0 or more
         How many taxels hold one value, drawn from 0 to the largest of the recording; how many are at random now at
@@ -73,7 +69,7 @@ def worn(
 
     Raises
     ------
-    ProblemError : events without intensities, sizes that are invalid, or more bad taxels than there are
+    ProblemError : more bad taxels than there are
 
     Examples
     --------
@@ -82,22 +78,19 @@ def worn(
     >>> worn(events, 40, seed=1, drift=2.0, age_min=10.0).intensity
     array([50, 60, 57, 76, 87], dtype=uint16)
     """
-    since, seed = whole("since_us", since_us), whole("seed", seed, 0)
-    per_minute = finite("drift", drift, least=0.0, most=_MOST)
-    age = finite("age_min", age_min, "min", least=0.0, most=_OLDEST_MIN)
-    counts = [whole(name, n, 0) for name, n in (("stuck", stuck), ("flickering", flickering), ("pairs", pairs))]
-    if instance("events", events, Events).intensity is None:
-        raise ProblemError("events without intensities: nothing says which values their taxels hold")
     rng = np.random.default_rng([seed])
     held = _Held(events)
-    stop = max([since, *events.t[-1:].tolist(), *(t for t, _ in events.markers)])
-    rates = rng.normal(0.0, per_minute, held.taxels) / _MINUTE_US
-    bad, changes = _bad(rng, held, since, stop, counts)
-    drifting = np.setdiff1d(held.known(since), bad)
-    added = [*changes, *(_steps(held, place, float(rates[place]), age * _MINUTE_US, since, stop) for place in drifting)]
-    shifted = np.rint(held.value + rates[held.place] * (age * _MINUTE_US + held.t - since)).astype(np.int64)
-    value = np.where(held.t < since, held.value, shifted)
-    kept = (held.t < since) | ~np.isin(held.place, bad)
+    stop = max([since_us, *events.t[-1:].tolist(), *(t for t, _ in events.markers)])
+    rates = rng.normal(0.0, drift, held.taxels) / _MINUTE_US
+    bad, changes = _bad(rng, held, since_us, stop, (stuck, flickering, pairs))
+    drifting = np.setdiff1d(held.known(since_us), bad)
+    added = [
+        *changes,
+        *(_steps(held, place, float(rates[place]), age_min * _MINUTE_US, since_us, stop) for place in drifting),
+    ]
+    shifted = np.rint(held.value + rates[held.place] * (age_min * _MINUTE_US + held.t - since_us)).astype(np.int64)
+    value = np.where(held.t < since_us, held.value, shifted)
+    kept = (held.t < since_us) | ~np.isin(held.place, bad)
     return _merged(events, held, value, kept, added)
 
 
@@ -140,7 +133,7 @@ def _steps(held: _Held, place: int, rate: float, age_us: float, since: int, stop
 
 
 def _bad(
-    rng: np.random.Generator, held: _Held, since: int, stop: int, counts: list[int]
+    rng: np.random.Generator, held: _Held, since: int, stop: int, counts: tuple[int, int, int]
 ) -> tuple[NDArray[np.int64], list[_Added]]:
     """Return the places of bad taxels, and their values."""
     stuck, flickering, pairs = counts

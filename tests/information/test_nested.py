@@ -1,0 +1,103 @@
+"""Nested predictions: what they choose inside the folds and what they refuse; neurons as classifiers."""
+
+import numpy as np
+import pytest
+from refusal import refused
+from sklearn.base import clone
+from sklearn.model_selection import cross_val_score
+
+from taxel import ProblemError, SpikeTrains
+from taxel.information import ConeRReadout, TempotronReadout, nested_predictions
+
+
+def clouds(trials, features, classes, seed, apart=1.0):
+    random = np.random.default_rng(seed)
+    y = random.integers(0, classes, trials)
+    y[:classes] = np.arange(classes)
+    y[classes : 2 * classes] = np.arange(classes)
+    x = random.normal(size=(classes, features))[y] * apart + random.normal(size=(trials, features))
+    return x @ (np.eye(features) + 0.3 * random.normal(size=(features, features))), y
+
+
+@pytest.mark.parametrize("scale", [1e-100, 1.0, 1e100])
+@pytest.mark.parametrize("ridge", [5e-324, 1e-310, 1e-200, 1e-17])
+def test_a_ridge_that_rounding_loses_is_named(ridge, scale):
+    x, y = np.random.default_rng(3).normal(size=(30, 4)), np.repeat([0, 1, 2], 10)
+    with pytest.raises(ProblemError, match=r"^ridge: .* is lost in their rounding; must be .* at least"):
+        nested_predictions([scale * (x @ x.T)], [4], y, ridges=[1.0, ridge])
+
+
+@pytest.mark.parametrize("trials", [10, 200])
+@pytest.mark.parametrize("power", [-4, -8, -12])
+def test_a_ridge_above_rounding_is_solved(trials, power):
+    x, y = np.random.default_rng(4).normal(size=(trials, 4)), np.arange(trials) % 2
+    assert nested_predictions([x @ x.T], [4], y, ridges=[10.0**power], count=3).responses.shape == (trials,)
+
+
+def test_nothing_is_learnt_from_the_trials_that_are_tested():
+    """Labels without any pattern, the best of many ways chosen inside the folds: no better than chance."""
+    random = np.random.default_rng(17)
+    right = []
+    for seed in range(12):
+        x = random.normal(size=(60, 500))
+        y = random.permutation(np.arange(60) % 3)
+        grams = [x @ x.T, x[:, :50] @ x[:, :50].T, x[:, 50:90] @ x[:, 50:90].T]
+        right.append((nested_predictions(grams, [500, 50, 40], y, count=6, inner=3, seed=seed).responses == y).mean())
+    assert abs(np.mean(right) - 1 / 3) < 0.06
+
+
+def test_neighbours_are_chosen_inside_the_folds_too():
+    x, y = clouds(90, 6, 3, 30, apart=2.0)
+    found = nested_predictions([x @ x.T], [6], y, count=5, neighbours=(1, 5, 9))
+    assert (found.responses == y).mean() > 0.7
+    assert {ridge for _, ridge in found.chosen.values()} <= {1.0, 5.0, 9.0}
+
+
+def test_a_class_that_a_training_set_lacks_is_said():
+    y = np.array([0, 0, 0, 1, 1, 1, 2, 2, 2, 2])
+    groups = np.array([0, 1, 2, 0, 1, 2, 3, 3, 3, 4])
+    random = np.random.default_rng(1)
+    x = random.normal(size=(10, 30)) + np.eye(3, 30)[y]
+    found = nested_predictions([x @ x.T], [30], y, groups=groups, count=2, inner=2)
+    assert found.missing == ()
+    assert set(found.responses) <= {0, 1, 2}
+    one = np.array([0] * 6 + [1] * 6 + [2] * 6)
+    apart_ = np.array([0, 1, 2, 3, 4, 5] * 2 + [6, 6, 6, 7, 7, 7])
+    x = random.normal(size=(18, 30)) + 3 * np.eye(3, 30)[one]
+    both = nested_predictions([x @ x.T], [30], one, groups=apart_, count=2, inner=2)
+    assert isinstance(both.missing, tuple)
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2), "not symmetric"),
+        (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "one a matrix"),
+        (lambda: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]), "above 0"),
+        (lambda: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2), "must be two at least"),
+        (lambda: TempotronReadout().predict([]), "not fitted"),
+        (lambda: TempotronReadout().set_params(epoch=1), "no parameter 'epoch'"),
+    ],
+)
+def test_what_cannot_be_learnt_is_one_clear_error(call, text):
+    with pytest.raises(ProblemError, match=text):
+        call()
+
+
+def test_scikit_learn_can_clone_and_cross_validate_neurons():
+    assert clone(ConeRReadout(tau=5.0)).get_params() == {"tau": 5.0, "bound": 0.3, "max_seconds": 10.0}
+    patterns = [SpikeTrains.from_lists([[t], [30.0 - t]], stop=30.0) for t in np.linspace(1, 9, 12) + [0, 20] * 6]
+    shares = cross_val_score(TempotronReadout(tau=5.0), patterns, [0, 1] * 6, cv=3)
+    assert shares.mean() > 0.7
+
+
+@pytest.mark.parametrize("readout", [ConeRReadout, TempotronReadout])
+def test_readouts_of_classes_refuse_graded_trains_by_name(readout):
+    graded, plain = (
+        [SpikeTrains.from_lists([[1.0 + k], [2.0]], stop=10.0, values=values, kind=kind) for k in range(4)]
+        for values, kind in (([[2.0], [1.0]], "graded"), (None, None))
+    )
+    one = readout().fit(plain, [0, 0, 1, 1])
+    for call in (lambda: readout().fit(graded, [0, 0, 1, 1]), lambda: one.predict(graded)):
+        with refused(f"^{readout.__name__} takes no graded trains"):
+            call()
