@@ -69,7 +69,7 @@ def simulate(
             played = taxel.simulate.play(
                 scene_file.acts(),
                 seed=seed,
-                watch=lambda share: show("playing", round(1000 * share), 1000),
+                watch=lambda share: show("playing", round(100 * share), 100),
                 **scene_file.options,
             )
             about["events"] = len(played.events)
@@ -85,7 +85,7 @@ def simulate(
                 frame_us=scene_file.registers.frame_us,
                 slower=slower,
                 overwrite=overwrite,
-                watch=lambda share: show("drawing", round(1000 * share), 1000),
+                watch=lambda share: show("drawing", round(100 * share), 100),
             )
             lines.append(f"movie written to {movie}")
     if labels is not None:
