@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from taxel import Detection, Note
 from taxel.live.client import Curves, Frame, Item, Spikes, Subject
 
-__all__ = ["ToFoxglove"]
-
 #: Messages that wait for each client; beyond them the server drops the oldest.
 _BACKLOG = 512
 

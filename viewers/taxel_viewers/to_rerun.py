@@ -16,8 +16,6 @@ from taxel.live.client import Curves, Frame, Item, Spikes, Subject
 from taxel.spikes import to_ms
 from taxel_viewers.kinds import Disconnected
 
-__all__ = ["ToRerun"]
-
 #: Name of the time line, which has the board's times.
 _TIME = "board"
 

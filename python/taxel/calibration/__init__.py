@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.columns import frozen
 from taxel._base.documents import object_of_json

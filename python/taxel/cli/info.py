@@ -92,11 +92,11 @@ def info(
         if len(every) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:
                 raise ProblemError(_several(file, every))
-            infos = [taxel.tasks.info(one, tare) for one in every]
-            of_each = [one.facts for one in infos]
+            infos = [taxel.tasks.info(each, tare) for each in every]
+            of_each = [found.facts for found in infos]
             result = [json.dumps(of_each if len(every) > 1 else of_each[0])]
             say(*(result if as_json else chain.from_iterable(map(_pages, of_each))))
-            say_warnings(dict.fromkeys(text for one in infos for text in one.warnings))
+            say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return
         found = taxel.tasks.info(recording, tare)
         facts, pressed = found.facts, found.pressed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -146,10 +147,8 @@ def _points(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, float
     by_total = np.unique(np.quantile(totals, QUANTILES)).tolist() if len(totals) else []
     thresholds = {"area": AREAS, "total": by_total, "local_load": LOCAL_LOADS}
     for quantity in loads.quantities:
-        for threshold in thresholds[quantity]:
-            for frames in FRAMES:
-                for release in RELEASES:
-                    yield quantity, threshold, release, frames
+        for threshold, frames, release in product(thresholds[quantity], FRAMES, RELEASES):
+            yield quantity, threshold, release, frames
 
 
 def _at_edges(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path
 from taxel._base.limits import TAXELS, TIME_US
 from taxel._core import FormatError
 from taxel.array import Array

@@ -137,7 +137,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     ------
     FormatError : a line without 13 numbers, or times that do not ascend (names file and line)
     """
-    path = Path(arguments.path("path", path))
+    path = Path(arguments.checked_path("path", path))
     rows = [line.split() for line in text.lines(path)]
     values = text.numbers(rows, path, 1, _TS_COLUMNS)
     if not len(values):

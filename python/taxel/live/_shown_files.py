@@ -28,8 +28,6 @@ from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import is_recording, open_joined
 from taxel.recording.rest import flickering, loaded_from, of_frames, ticks_by_unit
 
-__all__ = ["Opening", "ReadFrames", "ShownFiles", "side_by_side"]
-
 #: Of a text table of more bytes than this the beginning is shown first, of so many bytes.
 _LARGE, _BEGINNING = 8 << 20, 1 << 19
 _TEXTS = {".csv", ".txt", ".asc", ".asf", ".lst"}

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, numbers, shown, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, finite, flag, numbers, shown, text, whole
 from taxel._base.errors import refused
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped
@@ -28,8 +27,6 @@ from taxel.live.options import LiveOptions
 from taxel.live.summary import Summary, summary_of
 from taxel.recording.changes import Zeroing
 from taxel.tare import Tare
-
-__all__ = ["Live"]
 
 #: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"

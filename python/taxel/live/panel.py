@@ -9,8 +9,7 @@ from pathlib import Path
 from types import TracebackType
 
 from taxel import _core
-from taxel._base.arguments import callback, flag, instance, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import callback, checked_path, flag, instance, text, whole
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detect import load
@@ -26,8 +25,6 @@ from taxel.recording.frames import period_us
 from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import check_recording, recordings_in
 from taxel.tare import Tare
-
-__all__ = ["Panel"]
 
 
 class Panel:

@@ -26,8 +26,6 @@ from taxel.recording.pressure import above_rest_at
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 
-__all__ = ["film", "writer_of"]
-
 #: Frame rate of the film, Hz.
 _RATE_HZ = 20
 #: The most frames of a film.

@@ -17,8 +17,6 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["detections", "event_picture", "pressure_map", "raster"]
-
 ON, OFF = "#c44e52", "#4c72b0"
 
 

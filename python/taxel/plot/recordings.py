@@ -19,8 +19,6 @@ from taxel.recording import Health, Recording, health
 from taxel.recording.pressure import Series, above_rest
 from taxel.recording.rest import Rest
 
-__all__ = ["health_map", "overview", "pressure"]
-
 F = TypeVar("F", bound=FigureBase)
 
 _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}

@@ -23,8 +23,6 @@ from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.verdict import Verdict
 
-__all__ = ["Slices", "between", "inside"]
-
 #: So many bytes at either end of a file name a recording.
 _END = 1 << 16
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from taxel import _core
 from taxel._base import limits
-from taxel._base.arguments import flag, path, shown, text
+from taxel._base.arguments import checked_path, flag, shown, text
 from taxel._base.errors import refused
 from taxel._base.files import whole_file, write_whole
 from taxel._base.messages import counted
@@ -83,7 +83,7 @@ def convert(
     >>> taxel.convert(folder / "two.npz", folder / "two.lsa")
     ['the sensor (8 x 8 taxels, of unknown pitch, "array")', 'times finer than 100 us']
     """
-    place = Path(path("target", target))
+    place = Path(checked_path("target", target))
     kind = place.suffix.lower()
     if kind not in KINDS:
         raise ProblemError(f"{place}: ends in {kind or 'nothing'!r}; must be {', '.join(KINDS)}")

@@ -17,8 +17,6 @@ from taxel.recording.contents import Contents, applied
 from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 
-__all__ = ["cut", "region", "span_us"]
-
 
 def cut(
     recording: Recording,

@@ -29,11 +29,6 @@ from taxel.recording.once import known
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
-__all__ = [
-    "about_of", "array_of", "board_changes_of", "counts_of", "described_source", "detections_of", "json_of",
-    "notes_of", "turned_of", "zeroings_of",
-]  # fmt: skip
-
 
 def json_of(of: Source) -> str:
     """Return all fields that are not columns of the table, as the JSON in files.

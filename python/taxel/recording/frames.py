@@ -20,8 +20,6 @@ from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source
 from taxel.recording.once import UNKNOWN, Once, known
 from taxel.tare import Tare
 
-__all__ = ["FRAMES_HZ", "as_frames", "at_rate", "calibrated", "period_us", "times_at"]
-
 #: The default rate of frames of a recording of events, Hz.
 FRAMES_HZ = 100.0
 

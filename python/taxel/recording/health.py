@@ -24,8 +24,6 @@ from taxel.recording.rest import FORCE_UNITS, flickering, ticks_by_unit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Health", "TaxelStatistics", "Touches", "health", "judged"]
-
 #: Reading: a taxel is dead, or stuck, if its place was touched at least this number of times (`_core`, *touch counts*)
 #: and it never changed meanwhile, if it has this number of neighbours: beyond the edge of an insole nothing presses ...
 TOUCHED_FROM, NEIGHBOURS_FROM = 3, 5

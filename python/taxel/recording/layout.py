@@ -24,8 +24,6 @@ from taxel.recording.frames import times_at
 from taxel.recording.once import known
 from taxel.recording.parts import Changes, Readings
 
-__all__ = ["check_size", "laid_out", "on_array"]
-
 #: Units that say nothing: what a table or a stream of numbers holds.
 _UNSAID = ("counts", "as sent")
 

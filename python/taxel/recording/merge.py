@@ -31,8 +31,6 @@ from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
-__all__ = ["merge", "merged"]
-
 T = TypeVar("T")
 #: What has a time of its own.
 M = TypeVar("M", Note, BoardChange)

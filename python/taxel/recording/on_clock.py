@@ -23,8 +23,6 @@ from taxel.recording.once import Once
 from taxel.recording.read_mcap import ascending
 from taxel.recording.verdict import Verdict
 
-__all__ = ["HOST", "on_clock"]
-
 #: The name of the host's clock, us since 1970.
 HOST = "host"
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import instance, several, text
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, instance, several, text
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
@@ -19,8 +18,6 @@ from taxel.recording.contents import Contents
 from taxel.recording.layout import on_array
 from taxel.recording.opening import joined, sensors
 from taxel.recording.read_foreign import is_lone_array
-
-__all__ = ["OpenOptions", "sensors_of"]
 
 
 @dataclass(frozen=True)

@@ -42,18 +42,6 @@ from taxel.recording.recording import Recording, noted
 from taxel.recording.sidecars import labels_of, with_sidecars
 from taxel.recording.without_layout import refuse_without_layout
 
-__all__ = [
-    "check_recording",
-    "is_recording",
-    "joined",
-    "open_all",
-    "open_joined",
-    "open_one",
-    "open_recording",
-    "recordings_in",
-    "sensors",
-]
-
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
 
@@ -130,7 +118,7 @@ def open_one(
     Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
     """
     how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
-    place = Path(arguments.path("path", path))
+    place = Path(arguments.checked_path("path", path))
     if place.is_dir() and not is_bag(place):
         raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
     every = _open(place, how)
@@ -195,7 +183,7 @@ def open_all(
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
     how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
-    return _open(Path(arguments.path("path", path)), how)
+    return _open(Path(arguments.checked_path("path", path)), how)
 
 
 def _open(place: Path, how: How) -> list[Recording]:
@@ -258,7 +246,7 @@ def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
     """
     said = How(**how)
     with said.within():
-        return _open_one(Path(arguments.path("path", path)), said)
+        return _open_one(Path(arguments.checked_path("path", path)), said)
 
 
 def _open_one(place: Path, how: How) -> Recording:
@@ -455,7 +443,7 @@ def _layout(place: Path, given: str | os.PathLike[str] | Layout | None) -> Layou
     """Return what the given layout file says, or the one beside a recording; None if there is none."""
     if isinstance(given, Layout):
         return given
-    file = Layout.beside(place) if given is None else Path(arguments.path("layout", given))
+    file = Layout.beside(place) if given is None else Path(arguments.checked_path("layout", given))
     return None if file is None else Layout.read(file)
 
 

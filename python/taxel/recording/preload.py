@@ -12,8 +12,6 @@ from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, of_quiet
 from taxel.tare import Tare
 
-__all__ = ["free_of_preload", "without_preload"]
-
 #: A tare lasts so long at least, us, and so many frames.
 _LEAST_US, _LEAST_FRAMES = 10_000, 20
 

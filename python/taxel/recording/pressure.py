@@ -33,8 +33,6 @@ from taxel.recording.rest import (
 )
 from taxel.tare import Tare
 
-__all__ = ["Series", "above_rest", "above_rest_at", "quiet_rest", "readings", "series"]
-
 #: The most frames of a long recording, as a plot resolves no more points.
 MOST_FRAMES = 2000
 #: Number of values of frames that are computed at once.

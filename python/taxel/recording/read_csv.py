@@ -32,8 +32,6 @@ from taxel.recording.contents import Source, source_from
 from taxel.recording.parts import Origin
 from taxel.recording.read_npz import around
 
-__all__ = ["EVENTS", "MORE", "check_head", "read_csv"]
-
 #: Columns of events: those that a table must have, and those that may follow.
 EVENTS = ("t_us", "x", "y", "p")
 MORE = ("intensity", "repaired")

@@ -37,23 +37,6 @@ from taxel.recording.once import known
 from taxel.recording.parts import Losses, Origin
 from taxel.recording.read_h5 import is_ours
 
-__all__ = [
-    "ARRAYS",
-    "MISSING",
-    "are_units",
-    "arrays_of",
-    "cells",
-    "ends_in_separator",
-    "is_foreign",
-    "is_lone_array",
-    "listed",
-    "read_foreign",
-    "seconds_of",
-    "shapes_of",
-    "times_of",
-    "unit_of",
-]
-
 #: The endings of tables of text, also compressed by gzip, and of files of arrays.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5")

@@ -16,8 +16,6 @@ from taxel.recording.read_npz import DTYPES, chosen, source_of_columns
 from taxel.recording.write_h5 import MARK, VERSION
 from taxel.recording.write_npz import TEXTS
 
-__all__ = ["is_ours", "read_h5"]
-
 #: Bytes of a file that are searched at once.
 _PIECE_BYTES = 1 << 20
 

@@ -34,8 +34,6 @@ from taxel.recording.raw import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
-__all__ = ["DOUBTS", "STEPS", "ascending", "read_mcap"]
-
 #: The damage after which times are doubtful; from when on is known by the file's own times alone.
 DOUBTS = ("jumps_of_time", "stamps_out_of_order", "drifts_from_arrival")
 #: What is counted where times step back, by how much and where.

@@ -27,8 +27,6 @@ from taxel.recording.layout import check_size
 from taxel.recording.parts import Origin
 from taxel.recording.write_npz import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
 
-__all__ = ["DTYPES", "around", "chosen", "read_npz", "source_of_columns"]
-
 #: Columns of events, one entry each.
 _OF_EVENTS = (*EVENTS, "intensity", "present", "repaired")
 #: The columns that are converted as they are read.

@@ -39,8 +39,6 @@ from taxel.wire import Registers
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Recording"]
-
 
 class Recording:
     """Hold an opened file; each attribute is read at its first access.

@@ -18,23 +18,6 @@ from taxel.formats.layout import Layout, or_given
 from taxel.frames import Frames
 from taxel.tare import Tare
 
-__all__ = [
-    "BY_UNIT",
-    "FORCE_UNITS",
-    "SHARE",
-    "TIMES_NOISE",
-    "FrameBlock",
-    "Rest",
-    "by_unit",
-    "flickering",
-    "found",
-    "loaded_from",
-    "of_frames",
-    "of_quiet",
-    "ticks_by_unit",
-    "tracked",
-]
-
 #: Units of force and pressure: an unloaded taxel reads 0 in them.
 FORCE_UNITS = ("N", "mN", "kPa", "Pa", "N/cm2")
 #: The note of a tare that was not measured.

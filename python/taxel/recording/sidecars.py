@@ -13,8 +13,6 @@ from taxel.recording.frames import calibrated
 from taxel.recording.once import Once, known
 from taxel.recording.parts import Origin
 
-__all__ = ["calibrated_by", "calibration_beside", "has_calibration", "labels_of", "with_sidecars"]
-
 
 def with_sidecars(of: Contents) -> Contents:
     """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration in its folder."""

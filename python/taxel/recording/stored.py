@@ -39,8 +39,6 @@ from taxel.recording.write_csv import array_in_csv
 from taxel.recording.write_mcap import cut_raw, encoded
 from taxel.wire import decode as wire_decode
 
-__all__ = ["STAMP_US", "is_made", "stored"]
-
 #: The unit of the stamps of wire version 1, us.
 STAMP_US = 100
 

@@ -14,8 +14,6 @@ from taxel.recording.health import health
 from taxel.recording.pressure import Series
 from taxel.recording.recording import Recording
 
-__all__ = ["summary"]
-
 #: The interval over which the highest rate is measured, us.
 _PEAK_US = 10_000
 #: Reading: frames are apart by a gap if by so many median intervals.

@@ -34,8 +34,6 @@ from taxel.recording.read_foreign import (
     unit_of,
 )
 
-__all__ = ["are_spike_trains", "refuse_without_layout"]
-
 #: A column without a name is one of times if it ascends for so many lines.
 _ASCENDS = 20
 _NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and without it frames are numbered"

@@ -13,8 +13,6 @@ from taxel.frames import Frames
 from taxel.recording.read_csv import EVENTS, MORE
 from taxel.recording.read_npz import around
 
-__all__ = ["array_in_csv", "write_csv"]
-
 #: Number of frames that are written at once.
 _FRAMES = 4096
 

@@ -22,8 +22,6 @@ from taxel._base import h5_writing
 from taxel.recording.contents import Source
 from taxel.recording.write_npz import TEXTS, columns_of
 
-__all__ = ["MARK", "VERSION", "write_h5"]
-
 #: Name of the attribute that has the version of the layout.
 MARK = "taxel"
 #: Version of the layout.

@@ -20,8 +20,6 @@ from taxel.frames import Frames
 from taxel.recording.contents import Source
 from taxel.recording.description import json_of
 
-__all__ = ["COLUMNS", "DIGEST", "EVENTS", "PIECE_BYTES", "TEXTS", "columns_of", "digest_of", "write_npz"]
-
 EVENTS = ("t", "x", "y", "p")
 COLUMNS = (*EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
 #: The columns that are a single text, and how many characters they may have; NumPy's have 4 bytes.

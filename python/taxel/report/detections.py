@@ -269,14 +269,12 @@ def _potential(
         axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1, label="potential")
         threshold = readout.run_threshold * cell.neuron.theta_0
         axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
-        for k, t in enumerate(detected_ms[np.abs(detected_ms - at) < reach]):
-            axis.axvline(t - at, color=_DETECTED, linewidth=1.2, label="detected" * (k == 0))
         true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
-        for k, t in enumerate(true[np.abs(true - at) < reach]):
-            axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--", label="true" * (k == 0))
         felt = np.empty(0) if aligned is None else to_ms(aligned.felt(moment.recording))
-        for k, t in enumerate(felt[np.abs(felt - at) < reach]):
-            axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle=":", label="felt" * (k == 0))
+        lines = (("detected", detected_ms, _DETECTED, "-"), ("true", true, _TRUE, "--"), ("felt", felt, _TRUE, ":"))
+        for what, ms, color, style in lines:
+            for k, t in enumerate(ms[np.abs(ms - at) < reach]):
+                axis.axvline(t - at, color=color, linewidth=1.2, linestyle=style, label=what * (k == 0))
         axis.set_title(escaped(f"{moment.what}, {(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s"), fontsize=9)
         axis.set_xlabel("ms from then")
         axis.legend()

@@ -17,6 +17,8 @@ from taxel.recording import Recording
 from taxel.spikes import SpikeTrains
 from taxel.tasks.rest import GivenTare, check_tare, given_or_by_unit
 
+__all__ = ["EncodeOptions", "Encoded", "encode", "encoder_of"]
+
 
 def encoder_of(name: str | None, values: Mapping[str, Any]) -> Encoder:
     """Return the encoder of a name with its parameters, of which `name` may be one."""

@@ -10,8 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, instance, number
 from taxel._base.errors import helped, refused
 from taxel._base.messages import warn
 from taxel._base.number_text import float_of
@@ -120,8 +119,8 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
         return TakenRest("unit", zero, begin_us)
     found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
     if found is not None and found.preload_at:
-        span, said = free_of_preload(recording, found)
-        warn(said, stacklevel=2)
+        span, warning = free_of_preload(recording, found)
+        warn(warning, stacklevel=2)
     else:
         span = None if found is None else found.quiet_us
     if span is None:
@@ -212,9 +211,9 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return zero
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
-    tare, said = without_preload(recording, first)
-    if said:
-        warn(said, stacklevel=2)
+    tare, warning = without_preload(recording, first)
+    if warning:
+        warn(warning, stacklevel=2)
     if tare is not None:
         return tare
     if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_FRAMES <= len(source):

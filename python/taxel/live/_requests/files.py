@@ -15,8 +15,6 @@ from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.health import TaxelStatistics, Touches, judged
 
-__all__ = ["FileRequests"]
-
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
 
