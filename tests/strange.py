@@ -39,7 +39,7 @@ def wrong(said: str) -> str:
 
 
 def pressed(n: int = 400) -> np.ndarray[Any, Any]:
-    """Values of 2 x 3 taxels with a press in each 80 pictures."""
+    """Values of 2 x 3 taxels with a press in each 80 frames."""
     values = np.random.default_rng(3).integers(0, 3, (n, 2, 3)).astype(float)
     for k in range(40, n, 80):
         values[k : k + 30, :, 1:] += 300
@@ -47,13 +47,13 @@ def pressed(n: int = 400) -> np.ndarray[Any, Any]:
 
 
 def frames() -> taxel.Frames:
-    """Pictures of an array whose name and names of taxels are hostile, in a hostile unit."""
+    """Frames of an array whose name and names of taxels are hostile, in a hostile unit."""
     array = taxel.Array(2, 3, names=[f"{k}{NAME}" for k in range(6)], name=NAME)
     return taxel.Frames(pressed(), np.arange(400) * 10_000, unit=CELL, array=array)
 
 
 def recording(source: str = NAME) -> Recording:
-    """Such pictures with hostile notes, detections, source and remarks."""
+    """Such frames with hostile notes, detections, source and remarks."""
     found = taxel.Detections([NAME, CELL], [500_000, 900_000], [500_000, 900_000], [1.0, 1.0])
     marks = Marks(notes=known((Note(NAME, 300_000, 0), Note(CELL, 600_000, 0))), detections=known(found))
     losses = Losses(remarks=(NAME,), lost=known((NAME,)))

@@ -228,7 +228,7 @@ def forked(work):
 
 
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
-@pytest.mark.parametrize("what", ["stop", "counters", "next", "note", "zeroed", "picture"])
+@pytest.mark.parametrize("what", ["stop", "counters", "next", "note", "zeroed", "frame"])
 def test_a_forked_child_that_uses_its_parents_live_gets_one_clear_error(what):
     with taxel.live.Live(0, host="127.0.0.1") as live:
         calls = {
@@ -237,7 +237,7 @@ def test_a_forked_child_that_uses_its_parents_live_gets_one_clear_error(what):
             "next": lambda: live.next(0.1),
             "note": lambda: live.note("here"),
             "zeroed": lambda: live.zeroed,
-            "picture": lambda: live.picture,
+            "frame": lambda: live.frame,
         }
         said = forked(calls[what])
     assert said == (

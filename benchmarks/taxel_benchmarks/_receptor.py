@@ -19,7 +19,7 @@ def low_pass(tau: float, period: float) -> Callable[[Any, Any, Any], Any]:
 
 
 def filter_of(encoder: SA1 | SA2 | FA2, x: Any) -> Callable[[Any], Any]:
-    """Return a function from the next picture to the potential."""
+    """Return a function from the next frame to the potential."""
     period, state = encoder.period_ms, {"x": x}
     if isinstance(encoder, FA2):
         corner, membrane = low_pass(encoder.corner_ms, period), low_pass(encoder.membrane_ms, period)
@@ -56,9 +56,9 @@ def numpy_afferents(encoder: SA1 | SA2 | FA2, frames: Frames) -> list[Any]:
     u = 0 * x if isinstance(encoder, FA2) else (1 - encoder.loss) * x
     raised, wait = np.maximum(u - encoder.threshold, 0), np.zeros_like(x)
     keep = np.exp(-period / encoder.recovery_ms)
-    for t, picture in zip(frames.t[1:], frames.values[1:], strict=True):
+    for t, frame in zip(frames.t[1:], frames.values[1:], strict=True):
         below = encoder.threshold + raised - u
-        u = step(np.maximum(picture, 0).astype(np.float64).ravel() / encoder.range)
+        u = step(np.maximum(frame, 0).astype(np.float64).ravel() / encoder.range)
         raised = raised * keep
         fired = np.flatnonzero((u >= encoder.threshold + raised) & (wait < period))
         above = u[fired] - encoder.threshold - raised[fired]

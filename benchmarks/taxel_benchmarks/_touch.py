@@ -20,7 +20,7 @@ PERIOD_US, FLOOR = 192, 3.0
 
 
 class Scene(NamedTuple):
-    """Pictures in ticks, pictures of pressure, the tare of the taxels at rest, and the board's events."""
+    """Frames in ticks, frames of pressure, the tare of the taxels at rest, and the board's events."""
 
     ticks: Frames
     pressure: Frames
@@ -47,7 +47,7 @@ def scene(seconds: float) -> Scene:
 
 
 def board_events(frames: Frames) -> Events:
-    """Return the events of a board with the floor: the first picture, then changes against the last sent value."""
+    """Return the events of a board with the floor: the first frame, then changes against the last sent value."""
     spikes = ChangeEvents(noise_floor=FLOOR).encode(frames)
     times, taxels = spikes.to_numpy()
     k = np.rint(times * 1000 / PERIOD_US).astype(int)
@@ -57,9 +57,9 @@ def board_events(frames: Frames) -> Events:
     return Events(frames.t[k], taxels % 64, taxels // 64, np.ones(len(k), bool), array=frames.array, intensity=ticks)
 
 
-def loaded(picture: Any, loaded_from: Any) -> Any:
+def loaded(frame: Any, loaded_from: Any) -> Any:
     """Return which taxels are loaded and have a loaded neighbour."""
-    wide = np.pad(picture >= loaded_from, 1)
+    wide = np.pad(frame >= loaded_from, 1)
     rows = wide[:-2] | wide[1:-1] | wide[2:]
     beside = rows[:, :-2] | rows[:, 2:] | wide[:-2, 1:-1] | wide[2:, 1:-1]
     return wide[1:-1, 1:-1] & beside

@@ -33,7 +33,6 @@ def run(*, quick: bool) -> dict[str, Any]:
             seed=1,
             live=False,
             noise_s=5.0 if quick else None,
-            data=None,
             readout=None,
             folder=Path(place) / "demo",
         )
@@ -45,4 +44,4 @@ def run(*, quick: bool) -> dict[str, Any]:
             ratios[f"{touch}, {label}: plain rule's delay over ours"] = (
                 rule["known_ms"]["p50"] / ours["known_ms"]["p50"]
             )
-    return stamp() | values | {"ratios": ratios}
+    return values | stamp() | {"ratios": ratios}

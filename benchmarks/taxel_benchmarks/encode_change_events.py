@@ -20,12 +20,12 @@ from taxel_benchmarks._touch import FLOOR, compare, scene
 def numpy_change(frames: Frames) -> list[Any]:
     """Return (t, taxel, rise or fall) of changes above the floor since the last sent value."""
     spikes, last = [], frames.values[0].copy()
-    for t, picture in zip(frames.t[1:], frames.values[1:], strict=True):
-        moved = picture - last
+    for t, frame in zip(frames.t[1:], frames.values[1:], strict=True):
+        moved = frame - last
         there = np.abs(moved) > FLOOR
         if there.any():
             spikes += [(t, taxel_, np.sign(moved.ravel()[taxel_])) for taxel_ in np.flatnonzero(there)]
-            last[there] = picture[there]
+            last[there] = frame[there]
     return spikes
 
 

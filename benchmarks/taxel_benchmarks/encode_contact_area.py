@@ -23,8 +23,8 @@ def numpy_area(frames: Frames, tare: Tare) -> list[Any]:
     """Return (t, train) of rises and falls of the number of loaded taxels with a loaded neighbour."""
     spikes, before = [], 0
     loaded_from = tare.rest + FLOOR + 0.5
-    for t, picture in zip(frames.t, frames.values, strict=True):
-        area = int(np.count_nonzero(loaded(picture, loaded_from)))
+    for t, frame in zip(frames.t, frames.values, strict=True):
+        area = int(np.count_nonzero(loaded(frame, loaded_from)))
         if area != before:
             spikes += [(t, k) for k, level in enumerate(LEVELS) if before < level <= area]
             spikes += [(t, 5 + k) for k, level in enumerate(LEVELS) if area < level <= before]

@@ -24,8 +24,8 @@ def numpy_crossing(frames: Frames, levels: list[float], share: float) -> list[An
     off_at = np.array([share * level for level in levels], np.float32)[:, None, None]
     above = frames.values[0] >= on_at
     train = np.arange(above.size).reshape(-1, len(levels)).T.reshape(above.shape)  # taxel by taxel, level by level
-    for t, picture in zip(frames.t[1:], frames.values[1:], strict=True):
-        now = picture >= np.where(above, off_at, on_at)
+    for t, frame in zip(frames.t[1:], frames.values[1:], strict=True):
+        now = frame >= np.where(above, off_at, on_at)
         if (now != above).any():
             spikes += [(t, train[place], 1 if now[place] else -1) for place in map(tuple, np.argwhere(now != above))]
             above = now

@@ -22,8 +22,8 @@ LEAST = 0.3
 def noisy(tare: Tare) -> Tare:
     """Return the tare of the scene's taxels with the noise that they have in it."""
     rng = np.random.default_rng(192)
-    pictures = np.rint(tare.rest + rng.normal(0, 0.5, (250, *tare.array.shape)))
-    return Tare.take(Frames(pictures, np.arange(250) * PERIOD_US, unit="ticks", array=tare.array))
+    frames = np.rint(tare.rest + rng.normal(0, 0.5, (250, *tare.array.shape)))
+    return Tare.take(Frames(frames, np.arange(250) * PERIOD_US, unit="ticks", array=tare.array))
 
 
 def around(values: Any) -> Any:
@@ -43,9 +43,9 @@ def numpy_load(frames: Frames, tare: Tare) -> list[Any]:
     baseline, above = tare.rest.copy(), np.zeros(frames.array.shape)
     now = np.empty((len(frames), 4))
     spikes = []
-    for k, (t, picture) in enumerate(zip(frames.t, frames.values, strict=True)):
+    for k, (t, frame) in enumerate(zip(frames.t, frames.values, strict=True)):
         baseline += np.where(np.abs(above) < far, near_step, far_step) * above
-        above = picture - baseline
+        above = frame - baseline
         sums = around(np.clip(above, -3 * s, 3 * s)) / of_sum
         there = above >= least
         area = np.count_nonzero(there & (around(there.astype(np.uint8)) > 1))

@@ -28,11 +28,11 @@ def numpy_moments(frames: Frames, tare: Tare) -> list[Any]:
     loaded_from, pitch = tare.rest + FLOOR + 0.5, frames.array.column_mm
     y, x = np.mgrid[: frames.array.rows, : frames.array.columns]
     spikes, before, origin = [], None, None
-    for t, picture in zip(frames.t, frames.values, strict=True):
-        there = loaded(picture, loaded_from)
+    for t, frame in zip(frames.t, frames.values, strict=True):
+        there = loaded(frame, loaded_from)
         moments = np.zeros(5)
         if there.any():
-            above = np.where(there, picture - tare.rest, 0.0)
+            above = np.where(there, frame - tare.rest, 0.0)
             total = above.sum()
             centre = np.array([(above * x).sum(), (above * y).sum()]) / total
             origin = centre if origin is None else origin

@@ -2,7 +2,7 @@
 
 64 x 64 taxels of 2.67 mm at 5208 Hz have 4096 afferents in the fingertip's mixture (70 : 140 : 6 : 25), less dense than
 a fingertip's. On the board's events, and on frames whose every taxel changes all the time. No other library has such a
-skin. The NumPy version multiplies SciPy's sparse matrix of the fields with all pictures, and steps the afferents of
+skin. The NumPy version multiplies SciPy's sparse matrix of the fields with all frames, and steps the afferents of
 each type as one vector. Our weights have 32 bits, so that a spike may differ by a sample.
 
 Peer: the obvious NumPy and SciPy. Unit: times real time, on one core. Goal: 20, with 99 % of the spikes equal.
@@ -55,8 +55,8 @@ def fields(afferents: Afferents, encoder: Skin, shape: tuple[int, int]) -> Any:
 def numpy_skin(frames: Frames, encoder: Skin) -> list[Any]:
     """Return (t, train) of all spikes, of either sign."""
     afferents = encoder.afferents(frames.array)
-    pictures = frames.values.reshape(len(frames), -1)
-    felt = (fields(afferents, encoder, frames.array.shape) @ pictures.T.astype(np.float64)).T
+    readings = frames.values.reshape(len(frames), -1)
+    felt = (fields(afferents, encoder, frames.array.shape) @ readings.T.astype(np.float64)).T
     spikes = []
     receptors = {"SA-1": SA1(period_ms=0.192), "SA-2": SA2(period_ms=0.192), "FA-2": FA2(period_ms=0.192)}
     for kind in KINDS:

@@ -5,7 +5,7 @@ Two tables of labelled trials of published recordings (docs/recordings.md; TAXEL
 
 - footfalls: the 60 of subj000 on the plate, 42 x 33 taxels at 500 Hz; the label is the class of speed that
   ``conditions.csv`` has (1 slow, 2 normal, 3 fast); 400 ms from the contact on. The plate's reader gives as many rows
-  as a footfall has and begins with its contact; here each becomes an .npz of 42 rows with a picture of rest before;
+  as a footfall has and begins with its contact; here each becomes an .npz of 42 rows with a frame of rest before;
 - strides: the 144 contacts of GaPt23 of gaitpdb that ``events.csv`` has, 8 channels a foot at 100 Hz; the label is the
   foot; 1000 ms from the contact on, which is searched from 100 ms before the listed one on.
 

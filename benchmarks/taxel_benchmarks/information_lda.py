@@ -63,8 +63,8 @@ def touches(trials, features, classes, seed):
     pressure = random.uniform(0.9, 1.1, (trials, 1)) * depth * np.exp(-(x**2 + (y - place) ** 2) / (2 * width**2))
     t = 2.0 * np.arange(samples + 1)
     course = np.clip((t - 2 - random.uniform(0, 2, (trials, 1))) / rise, 0, 1)
-    pictures = (course.T[:, :, None] * pressure).astype(np.float32)
-    spikes = FA1(period_ms=2.0).encode(Frames(pictures, (1000 * t).astype(int), array=Array(trials, ROWS * COLUMNS)))
+    frames = (course.T[:, :, None] * pressure).astype(np.float32)
+    spikes = FA1(period_ms=2.0).encode(Frames(frames, (1000 * t).astype(int), array=Array(trials, ROWS * COLUMNS)))
     at, taxel = spikes.to_numpy()
     table = np.zeros((trials * ROWS * COLUMNS, samples), np.int8)
     table[taxel, np.rint(at / 2).astype(int) - 1] = spikes.values

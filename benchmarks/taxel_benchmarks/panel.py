@@ -1,18 +1,18 @@
-"""The live panel: pictures a second beside 99 other clients and in a browser, seeking and opening recordings.
+"""The live panel: frames a second beside 99 other clients and in a browser, seeking and opening recordings.
 
 Sender and clients share this machine, over loopback, the sender a process of its own. The fast client reads all
-messages and sends a credit for each picture; half of the others request pictures and never read. CPU is of
-the thread `taxel-panel` alone. Times of a seek are from the request to the picture with its 5 s of raster.
+messages and sends a credit for each frame; half of the others request frames and never read. CPU is of
+the thread `taxel-panel` alone. Times of a seek are from the request to the frame with its 5 s of raster.
 
-Recordings of pictures are an hour of both insoles, 2 x 99 sensors at 100 Hz, as .mcap, one of them as .h5 and as a text
-table, all in the page cache. A client's times of opening are from its request to the first picture, the overview and
+Recordings of frames are an hour of both insoles, 2 x 99 sensors at 100 Hz, as .mcap, one of them as .h5 and as a text
+table, all in the page cache. A client's times of opening are from its request to the first frame, the overview and
 the whole; the page's, in Chromium without GPU at 1300 x 900, from its address to a map and an overview that are drawn.
 CPU is of this process and its children, medians of rounds. Commands are processes of their own.
 
-Peer: none but a hundred clients of its own, as nothing else speaks its protocol. Unit: pictures; cores; ms of a seek;
-s. Goal: 50 pictures/s beside 99 others and in Chromium, nothing lost, .025 core of the server alone and .14 with the
+Peer: none but a hundred clients of its own, as nothing else speaks its protocol. Unit: frames; cores; ms of a seek;
+s. Goal: 50 frames/s beside 99 others and in Chromium, nothing lost, .025 core of the server alone and .14 with the
 others, a GB indexed within 2 s (scaled from 218 and 135 MB), any time within 50 ms; an hour of insoles opens
-in 2 s and is complete within 5, a text table shows its first picture in 2 s, then progress; taxel view answers within
+in 2 s and is complete within 5, a text table shows its first frame in 2 s, then progress; taxel view answers within
 1 s.
 """
 
@@ -64,9 +64,9 @@ CORES = {0: 0.025, 99: 0.14}
 #: Words of the figures that are better when smaller.
 SMALLER = ("cores",)
 
-#: Notes in a page when its map showed more than one colour and its overview had bins, and counts the pictures drawn.
+#: Notes in a page when its map showed more than one colour and its overview had bins, and counts the frames drawn.
 WATCH = """
-window.seen = { pictures: 0 };
+window.seen = { frames: 0 };
 const proto = CanvasRenderingContext2D.prototype;
 let frame = null, bins = 0;
 for (const name of ["putImageData", "fillRect", "fill", "drawImage"]) {
@@ -75,7 +75,7 @@ for (const name of ["putImageData", "fillRect", "fill", "drawImage"]) {
     own.apply(this, given);
     const id = this.canvas.id;
     if (id === "pressure-map") {
-      if (frame !== document.timeline.currentTime) seen.pictures++;
+      if (frame !== document.timeline.currentTime) seen.frames++;
       frame = document.timeline.currentTime;
       if (seen.map === undefined) {
         const { data } = this.getImageData(0, 0, this.canvas.width, this.canvas.height);
@@ -110,7 +110,7 @@ def events(side: int, count: int, seconds: float) -> taxel.Events:
 
 
 def connected(panel: Panel) -> ClientConnection:
-    """Connect a client that has requested two pictures."""
+    """Connect a client that has requested two frames."""
     from websockets.sync.client import connect  # noqa: PLC0415  an extra
 
     host = "{}:{}".format(*panel.address)
@@ -134,17 +134,17 @@ def sending(side: int, port: int, seconds: float, scratch: Path) -> subprocess.P
 
 
 def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str, Any]:
-    """Count the pictures of a fast client while events arrive."""
+    """Count the frames of a fast client while events arrive."""
     array = taxel.Array(side, side, name="bench")
     with Live(0, host="127.0.0.1", array=array) as live, Panel(live, folder=scratch) as panel:
         crowd = [connected(panel) for _ in range(others)]
         good = connected(panel)
         sender = sending(side, live.address[1], seconds + 1.0, scratch)
         time.sleep(0.5)
-        pictures, before, begun = 0, thread_seconds().get("taxel-panel", 0.0), time.perf_counter()
+        frames, before, begun = 0, thread_seconds().get("taxel-panel", 0.0), time.perf_counter()
         while time.perf_counter() - begun < seconds:
             if isinstance(good.recv(timeout=60), bytes):
-                pictures += 1
+                frames += 1
                 good.send(json.dumps({"type": "credit", "n": 1}))
         wall = time.perf_counter() - begun
         cpu = thread_seconds()["taxel-panel"] - before
@@ -155,7 +155,7 @@ def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str
     return {
         "side": side,
         "others": others,
-        "pictures_per_s": pictures / wall,
+        "frames_per_s": frames / wall,
         "server_cores": cpu / wall,
         "lost": capture["dropped_by_kernel"] + capture["dropped_by_queue"],
     }
@@ -224,7 +224,7 @@ def insoles(seconds: float) -> taxel.Recording:
 
 
 def opening(path: Path) -> dict[str, Any]:
-    """Open a recording of pictures; measure the time to the first picture, to the overview and to all of it."""
+    """Open a recording of frames; measure the time to the first frame, to the overview and to all of it."""
     with Panel(path) as panel:
         client = connected(panel)
         cpu, begun = used_s(), time.perf_counter()
@@ -233,18 +233,18 @@ def opening(path: Path) -> dict[str, Any]:
         times: dict[str, float] = {}
         left_s: float | None = 0.0
         progress = 0
-        while not {"picture_s", "overview_s", "complete_s"} <= times.keys():
+        while not {"frame_s", "overview_s", "complete_s"} <= times.keys():
             message = client.recv(timeout=600)
             now = time.perf_counter() - begun
             if isinstance(message, bytes):
                 client.send(json.dumps({"type": "credit", "n": 1}))
                 if left_s != 0.0:
-                    times.setdefault("picture_s", now)
+                    times.setdefault("frame_s", now)
                 continue
             told = json.loads(message)
             progress += told["type"] == "loading"
             if told["type"] == "opened":
-                left_s = told["pictures"]["left_s"]
+                left_s = told["frames"]["left_s"]
                 if left_s is None:
                     times["complete_s"] = now
             elif told["type"] == "overview":
@@ -292,16 +292,16 @@ def opening_on_page(path: Path) -> dict[str, float]:
 
 
 def on_page(side: int, seconds: float, scratch: Path) -> dict[str, Any]:
-    """Count the pictures that Chromium draws while events arrive."""
+    """Count the frames that Chromium draws while events arrive."""
     array = taxel.Array(side, side, name="bench")
     with Live(0, host="127.0.0.1", array=array) as live, Panel(live) as panel, page(panel.url) as shown:
         sender = sending(side, live.address[1], seconds + 3, scratch)
         shown.wait_for_timeout(2000)
-        before, begun = shown.evaluate("seen.pictures"), time.perf_counter()
+        before, begun = shown.evaluate("seen.frames"), time.perf_counter()
         shown.wait_for_timeout(1000 * seconds)
-        pictures, wall = shown.evaluate("seen.pictures") - before, time.perf_counter() - begun
+        frames, wall = shown.evaluate("seen.frames") - before, time.perf_counter() - begun
         sender.wait()
-    return {"side": side, "pictures_per_s": pictures / wall}
+    return {"side": side, "frames_per_s": frames / wall}
 
 
 def command(*words: str | Path) -> dict[str, float]:
@@ -354,27 +354,27 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
         return []
     rows, (*hours, table) = result["following"], result["opening"]
     found = [
-        Goal("pictures/s beside others, the least", min(row["pictures_per_s"] for row in rows), 50),
-        Goal("pictures lost", sum(row["lost"] for row in rows), 0, at_most=True),
+        Goal("frames/s beside others, the least", min(row["frames_per_s"] for row in rows), 50),
+        Goal("frames lost", sum(row["lost"] for row in rows), 0, at_most=True),
         *(
             Goal(f"the server's cores, {row['others']} others", row["server_cores"], CORES[row["others"]], at_most=True)
             for row in rows
         ),
         Goal(
             "an hour of insoles opens, s",
-            max(max(one["picture_s"], one["overview_s"]) for one in hours),
+            max(max(one["frame_s"], one["overview_s"]) for one in hours),
             2,
             at_most=True,
         ),
         Goal("an hour of insoles is complete, s", max(one["complete_s"] for one in hours), 5, at_most=True),
-        Goal("a text table shows its first picture, s", table["picture_s"], 2, at_most=True),
+        Goal("a text table shows its first frame, s", table["frame_s"], 2, at_most=True),
         Goal("messages of progress on a text table", table["progress"], 1),
         Goal("taxel view answers, s", max(one["view"]["wall_s"] for one in result["opening"]), 1, at_most=True),
     ]
     # Without Chromium these two were not measured.
     drawn = max(max(one["page"].values()) for one in hours) if result["page"] else None
     found.append(Goal("an hour of insoles is drawn in Chromium, s", drawn, 2, at_most=True))
-    found.append(Goal("pictures/s in Chromium", result["page"] and result["page"]["pictures_per_s"], 50))
+    found.append(Goal("frames/s in Chromium", result["page"] and result["page"]["frames_per_s"], 50))
     for one in result["seeking"]:
         version = f"version {one['version']}"
         scaled = f"{version}: a GB indexed, scaled from {one['file_mb']:.0f} MB, s"
@@ -415,12 +415,12 @@ def run(*, quick: bool) -> dict[str, Any]:
                 f"{row['side']} x {row['side']}, {row['others']} others: {what}": of
                 for row in rows
                 for what, of in {
-                    "pictures/s over 50": row["pictures_per_s"] / 50,
+                    "frames/s over 50": row["frames_per_s"] / 50,
                     "the server's cores": row["server_cores"],
                 }.items()
             },
-            **({"Chromium: pictures/s over 50": shown["pictures_per_s"] / 50} if shown else {}),
-            **{f"{one['file']}: 2 s over the first picture": 2 / one["picture_s"] for one in opened},
+            **({"Chromium: frames/s over 50": shown["frames_per_s"] / 50} if shown else {}),
+            **{f"{one['file']}: 2 s over the first frame": 2 / one["frame_s"] for one in opened},
             **{f"{one['file']}: 5 s over all of it": 5 / one["complete_s"] for one in opened[:-1]},
         },
         "stable": load < (os.cpu_count() or 1),

@@ -2,7 +2,7 @@
 
 Bytes an event: the same trip times go through a board of each version at 5208 frames/s (kind S, values included).
 The other contents of version 2 (heartbeats, states, totals) are counted apart. Scenes: every taxel in
-every frame; a footfall, which is a picture that rolls from heel to toe, drawn by a seed (no recording); a ball
+every frame; a footfall, which is a frame that rolls from heel to toe, drawn by a seed (no recording); a ball
 dropped and pressed (the demo's scene of that seed), with a tare.
 
 Decoding: checksums included, beside version 1's pairs of change and intensity; an event is a pair. Version 2 is always
@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import wire
-from taxel.simulate import Board, Pictures, Scene, Silence, Version2, play
+from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, play
 from taxel.wire import FRAME_US, Registers
 from taxel_benchmarks._goals import Goal, at_least, at_most
 from taxel_benchmarks._instructions import beside_avx2
@@ -79,15 +79,15 @@ def footfall() -> Frames:
     """Return a footfall: a loaded patch that rolls from heel to toe, and a toe."""
     draw = np.random.default_rng(SEED)
     y, x = np.mgrid[:64, :64]
-    pictures = np.zeros((350, 64, 64), np.float32)
+    frames = np.zeros((350, 64, 64), np.float32)
     for k in range(1, 349):
         share = k / 349
         centre, load = 10 + 40 * share, np.sin(np.pi * share) ** 0.3
         sole = np.exp(-(((y - centre) / 9) ** 2) - ((x - 32 - 4 * np.sin(3 * share)) / 6) ** 2)
         toe = np.exp(-(((y - 54) / 3) ** 2) - ((x - 36) / 3) ** 2) * max(0.0, share - 0.5)
-        pictures[k] = load * (sole + 1.5 * toe)
-    pictures *= np.float32(0.8) / pictures.max() * (1 + 0.02 * draw.standard_normal((64, 64)).clip(-2, 2))
-    return felt([Pictures(pictures.clip(0, 1), 2000.0)])
+        frames[k] = load * (sole + 1.5 * toe)
+    frames *= np.float32(0.8) / frames.max() * (1 + 0.02 * draw.standard_normal((64, 64)).clip(-2, 2))
+    return felt([FrameSequence(frames.clip(0, 1), 2000.0)])
 
 
 def drop() -> Frames:

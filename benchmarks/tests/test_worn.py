@@ -43,14 +43,14 @@ def test_every_taxel_drifts_steadily_by_its_own_rate(played: Events) -> None:
 def test_bad_taxels_are_as_many_as_asked_and_no_others_change(played: Events) -> None:
     bad = worn(played, SINCE, seed=3, stuck=3, flickering=2, pairs=1)
     times = range(SINCE + 100, int(played.t[-1]), 20_000)
-    pictures = np.array([held(bad, t) for t in times])
-    differ = pictures != np.array([held(played, t) for t in times])
+    frames = np.array([held(bad, t) for t in times])
+    differ = frames != np.array([held(played, t) for t in times])
     places = np.nonzero(differ.any(axis=0))
-    count = [len(np.unique(pictures[:, y, x])) for y, x in zip(*places, strict=True)]
+    count = [len(np.unique(frames[:, y, x])) for y, x in zip(*places, strict=True)]
     assert (count.count(1), count.count(2), len(count)) == (3, 4, 7)
     flickering = [(y, x) for y, x, n in zip(*places, count, strict=True) if n == 2]
     pairs = [(y, x) for y, x in flickering if (y, x + 1) in flickering]
-    up = pictures > pictures.min(axis=0)
+    up = frames > frames.min(axis=0)
     assert any(np.array_equal(up[:, y, x], up[:, y, x + 1]) for y, x in pairs)
 
 

@@ -30,7 +30,7 @@ _UPDATE_S = 1.0
 
 
 class Bridge:
-    """Publish what a board sends to this computer: unchanged datagrams, low-rate pictures, detections.
+    """Publish what a board sends to this computer: unchanged datagrams, low-rate frames, detections.
 
     A context manager. Recorders on other computers receive every datagram: the bridge buffers up to 64 MiB for a slow
     one, and disconnects it after 1.5 s without progress. Viewers that are too slow lose datagrams. Neither slows
@@ -40,7 +40,7 @@ class Bridge:
     Parameters
     ----------
     live : Live
-        The receiver of the board; its detections are published, and its picture ten times a second.
+        The receiver of the board; its detections are published, and its frame ten times a second.
     name : str
         The name of the board: 1 to 64 letters, digits, - _ or .
     listen : str or sequence of str
@@ -94,7 +94,7 @@ class Bridge:
 
     def _run(self) -> None:
         """Publish the copies of the pipeline until all are published."""
-        send = {"parcel": self._zenoh.parcel, "picture": self._zenoh.picture, "detection": self._zenoh.detection}
+        send = {"parcel": self._zenoh.parcel, "frame": self._zenoh.frame, "detection": self._zenoh.detection}
         renewed = time.monotonic()
         try:
             while not (self._copies.is_over() or self._ending.is_set()):

@@ -47,7 +47,7 @@ def bridge(
         bool, typer.Option("--json", help="Print the counts at the end as JSON, and nothing else.")
     ] = False,
 ) -> None:
-    """Publish a board to other computers: its datagrams, ten pictures a second, and detections.
+    """Publish a board to other computers: its datagrams, ten frames a second, and detections.
 
     On the other computer, taxel live and taxel record receive the board with --from zenoh:HOST:PORT/NAME. The bridge
     listens on loopback unless --listen names another address; what it publishes is neither encrypted nor protected by a

@@ -95,7 +95,7 @@ class Remote(RemoteBoard):
     """Receive a board of another computer, which a `Bridge` there publishes. A context manager.
 
     Give it to `Live`, which then decodes, shows, records and detects as if the board were connected here; or
-    read the detections and pictures of that computer: `detections`, `pictures`.
+    read the detections and frames of that computer: `detections`, `frames`.
 
     Parameters
     ----------
@@ -228,9 +228,9 @@ class Remote(RemoteBoard):
         """Yield the detections of the other computer's readout, with the keys of ``taxel live --json``; endless."""
         return self._messages("detection")
 
-    def pictures(self) -> Iterator[dict[str, Any]]:
+    def frames(self) -> Iterator[dict[str, Any]]:
         """Yield the held values, ten times a second while events arrive: t_us, rows, columns, ticks; endless."""
-        return self._messages("picture")
+        return self._messages("frame")
 
     def _messages(self, what: str) -> Iterator[dict[str, Any]]:
         if self.in_use:

@@ -90,11 +90,11 @@ def test_nobody_there_and_the_wrong_name_are_said(place):
             Remote(f"zenoh:127.0.0.1:{there}", timeout=0.2)
 
 
-def test_pictures_and_detections_of_the_other_computer_are_heard(place):
+def test_frames_and_detections_of_the_other_computer_are_heard(place):
     """A readout there that says something of every touch, and what is heard of it here."""
     neuron = taxel.Neuron(tau=2.0, refractory=15.0, theta_0=0.4)
     readout = taxel.Readout(taxel.encode.ChangeEvents(), {"touch": (neuron, np.full(8192, 0.03))})
-    heard = {"detections": [], "pictures": []}
+    heard = {"detections": [], "frames": []}
 
     def listen(what):
         with Remote(f"zenoh:{place}") as remote:
@@ -121,9 +121,9 @@ def test_pictures_and_detections_of_the_other_computer_are_heard(place):
         said += iter(lambda: near.next(0.5), None)
     lines = {(one["label"], one["t_us"], one["known_us"], one["reported_ns"]) for one in heard["detections"]}
     assert lines <= {(one.label, one.t, one.known, one.reported_ns) for one in said}
-    picture = heard["pictures"][-1]
-    assert (picture["rows"], picture["columns"], len(picture["ticks"])) == (64, 64, 4096)
-    assert max(picture["ticks"]) > 0
+    frame = heard["frames"][-1]
+    assert (frame["rows"], frame["columns"], len(frame["ticks"])) == (64, 64, 4096)
+    assert max(frame["ticks"]) > 0
 
 
 def test_a_clock_that_is_ahead_and_drifts_is_one_clock_here(tmp_path, place):

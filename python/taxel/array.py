@@ -164,7 +164,7 @@ class Array:
                 raise ProblemError("pitch_mm and places are both given: give one of them")
             object.__setattr__(self, "places", instance("places", self.places, Places)._on(self))
         if self.names is not None:
-            names = tuple(text("names", one) for one in several("names", self.names))
+            names = tuple(text("names", entry) for entry in several("names", self.names))
             places = self.rows * self.columns
             if len(names) != places:
                 raise refused("names", f" has {counted(len(names), 'entry', 'entries')}: must be one a taxel, {places}")
@@ -372,9 +372,9 @@ class Array:
         known = self._is_measured and other._is_measured
         if not known or (self.pitch_mm, self.places) == (other.pitch_mm, other.places):
             return False
-        own, its = self._apart(), other._apart()
-        if own != its:
-            differ = f"{other.name} has its taxels {its}, {self.name} {own}"
+        ours, theirs = self._apart(), other._apart()
+        if ours != theirs:
+            differ = f"{other.name} has its taxels {theirs}, {self.name} {ours}"
         elif other.name == self.name:
             differ = f"two sensors named {self.name} have their taxels at different places"
         else:
@@ -466,12 +466,12 @@ class Array:
 
 def names_beside(arrays: Sequence[Array], lefts: Sequence[int], shape: tuple[int, int]) -> list[str] | None:
     """Return the names of the taxels of arrays side by side, each from its first column on; None if none has any."""
-    if all(one.names is None for one in arrays):
+    if all(array.names is None for array in arrays):
         return None
     names = np.full(shape, "", object)
-    for one, left in zip(arrays, lefts, strict=False):
-        if one.names is not None:
-            names[: one.rows, left : left + one.columns] = np.array(one.names, object).reshape(one.shape)
+    for array, left in zip(arrays, lefts, strict=False):
+        if array.names is not None:
+            names[: array.rows, left : left + array.columns] = np.array(array.names, object).reshape(array.shape)
     return [str(name) for name in names.ravel()]
 
 
@@ -482,7 +482,7 @@ def _pitch(pitch: object) -> float | tuple[float, float]:
         raise refused("pitch_mm", f" is {shown(pitch)}: must be a number, or two, that of rows and that of columns")
     values = list(pitch) if pair else [pitch]  # type: ignore[call-overload]
     each = [number("pitch_mm", value, "mm") for value in values]
-    if not all(np.isfinite(one) and one > 0 for one in each):
+    if not all(np.isfinite(distance) and distance > 0 for distance in each):
         raise refused("pitch_mm", f" is {shown(pitch)}: must be above 0 and finite")
     return each[0] if each[0] == each[-1] else (each[0], each[1])
 

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import bare, column, fields, instance, nth, several, shown, window
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import bare, checked_path, column, fields, instance, nth, several, shown, window
 from taxel._base.columns import Columns, frozen, own, own_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused

@@ -570,8 +570,8 @@ class Device:
         DeviceError : the board does not answer
         ProblemError : neither true nor false
         """
-        on = flag("start", start)
-        return self._try(lambda: self._record(on))
+        starts = flag("start", start)
+        return self._try(lambda: self._record(starts))
 
     @property
     def faults(self) -> dict[str, int]:

@@ -243,16 +243,18 @@ class Events(Columns):
             return NotImplemented
         if not self.array.fits(other.array):
             raise ProblemError(f"events of {self.array!r} and of {other.array!r}: only those of one array are merged")
-        both = (self, other)
+        tables = (self, other)
         ticks = present = None
         if self.intensity is not None or other.intensity is not None:
-            none = [np.zeros(len(e), np.uint16) for e in both]
-            ticks = np.concatenate([z if e.intensity is None else e.intensity for e, z in zip(both, none, strict=True)])
-            present = np.concatenate(
-                [z > 0 if e.present is None else e.present for e, z in zip(both, none, strict=True)]
+            none = [np.zeros(len(e), np.uint16) for e in tables]
+            ticks = np.concatenate(
+                [z if e.intensity is None else e.intensity for e, z in zip(tables, none, strict=True)]
             )
-        t, x, y, p = (np.concatenate([getattr(e, name) for e in both]) for name in ("t", "x", "y", "p"))
-        repaired = repaired_of(both)
+            present = np.concatenate(
+                [z > 0 if e.present is None else e.present for e, z in zip(tables, none, strict=True)]
+            )
+        t, x, y, p = (np.concatenate([getattr(e, name) for e in tables]) for name in ("t", "x", "y", "p"))
+        repaired = repaired_of(tables)
         return self._unchecked(t, x, y, p, self.array, ticks, present, repaired, self.markers + other.markers).sorted()
 
     def to_pandas(self) -> Any:

@@ -1,4 +1,4 @@
-"""Pictures of the whole array over time."""
+"""Frames of the whole array over time."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Frames"]
 
-#: The largest size of pictures made from events: 4 GiB.
+#: The largest size of frames made from events: 4 GiB.
 MOST_VALUES = 2**30
 
 
 class Frames(Columns):
-    """Hold pictures of the whole array over time.
+    """Hold frames of the whole array over time.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Frames(Columns):
 
     Raises
     ------
-    ProblemError : shapes that do not fit, an infinite value, or times that do not ascend (names the picture)
+    ProblemError : shapes that do not fit, an infinite value, or times that do not ascend (names the frame)
 
     Notes
     -----
@@ -53,7 +53,7 @@ class Frames(Columns):
     --------
     >>> frames = Frames(np.zeros((3, 8, 8)), [0, 192, 384], unit="ticks")
     >>> frames
-    Frames(3 pictures of 8 x 8 taxels, 0 to 384 us, ticks)
+    Frames(3 frames of 8 x 8 taxels, 0 to 384 us, ticks)
     """
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
@@ -66,7 +66,7 @@ class Frames(Columns):
             found = counted(self.values.ndim, "dimension")
             raise refused("values", f" have {found}: must have three (n, rows, columns)")
         if len(self.t) != len(self.values):
-            raise refused("t", f" has shape {self.t.shape}: must be ({len(self.values)},), one time a picture")
+            raise refused("t", f" has shape {self.t.shape}: must be ({len(self.values)},), one time a frame")
         back = np.flatnonzero(self.t[1:] <= self.t[:-1])
         if len(back):
             k = int(back[0])
@@ -76,7 +76,7 @@ class Frames(Columns):
             raise refused("unit", " is '': must say what the values are in")
         self.array = Array(*self.values.shape[1:]) if array is None else instance("array", array, Array)
         if self.array.shape != self.values.shape[1:]:
-            raise ProblemError(f"pictures have shape {self.values.shape[1:]}: the array has {self.array.shape}")
+            raise ProblemError(f"frames have shape {self.values.shape[1:]}: the array has {self.array.shape}")
 
     @classmethod
     def from_events(
@@ -88,9 +88,9 @@ class Frames(Columns):
         *,
         held: ArrayLike | None = None,
     ) -> Frames:
-        """Return the held intensities as pictures, one every `period_us`.
+        """Return the held intensities as frames, one every `period_us`.
 
-        A picture at time t includes all events up to and at t. A taxel reads its value of `held`, or 0, until its first
+        A frame at time t includes all events up to and at t. A taxel reads its value of `held`, or 0, until its first
         event.
 
         Parameters
@@ -99,7 +99,7 @@ class Frames(Columns):
             With intensities.
         period_us : int, us, 1 or more
         start, stop : int, us, optional
-            Time of the first picture, and the end (exclusive) of the pictures; default: the time of the events.
+            Time of the first frame, and the end (exclusive) of the frames; default: the time of the events.
         held : shape (rows, columns), ticks, optional
             The values of the taxels before the first event, if known.
 
@@ -118,19 +118,19 @@ class Frames(Columns):
         """
         instance("events", events, Events)
         if events.intensity is None or events.present is None:
-            raise ProblemError("events without intensities: pictures need the held values")
+            raise ProblemError("events without intensities: frames need the held values")
         period, array = whole("period_us", period_us, 1, unit="us"), events.array
         first = int(events.t.min()) if len(events) else 0
         first = first if start is None else whole("start", start, unit="us")
         end = int(events.t.max()) + 1 if len(events) else first
         end = end if stop is None else whole("stop", stop, unit="us")
-        pictures = max(0, -((first - end) // period))
-        if pictures * array.rows * array.columns > MOST_VALUES:
+        count = max(0, -((first - end) // period))
+        if count * array.rows * array.columns > MOST_VALUES:
             raise ProblemError(
-                f"{pictures} pictures from {first} to {end} us: at most {MOST_VALUES} values are made at once; take a "
+                f"{count} frames from {first} to {end} us: at most {MOST_VALUES} values are made at once; take a "
                 f"shorter stretch or a period longer than {period} us"
             )
-        t = np.arange(pictures, dtype=np.int64) * period + first
+        t = np.arange(count, dtype=np.int64) * period + first
         begins = None if held is None else own_numbers("held", held, np.float32)
         if begins is not None and begins.shape != array.shape:
             raise refused("held", f" has shape {begins.shape}: must have the array's, {array.shape}")
@@ -143,16 +143,16 @@ class Frames(Columns):
         return len(self.t)
 
     def __getitem__(self, chosen: slice) -> Frames:
-        """Return consecutive pictures."""
+        """Return consecutive frames."""
         if not isinstance(chosen, slice):
-            raise ProblemError(f"frames[{shown(chosen)}]: choose pictures by a slice")
+            raise ProblemError(f"frames[{shown(chosen)}]: choose frames by a slice")
         try:
             return Frames(self.values[chosen], self.t[chosen], unit=self.unit, array=self.array)
         except (TypeError, ValueError) as error:
             raise ProblemError(f"frames[{shown(chosen)}]: {error}") from None
 
     def between(self, start: float, stop: float) -> Frames:
-        """Return the pictures of ``start <= t < stop`` (us).
+        """Return the frames of ``start <= t < stop`` (us).
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class Frames(Columns):
         return self[int(first) : int(last)]
 
     def region(self, x: slice, y: slice) -> Frames:
-        """Return the pictures of a rectangle of columns `x` and rows `y`, as a smaller array.
+        """Return the frames of a rectangle of columns `x` and rows `y`, as a smaller array.
 
         Parameters
         ----------
@@ -202,11 +202,11 @@ class Frames(Columns):
         return int(np.count_nonzero(np.isnan(self.values)))
 
     def held(self) -> Frames:
-        """Return the pictures with each missing value (NaN) filled by the last one that the taxel read.
+        """Return the frames with each missing value (NaN) filled by the last one that the taxel read.
 
         No news is no change, as of a board that sends only changes. Before its first value a taxel reads that one; a
         taxel without any reads 0. Encoders, trainings, readouts and tares of a `Recording` do this themselves, with a
-        warning that counts the values; from pictures they need it done.
+        warning that counts the values; from frames they need it done.
 
         Returns
         -------
@@ -226,17 +226,17 @@ class Frames(Columns):
         values = self.values.reshape(len(self), -1).copy()
         for taxel in np.flatnonzero(np.isnan(values).any(axis=0)):
             known = np.flatnonzero(~np.isnan(values[:, taxel]))
-            # The place of the last known value up to each picture; before the first one that one's.
+            # The place of the last known value up to each frame; before the first one that one's.
             last = np.searchsorted(known, np.arange(len(self)), side="right") - 1
             values[:, taxel] = values[known[np.maximum(last, 0)], taxel] if len(known) else 0
         return Frames(frozen(values.reshape(self.values.shape)), self.t, unit=self.unit, array=self.array)
 
     def area(self, above: float = 0.0) -> NDArray[np.float64]:
-        """Return the contact area of each picture, mm2: that of each taxel that reads more than `above`.
+        """Return the contact area of each frame, mm2: that of each taxel that reads more than `above`.
 
         Parameters
         ----------
-        above : float, in the pictures' unit
+        above : float, in the frames' unit
             A taxel counts as loaded if its value is greater. If taxels at rest do not read 0, subtract their rest first
             (`Tare.off`).
 
@@ -264,11 +264,11 @@ class Frames(Columns):
         return np.asarray(np.where(self._loaded(above), areas, 0.0).sum(axis=(1, 2)))
 
     def loaded(self, above: float = 0.0) -> NDArray[np.int64]:
-        """Return the number of taxels of each picture that read more than `above`.
+        """Return the number of taxels of each frame that read more than `above`.
 
         Parameters
         ----------
-        above : float, in the pictures' unit
+        above : float, in the frames' unit
             As of `area`.
 
         Returns
@@ -287,19 +287,19 @@ class Frames(Columns):
         return np.asarray(np.count_nonzero(self._loaded(above), axis=(1, 2)), np.int64)
 
     def peak(self) -> NDArray[np.float64]:
-        """Return the largest value of each picture, in the pictures' unit; shape (n,)."""
+        """Return the largest value of each frame, in the frames' unit; shape (n,)."""
         return np.asarray(self.values.max(axis=(1, 2)), np.float64)
 
     def total(self) -> NDArray[np.float64]:
-        """Return the sum over taxels of each picture, in the pictures' unit; shape (n,)."""
+        """Return the sum over taxels of each frame, in the frames' unit; shape (n,)."""
         return np.asarray(self.values.sum(axis=(1, 2), dtype=np.float64))
 
     def centre(self, above: float = 0.0) -> NDArray[np.float64]:
-        """Return the centre of pressure of each picture, in the array's `centre_unit`: mm if they are known.
+        """Return the centre of pressure of each frame, in the array's `centre_unit`: mm if they are known.
 
         Parameters
         ----------
-        above : float, in the pictures' unit, 0 or more
+        above : float, in the frames' unit, 0 or more
             Only taxels with a greater value count, each weighted by its value.
 
         Returns
@@ -335,7 +335,7 @@ class Frames(Columns):
         return centre
 
     def _above(self, rest: NDArray[np.float64]) -> Frames:
-        """Return the pictures above the rest of each taxel; an unknown rest is infinite."""
+        """Return the frames above the rest of each taxel; an unknown rest is infinite."""
         above = _core.above_rest(np.ascontiguousarray(self.values).reshape(-1), np.ascontiguousarray(rest).reshape(-1))
         return Frames(above.reshape(self.values.shape), self.t, unit=self.unit, array=self.array)
 
@@ -343,7 +343,7 @@ class Frames(Columns):
         return np.asarray(self.values > np.float64(finite("above", above)))
 
     def to_pandas(self) -> Any:
-        """Return a table of one row a picture, indexed by its time ``t_us``, and one column a taxel, ``(row, column)``.
+        """Return a table of one row a frame, indexed by its time ``t_us``, and one column a taxel, ``(row, column)``.
 
         Raises
         ------
@@ -360,7 +360,7 @@ class Frames(Columns):
         return self.values.copy(), self.t.copy()
 
     def plot(self, at: int | None = None, ax: Axes | None = None) -> Axes:
-        """Draw the pressure map at `at` us, or of the picture with the largest sum."""
+        """Draw the pressure map at `at` us, or of the frame with the largest sum."""
         return draw("pressure_map", self, at, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
@@ -384,7 +384,7 @@ class Frames(Columns):
     def __repr__(self) -> str:
         time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
         size = f"{self.array.rows} x {self.array.columns} taxels"
-        return escaped(f"Frames({counted(len(self), 'picture')} of {size}, {time}, {self.unit})")
+        return escaped(f"Frames({counted(len(self), 'frame')} of {size}, {time}, {self.unit})")
 
 
 def _refuse_infinite(name: str, values: NDArray[np.float32]) -> None:

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import path as checked_path
-from taxel._base.arguments import shown, text
+from taxel._base.arguments import checked_path, shown, text
 from taxel._base.errors import refused
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named
@@ -148,9 +147,9 @@ class Labels:
         text("source", source)
         place = Path(checked_path("recording", recording))
         names = {row.recording for row in (*self.rows, *self.removed)}
-        own = (trial, "", str(recording), place.name, place.stem)
-        of_source = [f"{name} {source}" for name in own if name] if source else []
-        return next((name for name in (*of_source, *own) if name in names), None)
+        possible = (trial, "", str(recording), place.name, place.stem)
+        of_source = [f"{name} {source}" for name in possible if name] if source else []
+        return next((name for name in (*of_source, *possible) if name in names), None)
 
     def of(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
         """Return the events of a `taxel.Recording` by label, us on its own clock; empty if the table does not name it.
@@ -192,8 +191,8 @@ class Labels:
     def _rows(self, path: Path, source: str, trial: str, among: Sequence[Note] | None = None) -> list[Note]:
         """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own."""
         every = self.rows if among is None else among
-        own = trial in ("", path.name, path.stem)
-        names = {self.named(path), self.named(path, "" if own else trial, source), None if own else trial} - {None}
+        whole = trial in ("", path.name, path.stem)
+        names = {self.named(path), self.named(path, "" if whole else trial, source), None if whole else trial} - {None}
         return [row for row in every if row.recording in names and row.source in ("", source)]
 
     def _replaced(self, path: Path, source: str, trial: str) -> set[int | None]:

@@ -1,4 +1,4 @@
-"""The interface of a recording for the modules that `taxel.recording` imports: it holds events or pictures."""
+"""The interface of a recording for the modules that `taxel.recording` imports: it holds events or frames."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class Recorded(Protocol):
-    """Hold events or pictures, as `taxel.Recording` does."""
+    """Hold events or frames, as `taxel.Recording` does."""
 
     @property
     def path(self) -> Path:
@@ -36,12 +36,12 @@ class Recorded(Protocol):
 
     @property
     def has_events(self) -> bool:
-        """Whether it holds events (else pictures)."""
+        """Whether it holds events (else frames)."""
         ...
 
     @property
     def timed(self) -> bool:
-        """Whether it has times; else its pictures are numbered, one a us."""
+        """Whether it has times; else its frames are numbered, one a us."""
         ...
 
     @property
@@ -55,19 +55,19 @@ class Recorded(Protocol):
         ...
 
     def frames(self) -> Frames:
-        """Return the pictures."""
+        """Return the frames."""
         ...
 
 
 def recorded(x: Events | Frames | Recorded | T, *, hold: bool = True) -> Events | Frames | T:
-    """Return a recording's events, preceded by the values held at its beginning, or its pictures; else `x` itself.
+    """Return a recording's events, preceded by the values held at its beginning, or its frames; else `x` itself.
 
-    Missing values of a recording's pictures are filled (`Frames.held`), with a warning that counts them, unless `hold`
+    Missing values of a recording's frames are filled (`Frames.held`), with a warning that counts them, unless `hold`
     is false.
 
     Raises
     ------
-    ProblemError : pictures without times
+    ProblemError : frames without times
     """
     if isinstance(x, type) or not all(hasattr(x, name) for name in ("has_events", "frames")):
         return x  # type: ignore[return-value]
@@ -79,7 +79,7 @@ def recorded(x: Events | Frames | Recorded | T, *, hold: bool = True) -> Events 
 
 
 def _filled(frames: Frames, path: Path) -> Frames:
-    """Return pictures without missing values; say how many were filled."""
+    """Return frames without missing values; say how many were filled."""
     never = int(np.count_nonzero(np.isnan(frames.values).all(axis=0)))
     warn(
         f"{path}: {frames.missing} of {frames.values.size} values are missing (NaN): each is held at the taxel's last "
@@ -90,19 +90,19 @@ def _filled(frames: Frames, path: Path) -> Frames:
 
 
 def unit_of(source: Events | Frames) -> str:
-    """Return the unit of values: that of pictures; the intensities of events are ticks."""
+    """Return the unit of values: that of frames; the intensities of events are ticks."""
     return source.unit if isinstance(source, Frames) else "ticks"
 
 
 def refuse_numbered(recording: Recorded) -> None:
-    """Refuse a recording whose pictures are numbered (`Recording.timed`), where times are needed.
+    """Refuse a recording whose frames are numbered (`Recording.timed`), where times are needed.
 
     Raises
     ------
-    ProblemError : pictures without times
+    ProblemError : frames without times
     """
     if not recording.timed:
-        raise helped(ProblemError(f"{recording.path}: its pictures have no times"), "rate_hz", "give")
+        raise helped(ProblemError(f"{recording.path}: its frames have no times"), "rate_hz", "give")
 
 
 def _begun(events: Events, held: NDArray[np.float32] | None) -> Events:

@@ -98,7 +98,7 @@ class Tare(Saved):
         )
         given, x = x, recorded(x)
         if isinstance(x, Events | Frames) and not len(x.t):
-            what, why = ("event" if isinstance(x, Events) else "picture"), getattr(given, "_why_empty", str)()
+            what, why = ("event" if isinstance(x, Events) else "frame"), getattr(given, "_why_empty", str)()
             raise refused("tare", f": there is no {what}{why}")
         if isinstance(x, Events | Frames) and window[1] is not None and x.t.min() >= window[1]:
             raise ProblemError(f"tare to {stop_us} us: nothing came before it, but from {x.t.min()} to {x.t.max()} us")
@@ -109,7 +109,7 @@ class Tare(Saved):
         raise ProblemError(f"{type(x).__name__}: a tare is measured from taxel.Events or taxel.Frames")
 
     def off(self, frames: Frames) -> Frames:
-        """Return pictures with each taxel's rest subtracted: 0 if it reads less, or if its rest is unknown.
+        """Return frames with each taxel's rest subtracted: 0 if it reads less, or if its rest is unknown.
 
         Parameters
         ----------
@@ -117,15 +117,15 @@ class Tare(Saved):
 
         Raises
         ------
-        ProblemError : pictures of an array of another shape
+        ProblemError : frames of an array of another shape
         """
         instance("frames", frames, Frames)
         if not self.array.fits(frames.array):
             (rows, columns), (of_rows, of_columns) = frames.array.shape, self.array.shape
             others = ", of which others exist" if frames.array.shape == self.array.shape else ""
             of = f"{of_rows} x {of_columns}{others}"
-            raise ProblemError(f"pictures of {rows} x {columns} taxels: the tare is of {of}")
-        self.array._warn_apart(frames.array, "the pictures")
+            raise ProblemError(f"frames of {rows} x {columns} taxels: the tare is of {of}")
+        self.array._warn_apart(frames.array, "the frames")
         return frames._above(np.where(np.isnan(self.rest), np.inf, self.rest))
 
     @classmethod

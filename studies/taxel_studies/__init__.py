@@ -24,7 +24,7 @@ STUDIES = {
     "adaptive_ramp": "a ramp that adapts to the signal: steep in gross movement, gentle in fine control",
     "fig4.6": "a taxel's voltage against its load at two line voltages: sensitivity against range",
     "fig4.7": "the transducer's answer to an impact, and settling while four channels are multiplexed",
-    "fig4.8": "a tennis ball dropped on the array: its pictures, and its bits by sampling rate (4.8, 4.10)",
+    "fig4.8": "a tennis ball dropped on the array: its frames, and its bits by sampling rate (4.8, 4.10)",
     "fig4.9": "drops of a tennis ball laid out by t-SNE, by sampling rate",
     "contact": "a half disc pressed on silicone, sampled by taxels at its base (5.1 to 5.4)",
     "fig5.5": "bits of an indentation by sampling period, by parameter, and by time since contact (5.5, 5.6, 5.8)",

@@ -40,9 +40,9 @@ __all__ = [
     "absolute_distances",
     "conditions",
     "distances_of",
+    "frames_of",
     "named",
     "named_by_neighbours",
-    "pictures",
     "played",
     "sampled",
     "smoothed",
@@ -304,7 +304,7 @@ def sampled(drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.flo
     return counts
 
 
-def pictures(
+def frames_of(
     drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.float64], rig: Rig, length_ms: float
 ) -> NDArray[np.float64]:
     """Return each taxel's reading less that before the impact, sampled at a period, (drops, samples, taxels).

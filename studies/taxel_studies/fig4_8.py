@@ -1,4 +1,4 @@
-"""Figures 4.8 and 4.10: a tennis ball dropped on the array: pictures, and bits by sampling rate (thesis 4.4.2)."""
+"""Figures 4.8 and 4.10: a tennis ball dropped on the array: frames, and bits by sampling rate (thesis 4.4.2)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PROTOCOL = (
     "the first that answered, 40 ms from the impact's first frame on (the first in which three taxels rise: one "
     "alone may be noise), as ticks above those before it. Slower sampling: what the host holds is looked at every "
     "so often, from that frame on, as the thesis resampled its films; beside it, from any phase on. Linear "
-    "discriminants of the pictures, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
+    "discriminants of the frames, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
     "by Panzeri and Treves."
 )
 COURSES = True
@@ -36,15 +36,15 @@ PARAMETERS: dict[str, Any] = {
 }
 TOY: dict[str, Any] = {**dropped.TENNIS_TOY, "periods_ms": [2.0, 40.0]}
 SIZES = {"toy": TOY}
-#: Figure 4.8: pictures a ms, so many.
-PICTURE_MS, PICTURES = 1.0, 8
+#: Figure 4.8: frames a ms, so many.
+FRAME_MS, FRAMES = 1.0, 8
 #: 100 Hz, which 4.4.2 names.
 SLOW_MS = 10.0
 #: What counts as little of the bits that there can be, and as a marked gain, bits.
 LITTLE, MARKED = 0.5, 0.5
 #: How far from the region's middle the middle of the pressure may lie to be around the first taxel, taxels.
 AROUND = 3.0
-#: Seed of the phase at which a slow sampler takes its first picture.
+#: Seed of the phase at which a slow sampler takes its first frame.
 PHASES = 410
 
 
@@ -78,24 +78,24 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[st
 def sampled_drops(
     p: Parameters, seed: int, courses: SharedFolder, period_ms: float, length_ms: float, *, aligned: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return the pictures of all drops at a period, one drop a row, and the number of each drop's condition."""
+    """Return the frames of all drops at a period, one drop a row, and the number of each drop's condition."""
     rng = np.random.default_rng([seed, PHASES])
     parts = []
     for condition in dropped.conditions(p):
         ticks = dropped.played(p, condition, seed, courses, TENNIS).ticks
         late = np.zeros(len(ticks)) if aligned else rng.uniform(0, period_ms, len(ticks))
-        shown = dropped.pictures(ticks, period_ms, late, TENNIS, length_ms)
+        shown = dropped.frames_of(ticks, period_ms, late, TENNIS, length_ms)
         parts.append(shown.reshape(len(ticks), -1))
     return np.concatenate(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
-    """List the bits by period, and one drop's pictures."""
+    """List the bits by period, and one drop's frames."""
     asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
     one = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses, TENNIS).ticks[:1]
     frame_ms = TENNIS.frame_us / 1000
-    whole = dropped.pictures(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
-    shown = dropped.pictures(one, PICTURE_MS, np.zeros(1), TENNIS, (PICTURES + 1) * PICTURE_MS)[0]
+    whole = dropped.frames_of(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
+    shown = dropped.frames_of(one, FRAME_MS, np.zeros(1), TENNIS, (FRAMES + 1) * FRAME_MS)[0]
     x = np.arange(TENNIS.region**2) % TENNIS.region - TENNIS.region // 2
     y = np.arange(TENNIS.region**2) // TENNIS.region - TENNIS.region // 2
     most = np.clip(whole[int(whole.sum(1).argmax())], 0, None)
@@ -112,7 +112,7 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summ
         "sum": [[round(frame_ms * k, 3), round(float(total))] for k, total in enumerate(whole.sum(1))],
         "middle": [round(float(np.average(of, weights=most)), 2) for of in (x, y)],
         "full": int(one.max()),
-        "pictures": shown.round().astype(int).tolist(),
+        "frames": shown.round().astype(int).tolist(),
     }
 
 
@@ -174,17 +174,17 @@ def _hz(line: dict[str, Any]) -> str:
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
-    """Draw 4.8 (the pictures) and 4.10 (bits)."""
-    return [_draw_pictures(p, summary), _draw_bits(summary)]
+    """Draw 4.8 (the frames) and 4.10 (bits)."""
+    return [_draw_frames(p, summary), _draw_bits(summary)]
 
 
-def _draw_pictures(p: Parameters, summary: Summary) -> Figure:
+def _draw_frames(p: Parameters, summary: Summary) -> Figure:
     figure = Figure(figsize=(9, 5), layout="constrained")
-    axes = figure.subplots(2, PICTURES // 2).ravel()
-    pictures = np.array(summary["pictures"])[1:].reshape(PICTURES, TENNIS.region, TENNIS.region)
+    axes = figure.subplots(2, FRAMES // 2).ravel()
+    frames = np.array(summary["frames"])[1:].reshape(FRAMES, TENNIS.region, TENNIS.region)
     for k, ax in enumerate(axes):
-        shown = ax.imshow(pictures[k], cmap="viridis", vmin=0, vmax=pictures.max())
-        ax.set_title(f"{PICTURE_MS * (k + 1):g} ms", fontsize="medium")
+        shown = ax.imshow(frames[k], cmap="viridis", vmin=0, vmax=frames.max())
+        ax.set_title(f"{FRAME_MS * (k + 1):g} ms", fontsize="medium")
         ax.set_xticks([])
         ax.set_yticks([])
     figure.colorbar(shown, ax=list(axes), label="ticks above the impact's start")
@@ -203,7 +203,7 @@ def _draw_bits(summary: Summary) -> Figure:
     ax.axvline(1000 / SLOW_MS, color="0.8")
     logarithmic(ax, x=rates)
     ax.set_ylim(0, None)
-    ax.set_xlabel("pictures a second")
+    ax.set_xlabel("frames a second")
     ax.set_ylabel("bits")
     ax.set_title("figure 4.10")
     ax.legend(fontsize="small")

@@ -17,7 +17,7 @@ from taxel_studies.study import Parameters, Row, Statement, Summary
 WHERE = "thesis 4.4.2, figure 4.9"
 PROTOCOL = (
     "The drops of the study fig4.8, the first 20 ms of each drop, at the rates of the picture's panels by guess. "
-    "t-SNE of scikit-learn on all pictures of a drop, begun at its principal components; beside each map, how many "
+    "t-SNE of scikit-learn on all frames of a drop, begun at its principal components; beside each map, how many "
     "of a drop's 10 nearest neighbours in it are of its own class; and the same of drops sampled from any phase on."
 )
 COURSES = True
@@ -31,7 +31,7 @@ PARAMETERS: dict[str, Any] = {
 }
 TOY: dict[str, Any] = {**dropped.TENNIS_TOY, "rates_hz": [100.0, 1000.0], "perplexity": 5.0}
 SIZES = {"toy": TOY}
-#: How long the pictures of a drop last, ms.
+#: How long the frames of a drop last, ms.
 LENGTH_MS = 20.0
 #: From here on the classes lie clearly apart, Hz.
 CLEAR_HZ = 500.0

@@ -114,7 +114,7 @@ class Drop(NamedTuple):
     kind: int
 
     def frames(self, period_us: int, start: float, stop: float) -> Frames:
-        """Return pictures of the readings above rest; times in us."""
+        """Return frames of the readings above rest; times in us."""
         return self.tare.off(Frames.from_events(self.events, period_us, round(start), round(stop)))
 
 
@@ -260,7 +260,7 @@ def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Drop], t
         names.append(name)
         answers_by = {"rule": by_rule}
         for way, features in (("numbers", numbers), ("lda", around)):
-            learnt, judged = (features(pictures) for pictures in now)
+            learnt, judged = (features(parts) for parts in now)
             answers_by[way] = lda(learnt, truths[0])(judged)
         for way, kinds in answers_by.items():
             shares[way].append(float(np.mean(kinds == truths[1])))
@@ -276,7 +276,7 @@ def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Drop], t
 
 
 def _since_contact(drop: Drop, times: Sequence[float]) -> list[Frames]:
-    """Return the picture above rest at times (ms) since the touch really began."""
+    """Return the frame above rest at times (ms) since the touch really began."""
     contact = drop.contacts[0].start_us
     at = [round(contact + to_us(t)) for t in times]
     return [drop.frames(1, t, t + 1) for t in at]
@@ -329,20 +329,20 @@ def detections_at(t: NDArray[np.int64], label: str = "contact") -> Detections:
 
 
 def _touched(train: list[Drop]) -> Callable[[ArrayLike], NDArray[Any]]:
-    """Return an LDA that separates pictures of a touch from pictures of none."""
-    pictures, there = [], []
+    """Return an LDA that separates frames of a touch from frames of none."""
+    regions, there = [], []
     for drop in train:
         for contact in drop.contacts:
             frames = drop.frames(2000, contact.start_us - 20_000, contact.stop_us + 20_000)
-            pictures.append(around([frames]))
+            regions.append(around([frames]))
             there.append((frames.t >= contact.start_us) & (frames.t < contact.stop_us))
-    values, classes = np.concatenate(pictures), np.concatenate(there)
+    values, classes = np.concatenate(regions), np.concatenate(there)
     chosen = np.linspace(0, len(values) - 1, min(MOST_FRAMES, len(values))).astype(int)
     return lda(values[chosen], classes[chosen].astype(np.int64))
 
 
 def _by_frames(drop: Drop, touched: Callable[[ArrayLike], NDArray[Any]]) -> Detections:
-    """Detect contact and lift where the LDA's answer changes from one picture to the next, 1 ms apart."""
+    """Detect contact and lift where the LDA's answer changes from one frame to the next, 1 ms apart."""
     frames = drop.frames(1000, drop.events.markers[0][0], drop.contacts[-1].stop_us + AFTER_US)
     change = np.diff(touched(around([frames])), prepend=0)
     return detections_at(frames.t[change > 0]) + detections_at(frames.t[change < 0], "lift")

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 #: What a loaded taxel reads above rest at least, ticks.
 ABOVE = ContactArea().above
-#: Rows and columns of a picture around the touch (thesis 5.6.2).
+#: Rows and columns of a frame around the touch (thesis 5.6.2).
 AROUND = 16
 #: Ridges of the LDA; the one that does best inside the training scenes.
 RIDGES = (0.1, 1.0, 10.0, 100.0)
@@ -39,11 +39,11 @@ def best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple[
     return name, (sign * features[1][name] > sign * edge).astype(np.int64)
 
 
-def _features(pictures: list[Frames]) -> dict[str, Floats]:
-    """Return the simple features of each picture: area, total, peak and their ratios."""
-    area = np.array([frames.area(ABOVE)[0] for frames in pictures])
-    total = np.array([frames.total()[0] for frames in pictures])
-    peak = np.array([frames.peak()[0] for frames in pictures])
+def _features(parts: list[Frames]) -> dict[str, Floats]:
+    """Return the simple features of each frame: area, total, peak and their ratios."""
+    area = np.array([frames.area(ABOVE)[0] for frames in parts])
+    total = np.array([frames.total()[0] for frames in parts])
+    peak = np.array([frames.peak()[0] for frames in parts])
     some = np.maximum(area, 1.0), np.maximum(total, 1.0), np.maximum(peak, 1.0)
     return {
         "area": area,
@@ -56,20 +56,20 @@ def _features(pictures: list[Frames]) -> dict[str, Floats]:
     }
 
 
-def numbers(pictures: list[Frames]) -> Floats:
-    """Return the logarithms of area, total and peak of each picture."""
-    three = _features(pictures)
+def numbers(parts: list[Frames]) -> Floats:
+    """Return the logarithms of area, total and peak of each frame."""
+    three = _features(parts)
     return np.log(np.maximum(np.stack([three[name] for name in ("area", "total", "peak")], axis=1), 1.0))
 
 
-def around(pictures: Iterable[Frames]) -> Floats:
-    """Return the values of 16 x 16 taxels around the centre of what is loaded, picture by picture; beyond the edge 0.
+def around(parts: Iterable[Frames]) -> Floats:
+    """Return the values of 16 x 16 taxels around the centre of what is loaded, frame by frame; beyond the edge 0.
 
     A touch is anywhere on the array, and weights learnt for the taxels of one place are of no use at another. Where
     nothing is loaded, the taxels are those in the middle of the array.
     """
     regions = []
-    for frames in pictures:
+    for frames in parts:
         values = frames.values.astype(np.float64)
         shape = values.shape[1:]
         loaded = np.where(values >= ABOVE, values, 0.0)

@@ -33,7 +33,7 @@ SIZES = {"toy": {"boards": 3, "drops": 8, "folds": 3}}
 
 #: Times after the contact for which an answer is computed, ms.
 ANSWERED_MS = (1, 2, 5, 10)
-#: Times of the pictures, ms: an answer depends on those up to its own time.
+#: Times of the frames, ms: an answer depends on those up to its own time.
 LOOKED_MS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 #: The properties asked for: the unit, and the values that divide the answers. A level array has a slant of 0.
 QUESTIONS = {
@@ -47,7 +47,7 @@ _ABOVE = 3.5
 _FIRST_SEED = TRAINING_SEED + 500_000
 #: How long a ball is recorded after its fall, ms, and how fast a hand then lifts it, mm/s.
 _AFTER_FALL_MS, _LIFT_MM_S = 30.0, 500.0
-#: Ridge of the discriminants: consecutive pictures are nearly equal.
+#: Ridge of the discriminants: consecutive frames are nearly equal.
 _RIDGE = 0.01
 #: The move of the middle is stored in hundredths of a taxel.
 _MOVED = 100
@@ -61,7 +61,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> list[dict[str, Any]]:
-    """Drop balls on one board; return those that gave events: their properties, and a picture for each time."""
+    """Drop balls on one board; return those that gave events: their properties, and a frame for each time."""
     scenes = []
     for n in range(params["drops"]):
         scene = drawn(_FIRST_SEED + seed, n)
@@ -82,7 +82,7 @@ def realise(params: dict[str, Any], seed: int) -> list[dict[str, Any]]:
                     "ball": round(2 * ball["shape"]["sphere"]["radius_mm"], 1),
                     "height": round(ball["motion"]["dropped"]["height_mm"], 1),
                     "slant": round(scene.parameters["slant_deg"], 1),
-                    "pictures": look(events.sorted(), tare, float(inputs[0])).tolist(),
+                    "frames": look(events.sorted(), tare, float(inputs[0])).tolist(),
                 }
             )
     return found
@@ -92,7 +92,7 @@ def look(events: Events, tare: Tare, begin_us: float) -> NDArray[np.int64]:
     """Return what the host holds at each time of `LOOKED_MS` after the first event, shape (times, 4).
 
     Loaded taxels; ticks above rest, summed; the largest; how far along the rows, the way that the array falls, their
-    middle has moved since the first picture, in hundredths of a taxel.
+    middle has moved since the first frame, in hundredths of a taxel.
     """
     assert events.intensity is not None  # the board sends them
     index = events.array.index(events.x, events.y)
@@ -115,22 +115,22 @@ def look(events: Events, tare: Tare, begin_us: float) -> NDArray[np.int64]:
     return features
 
 
-def features(pictures: NDArray[np.int64], after_ms: float) -> NDArray[np.float64]:
-    """Return what the discriminants see of pictures up to a time."""
-    seen = pictures[:, [k for k, t in enumerate(LOOKED_MS) if t <= after_ms]].astype(np.float64)
+def features(frames: NDArray[np.int64], after_ms: float) -> NDArray[np.float64]:
+    """Return what the discriminants see of frames up to a time."""
+    seen = frames[:, [k for k, t in enumerate(LOOKED_MS) if t <= after_ms]].astype(np.float64)
     held, moved = np.log1p(seen[:, :, :-1]), seen[:, 1:, -1] / _MOVED
     return np.concatenate([held.reshape(len(seen), -1), moved], axis=1)
 
 
 def answers(
-    pictures: NDArray[np.int64], y: NDArray[np.int64], fold: NDArray[np.int64], after_ms: float
+    frames: NDArray[np.int64], y: NDArray[np.int64], fold: NDArray[np.int64], after_ms: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the most probable answer for each drop and its probability, by discriminants of the other folds.
 
-    Probabilities are the softmax of the discriminants: the posterior where pictures scatter alike about each answer's
+    Probabilities are the softmax of the discriminants: the posterior where frames scatter alike about each answer's
     mean.
     """
-    x = features(pictures, after_ms)
+    x = features(frames, after_ms)
     answer, probable = np.zeros(len(y), np.int64), np.zeros(len(y))
     for k in np.unique(fold):
         lda = LDA(ridge=_RIDGE).fit(x[fold != k], y[fold != k])
@@ -145,11 +145,11 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Return by question how many are right after each time, how probable the answers were, and what chance gives."""
     drops = [(row.seed * p["folds"] // p["boards"], drop) for row in rows for drop in row.result]
     fold = np.array([k for k, _ in drops])
-    pictures = np.array([drop["pictures"] for _, drop in drops])
+    frames = np.array([drop["frames"] for _, drop in drops])
     summary: Summary = {"drops": len(drops), "questions": {}}
     for name, (_, edges) in QUESTIONS.items():
         y = np.searchsorted(edges, [drop[name] for _, drop in drops]).astype(np.int64)
-        found = [answers(pictures, y, fold, t) for t in ANSWERED_MS]
+        found = [answers(frames, y, fold, t) for t in ANSWERED_MS]
         summary["questions"][name] = {
             "right": [float(np.mean(answer == y)) for answer, _ in found],
             "probable": [float(probable.mean()) for _, probable in found],

@@ -176,7 +176,7 @@ def tennis(folder):
 def test_a_tennis_ball_is_filmed_at_2_khz_around_the_first_taxel_that_answered(folder, tennis):
     assert TENNIS.frame_us == pytest.approx(500, abs=1)
     assert tennis.ticks.shape == (3, 1 + 80, 17 * 17)
-    film = dropped.pictures(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
+    film = dropped.frames_of(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
     np.testing.assert_array_equal(film, tennis.ticks[:, 1:].astype(int) - tennis.ticks[:, :1].astype(int))
     middle = 17 * 8 + 8
     assert (film[:, 0, middle] > 0).all()  # it responded in the impact's first frame
@@ -186,9 +186,9 @@ def test_a_tennis_ball_is_filmed_at_2_khz_around_the_first_taxel_that_answered(f
 
 
 def test_slower_films_hold_the_frames_before_their_times(tennis):
-    every = dropped.pictures(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
+    every = dropped.frames_of(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
     late = np.array([0.0, 1.2, 4.9])
-    for k, film in enumerate(dropped.pictures(tennis.ticks, 5.0, late, TENNIS, 20.0)):
+    for k, film in enumerate(dropped.frames_of(tennis.ticks, 5.0, late, TENNIS, 20.0)):
         at = np.floor((late[k] + 5.0 * np.arange(4)) * 1000 / TENNIS.frame_us).astype(int)
         np.testing.assert_array_equal(film, every[k, at])
 

@@ -34,19 +34,19 @@ def test_the_discriminant_knows_at_other_places_what_it_learnt_at_some() -> None
     rows, columns = np.indices((64, 64))
 
     def felt(rows_from: float, rows_to: float) -> list[taxel.Frames]:
-        pictures = []
+        frames = []
         for kind in kinds:
             row, column = rng.uniform(rows_from, rows_to), rng.uniform(0, 63)
             away = (rows - row) ** 2 + (columns - column) ** 2
             value = 20.0 * np.maximum(1 - away / (9.0 + 20.0 * kind), 0) + rng.normal(0, 0.3, away.shape)
-            pictures.append(taxel.Frames(value[None], [0], unit="ticks"))
-        return pictures
+            frames.append(taxel.Frames(value[None], [0], unit="ticks"))
+        return frames
 
     tell = touch_rivals.lda(touch_rivals.around(felt(0, 30)), kinds)
     assert np.mean(tell(touch_rivals.around(felt(34, 63))) == kinds) > 0.9
 
 
-def test_the_picture_around_a_touch_has_its_centre_in_the_middle_and_nothing_beyond_the_edge() -> None:
+def test_the_frame_around_a_touch_has_its_centre_in_the_middle_and_nothing_beyond_the_edge() -> None:
     values = np.zeros((3, 20, 40))
     values[0, 3:6, 30:33] = 9.0
     values[1, 0, 0] = 9.0

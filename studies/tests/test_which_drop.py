@@ -31,18 +31,18 @@ def test_drops_are_those_of_their_scenes_on_boards_that_the_demo_never_plays(dro
 
 
 def test_the_middle_moves_down_the_slant_and_not_on_a_level_array(drops: list[dict[str, Any]]) -> None:
-    moved = np.array([drop["pictures"][-1][-1] for drop in drops]) / 100
+    moved = np.array([drop["frames"][-1][-1] for drop in drops]) / 100
     slanted = np.array([drop["slant"] > 0 for drop in drops])
     assert abs(np.median(moved[~slanted])) < 0.1
     assert np.median(moved[slanted]) > 0.5
 
 
 def test_an_answer_rests_only_on_what_came_before_it(drops: list[dict[str, Any]]) -> None:
-    pictures = np.array([drop["pictures"] for drop in drops])
-    changed = pictures.copy()
+    frames = np.array([drop["frames"] for drop in drops])
+    changed = frames.copy()
     changed[:, [t > 2 for t in LOOKED_MS]] += 50
-    np.testing.assert_array_equal(features(pictures, 2), features(changed, 2))
-    assert not np.allclose(features(pictures, 5), features(changed, 5))
+    np.testing.assert_array_equal(features(frames, 2), features(changed, 2))
+    assert not np.allclose(features(frames, 5), features(changed, 5))
 
 
 def made(boards: int, told: bool) -> list[Row]:
@@ -58,17 +58,15 @@ def made(boards: int, told: bool) -> list[Row]:
                 "slant": random.choice([0, 15, 25]),
             }
             classes = [np.searchsorted(edges, values[name]) for name, (_, edges) in QUESTIONS.items()]
-            pictures = random.integers(20, 22, (len(LOOKED_MS), 4))
+            frames = random.integers(20, 22, (len(LOOKED_MS), 4))
             if told:
-                pictures[:, :3] += 40 * np.array(classes)
-            board_drops.append(
-                {**{name: float(value) for name, value in values.items()}, "pictures": pictures.tolist()}
-            )
+                frames[:, :3] += 40 * np.array(classes)
+            board_drops.append({**{name: float(value) for name, value in values.items()}, "frames": frames.tolist()})
         rows.append(Row({"drops": 20}, board, board_drops))
     return rows
 
 
-def test_what_pictures_tell_is_classified_and_what_they_do_not_is_chance() -> None:
+def test_what_frames_tell_is_classified_and_what_they_do_not_is_chance() -> None:
     p = {"boards": 6, "drops": 20, "folds": 3}
     told, untold = summarise(p, made(6, told=True)), summarise(p, made(6, told=False))
     assert told["drops"] == 120
@@ -79,11 +77,11 @@ def test_what_pictures_tell_is_classified_and_what_they_do_not_is_chance() -> No
 
 def test_a_drop_is_classified_by_other_folds_alone() -> None:
     """With its own label turned round, a fold's answers stay."""
-    pictures: NDArray[np.int64] = np.array([drop["pictures"] for row in made(4, told=True) for drop in row.result])
+    frames: NDArray[np.int64] = np.array([drop["frames"] for row in made(4, told=True) for drop in row.result])
     y = np.array([drop["ball"] > 60 for row in made(4, told=True) for drop in row.result]).astype(np.int64)
     fold = np.repeat([0, 0, 1, 1], 20)
-    answer, probable = answers(pictures, y, fold, 10)
-    turned, _ = answers(pictures, np.where(fold == 0, 1 - y, y), fold, 10)
+    answer, probable = answers(frames, y, fold, 10)
+    turned, _ = answers(frames, np.where(fold == 0, 1 - y, y), fold, 10)
     np.testing.assert_array_equal(answer[fold == 0], turned[fold == 0])
     assert (answer[fold == 1] != turned[fold == 1]).mean() > 0.9
     assert ((probable >= 0.5) & (probable <= 1)).all()

@@ -1,15 +1,12 @@
 """The demo: without the clock at toy size, and (slowly) in real time."""
 
 import json
-import math
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import h5py
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -17,11 +14,10 @@ import taxel
 from taxel.cli import app
 from taxel.demo.evaluation import evaluate_acts
 from taxel.demo.judging import GOALS, LABELS
-from taxel.demo.script import TRAINING_SEED, script
+from taxel.demo.script import TRAINING_SEED
 from taxel.demo.shipped import shipped
 from taxel.live import Live
 from taxel.simulate import Scene, Silence
-from taxel.wire import FRAME_US
 
 
 def run(*arguments):
@@ -46,12 +42,11 @@ def test_the_demo_finds_the_impacts_of_scenes_that_it_was_not_trained_on(toy):
         assert values["neuron"]["first_within_goal"][label]["share"] == 1.0
         assert -GOALS[label] <= first["known_ms"]["p95"] <= GOALS[label]
     assert values["noise"]["said"] == {"contact": 0, "lift": 0}
-    assert set(values["dashpot_ms"]) == {"0.3", "0"}
 
 
 def test_the_report_shows_what_it_should(toy):
     page = (toy / "report.html").read_text()
-    assert page.count('<div class="picture"><svg') == 7
+    assert page.count('<div class="picture"><svg') == 3
     for said in (
         "without the clock",
         "does as well",
@@ -89,64 +84,19 @@ def test_the_demo_never_plays_what_the_readout_was_trained_on():
     assert len(drawn) == 8
 
 
-def test_the_parts_of_a_delay_sum_to_it():
-    evaluation = evaluate_acts(script(3, 2), shipped(), seed=3)
-    row = evaluation.judged.row("first", "contact")
-    for (place, said), delay in zip(row.places, row.delays_ms, strict=True):
-        contact = evaluation.contacts[place]
-        stamp = evaluation.first_input(contact, "contact")
-        assert stamp is not None
-        begin = math.ceil(stamp / FRAME_US) * FRAME_US
-        physics = (begin - contact.start_us) / 1000
-        assert -0.2 < physics < delay
-        assert evaluation.detections.known[evaluation.detections.label == "contact"][said] >= begin + FRAME_US - 1
-
-
 def test_noise_alone_says_nothing():
     quiet = evaluate_acts([Silence(5_050.3)], shipped(), seed=8)
     assert len(quiet.detections) == 0
-    assert len(quiet.plain) == 0
+    assert quiet.judged_plain.false_counts == {"contact": 0, "lift": 0}
     assert 20 < len(quiet.events) / 5 < 400
 
 
-def test_footfalls_of_a_plate_are_laid_over_the_array(tmp_path):
-    """A small made-up plate: a heel that rolls to toes, its rows interpolated as the real files' are."""
-    (tmp_path / "plate").mkdir()
-    sensors = np.zeros((42, 33, 400))
-    rows, columns, frames = np.ogrid[:42, :33, :400]
-    middle = 4 + 28 * frames / 300
-    sensors = 200.0 * np.exp(-(((rows - middle) / 5) ** 2) - ((columns - 16) / 3) ** 2) * (frames < 300)
-    sensors = np.where(sensors < 20, 0, np.round(sensors)).astype(int)
-    image = np.zeros((63, 33, 400), np.uint16)
-    for k in range(21):
-        a, b, c = (sensors[min(2 * k + n, 41)] for n in range(3))
-        image[3 * k], image[3 * k + 1], image[3 * k + 2] = a, (a + 2 * b) // 3, (2 * b + c) // 3
-    with h5py.File(tmp_path / "plate" / "subj000.h5", "w") as file:
-        file["img000"] = image
-    ended = run(
-        "--no-clock", "--scenes", 1, "--seed", 5, "--noise", 1, "--data", tmp_path, "--folder", tmp_path / "r", "--json"
-    )
-    assert ended.exit_code == 0
-    steps = json.loads(ended.stdout)["footfalls"]["classes"]["footfall"]
-    assert {label: (steps[label]["found"], steps[label]["touches"]) for label in LABELS} == {
-        "contact": (1, 1),
-        "lift": (1, 1),
-    }
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--noise", "0"], "noise"),
-        (["--data", "nowhere"], "plate"),
-    ],
-)
-def test_what_the_user_got_wrong_is_one_line(arguments, said, tmp_path):
-    command = [sys.executable, "-m", "taxel", "demo", "--no-clock", "--scenes", "1", *arguments]
+def test_what_the_user_got_wrong_is_one_line(tmp_path):
+    command = [sys.executable, "-m", "taxel", "demo", "--no-clock", "--scenes", "1", "--noise", "0"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
     assert ended.returncode == 2
     assert ended.stderr.count("\n") == 1
-    assert said in ended.stderr
+    assert "noise" in ended.stderr
     assert not list(Path(tmp_path).iterdir())
 
 
@@ -165,11 +115,3 @@ def test_in_real_time_the_board_is_a_process_of_its_own_and_its_recording_says_t
     found = values["neuron"]["classes"]["first impact"]["contact"]["found"]
     assert (values["recording_agrees"] and found == 2) or host["late"] > 0, (found, host)
     shutil.rmtree(tmp_path / folder)
-
-
-def test_no_bar_of_a_delay_is_clipped_where_a_part_takes_no_time():
-    from taxel.demo.pictures import delay_split
-
-    (axes,) = delay_split({"lift": {"physics": 0.2, "kernel": 0.5, "frame": 0.3, "host": 0.0}}).axes
-    assert axes.get_xlim()[1] > 1.01
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["physics", "kernel", "frame"]

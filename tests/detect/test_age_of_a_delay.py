@@ -36,8 +36,8 @@ def test_labels_that_a_recipe_does_not_name_are_refused_when_they_are_trained() 
     recipe = Recipe(ENCODER, {"delay_ms": 5.5})
     two = taxel.Array(1, 2, pitch_mm=2.0)
     rest = taxel.Frames([[[50.0, 50.0]]] * 2, [0, 1000], unit="ticks", array=two)
-    pictures = [[[50.0, 50.0]]] * 5 + [[[90.0, 90.0]]] * 45
-    touch = taxel.Frames(pictures, range(0, 50_000, 1000), unit="ticks", array=two)
+    frames = [[[50.0, 50.0]]] * 5 + [[[90.0, 90.0]]] * 45
+    touch = taxel.Frames(frames, range(0, 50_000, 1000), unit="ticks", array=two)
     example = taxel.detect.Example(touch, {"contact": [5_000]}, tare=taxel.Tare.take(rest))
     with refused("neurons.contact: delay_ms is 5.5"):
         taxel.detect.fit([example], recipe)

@@ -1,4 +1,4 @@
-"""The ages of a touch in whole pictures: kinds of touch are told at any rate."""
+"""The ages of a touch in whole frames: kinds of touch are told at any rate."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from taxel import Array, Events, Frames, SpikeTrains, Tare
 from taxel.detect import Example, Recipe, judge, run, score
-from taxel.detect.ages import Ages, in_pictures, later_us
+from taxel.detect.ages import Ages, in_frames, later_us
 from taxel.detect.training import trained
 
 KINDS = ("small", "large")
@@ -18,7 +18,7 @@ KINDS = ("small", "large")
 def touched(
     seed: int, rate: float, jitter: float = 0.0, rise_s: float = 0.02, start_us: int = 0
 ) -> tuple[Frames, dict[str, np.ndarray]]:
-    """Return pictures of 16 touches by two sizes of ball on 7 x 7 taxels, and when which began; stamps may vary."""
+    """Return frames of 16 touches by two sizes of ball on 7 x 7 taxels, and when which began; stamps may vary."""
     random = np.random.default_rng(seed)
     begins = 1.5 + 0.9 * np.arange(16) + random.uniform(0, 0.2, 16)
     large = random.permutation(np.arange(16) % 2).astype(bool)
@@ -60,9 +60,9 @@ def test_kinds_are_told_at_any_rate(rate: float, jitter: float, rise_s: float, s
 def test_the_board_keeps_the_recipe_and_slower_events_take_whole_frames() -> None:
     recipe = Recipe.load("touch", labels=("contact", *KINDS))
     events = Events([0, 100], [0, 1], [0, 0], [True, True], array=Array(2, 2))
-    assert in_pictures(recipe, [Example(events, {})], [(192.0, 1)]) is recipe
-    assert in_pictures(recipe, [Example(events, {})], [(None, 1)]) is recipe
-    slow = in_pictures(recipe, [Example(events, {})], [(10_000.0, 1)])
+    assert in_frames(recipe, [Example(events, {})], [(192.0, 1)]) is recipe
+    assert in_frames(recipe, [Example(events, {})], [(None, 1)]) is recipe
+    slow = in_frames(recipe, [Example(events, {})], [(10_000.0, 1)])
     assert slow.neurons["small"]["delay_ms"] == 10.0
     assert slow.neurons["small"]["kernel"] == "alpha"
     assert {1: slow.neurons["contact"]} == {1: recipe.neurons["contact"]}
@@ -77,7 +77,7 @@ def test_kinds_are_told_at_1000_hz_held_out() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_kinds_are_told_where_a_tenth_of_the_pictures_is_lost(seed: int) -> None:
+def test_kinds_are_told_where_a_tenth_of_the_frames_is_lost(seed: int) -> None:
     examples = []
     for drawn in (seed, seed + 10):
         frames, labels = touched(drawn, 100)
@@ -102,12 +102,12 @@ def test_a_recipe_whose_later_age_was_chosen_is_sound_and_its_search_is_as_it_wa
 
 @settings(max_examples=settings.default.max_examples // 6)
 @given(st.floats(0.3, 200.0))
-def test_each_delay_has_one_picture(picture_ms: float) -> None:
+def test_each_delay_has_one_frame(frame_ms: float) -> None:
     recipe = Recipe.load("touch", labels=KINDS)
-    t = np.rint(1e3 * picture_ms * np.arange(5)).astype(np.int64)
+    t = np.rint(1e3 * frame_ms * np.arange(5)).astype(np.int64)
     examples, clocks = [Example(Frames(np.zeros((5, 2, 2)), t), {})], [(None, 1)]
-    made = in_pictures(recipe, examples, clocks)
-    assert in_pictures(made, examples, clocks) == made
+    made = in_frames(recipe, examples, clocks)
+    assert in_frames(made, examples, clocks) == made
     period_ms = float(np.median(np.diff(t))) / 1e3
     neuron = made.neurons["small"]
     *points, place = neuron, *neuron["choose"]

@@ -426,7 +426,7 @@ def test_labels_behind_the_last_event_are_named(
 
 
 @pytest.mark.parametrize(("late_us", "left_out"), [(9_999, False), (10_000, False), (10_001, True)])
-def test_a_note_behind_the_last_picture_is_left_out_and_said(tmp_path: Path, late_us: int, left_out: bool) -> None:
+def test_a_note_behind_the_last_frame_is_left_out_and_said(tmp_path: Path, late_us: int, left_out: bool) -> None:
     frames = taxel.Frames(np.zeros((100, 2, 2)), np.arange(100) * 10_000, unit="N", array=taxel.Array(2, 2))
     taxel.convert(frames, tmp_path / "mat.npz")
     (tmp_path / "mat.notes.csv").write_text(f"label,t_us\ntouch,400000\ntouch,{990_000 + late_us}\n")

@@ -37,7 +37,7 @@ def held(seed: int, n: int = 3000) -> Events:
     return Events(t, rng.integers(0, 4, n), rng.integers(0, 4, n), rng.random(n) < 0.5, intensity=ticks, array=ARRAY)
 
 
-def pictures(seed: int) -> Frames:
+def frames(seed: int) -> Frames:
     return Frames.from_events(held(seed), 200)
 
 
@@ -59,7 +59,7 @@ def composite(seed: int, **options: object) -> Readout:
     return Readout(Composite(PARTS), neurons(seed, **options), array=ARRAY, delays_ms=DELAYS)
 
 
-@pytest.mark.parametrize("source", [held, pictures])
+@pytest.mark.parametrize("source", [held, frames])
 @pytest.mark.parametrize("options", [{}, {"time": "grid", "step_ms": 0.2, "kernel": "exponential"}])
 def test_a_neuron_detects_what_it_would_behind_its_inputs_alone(source, options) -> None:
     """`t` too, so that the latency is the largest of its own inputs."""
@@ -245,7 +245,7 @@ def test_each_neuron_is_trained_on_its_inputs_as_if_they_were_the_encoder() -> N
     assert single.neurons["contact"].weights.tobytes() == readout.neurons["contact"].weights.tobytes()
     new = touches(9)
     found = run(readout, new.source, tare=REST)
-    # A spike at an age acts a step of the grid later at most, a fiftieth of a picture; `t` is the onset all the same.
+    # A spike at an age acts a step of the grid later at most, a fiftieth of a frame; `t` is the onset all the same.
     for label in ("strong", "weak"):
         late = found[label].t - new.labels[label]
         assert ((late >= 0) & (late < 20)).all(), late

@@ -62,8 +62,8 @@ def test_where_nothing_is_found_no_quantity_follows() -> None:
     assert follow([pattern], "touch", [np.array([20_000])], 0.0, [0, 1]) == []
 
 
-def pictures(seed: int, away: float) -> Example:
-    """Pictures of 10 touches; after the tare all readings are away from it by as much."""
+def frames(seed: int, away: float) -> Example:
+    """Frames of 10 touches; after the tare all readings are away from it by as much."""
     draw, count = np.random.default_rng(seed), 5200
     values = draw.normal(50.0, 0.4, (count, 8, 8))
     onsets = 300 + 480 * np.arange(10) + draw.integers(0, 60, 10)
@@ -81,10 +81,10 @@ def test_a_training_takes_levels_of_the_local_load_and_with_a_stale_tare_those_o
     recipe = Recipe.load("touch", labels=["contact"])
     # One recording with a stale tare shows one error of it; two show that levels above the rest do not carry over.
     for away, inputs in ((0.0, ["levels"]), (10.0, ["changes"])):
-        made = trained([pictures(1, away), pictures(3, away)], recipe, None)
+        made = trained([frames(1, away), frames(3, away)], recipe, None)
         assert made.recipe.neurons["contact"]["inputs"] == inputs
         assert "search" in made.recipe.neurons["contact"]
-        unseen = pictures(2, away)
+        unseen = frames(2, away)
         found = score(run(made.readout, unseen.source, tare=unseen.tare), unseen.labels)
         assert (found.missed, found.false) == (0, 0), away
         assert made.readout.encoder == recipe.encoder.parts[inputs[0]]
@@ -97,12 +97,12 @@ def test_a_point_that_leaves_no_more_counts_only_where_that_is_enough(fewer, inp
     neuron = {"inputs": ["area"], "refractory": 15.0, "tau": 0.3, "ub": 3.0, "lb": 0.0, "delay_ms": 0.1}
     choose = [{"inputs": ["levels"], "fewer": fewer}]
     recipe = Recipe(encoder, {}, {"contact": {**neuron, "choose": choose}}, run_threshold=0.8, align=True)
-    made = trained([pictures(1, 0.0)], recipe, None)
+    made = trained([frames(1, 0.0)], recipe, None)
     assert made.recipe.neurons["contact"] == {**neuron, "inputs": inputs, "choose": choose}
 
 
 def test_without_a_tare_no_input_that_needs_one_is_chosen() -> None:
-    recipe, one = Recipe.load("touch", labels=["contact"]), pictures(1, 10.0)
+    recipe, one = Recipe.load("touch", labels=["contact"]), frames(1, 10.0)
     assert possible(recipe, [one]) == recipe
     left = possible(recipe, [one._replace(tare=None)])
     names = [name for point in left.neurons["contact"].get("choose", ()) for name in point.get("inputs", ())]

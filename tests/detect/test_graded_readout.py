@@ -14,7 +14,7 @@ REST = Tare.take(Frames(np.full((2, 4, 5), 50.0), [0, 1000], unit="ticks", array
 ENCODER = Moments(levels=2, graded=True, ages_ms=[0.0, 1.0, 4.0], period_ms=0.2, displacement_mm=(0.2, 5), tare=REST)
 
 
-def pictures(seed, n=120):
+def touch_frames(seed, n=120):
     rng = np.random.default_rng(seed)
     touch = np.repeat(rng.random(n // 10) < 0.6, 10)[:, None, None] * rng.uniform(0, 40, (n, 4, 5))
     touch[-10:] = 0  # what is held at the end causes spikes for as long as the readout runs on
@@ -41,7 +41,7 @@ def same(a: Detections, b: Detections):
 @pytest.mark.parametrize("options", [{}, {"time": "grid", "step_ms": 0.192, "kernel": "exponential"}])
 def test_a_readout_multiplies_weights_by_values_in_a_recording_in_trains_and_in_pieces(options):
     for seed in range(3):
-        frames, found = pictures(seed), readout(seed, **options)
+        frames, found = touch_frames(seed), readout(seed, **options)
         whole = run(found, frames)
         assert len(whole) > 3
         trains = ENCODER.encode(frames)

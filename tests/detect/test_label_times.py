@@ -26,7 +26,7 @@ FLOOR = 0.05
 def touched(
     seed: int, count: int = 12, begin_s: float = 2.5, hold_s: tuple[float, float] = (0.1, 0.3)
 ) -> tuple[Frames, dict[str, np.ndarray]]:
-    """Return pictures at 200 Hz of touches that follow each other irregularly, and when each began and ended, us."""
+    """Return frames at 200 Hz of touches that follow each other irregularly, and when each began and ended, us."""
     random = np.random.default_rng(seed)
     begins = begin_s + np.cumsum(random.uniform(0.5, 1.5, count))
     ends = begins + random.uniform(*hold_s, count)
@@ -166,6 +166,6 @@ def test_kinds_that_differ_by_place_are_told_and_of_others_the_advice_says_what_
         assert any(one.startswith(f"{name}, neuron: 12 of 12 found, 0 missed, 0 false") for one in told), told[:5]
     told = lines(("wet", "dry"), random.permutation(24) < 12, 2)
     (line,) = [one for one in told if one.startswith("wet: ") and "what may help is other kinds: " in one]
-    assert "the inputs of this recipe are moments of the picture" in line
+    assert "the inputs of this recipe are moments of the frame" in line
     assert "--recipe gait_plate, whose inputs are the taxels, may tell them, and taxel information says" in line
     assert "no input tells" not in line

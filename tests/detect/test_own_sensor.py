@@ -1,4 +1,4 @@
-"""Training on a sensor of one's own: pictures of a grid in any unit, with an offset and noise of each taxel."""
+"""Training on a sensor of one's own: frames of a grid in any unit, with an offset and noise of each taxel."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LABELS = ("contact", "lift")
 def touched(
     shape: tuple[int, int], seed: int, *, gain: float, noise: float, offset: float = 0.0, begin_s: float = 1.0
 ) -> tuple[Frames, dict[str, np.ndarray]]:
-    """Return pictures at 100 Hz of 12 touches anywhere, and when they begin and end."""
+    """Return frames at 100 Hz of 12 touches anywhere, and when they begin and end."""
     random = np.random.default_rng(seed)
     count, period = 12, 100
     first = round(100 * begin_s)
@@ -388,7 +388,7 @@ def test_wrong_input_says_what_would_be_right(
     assert said in wrong
 
 
-def test_info_takes_the_rate_of_numbered_pictures(tmp_path: Path, capsys) -> None:
+def test_info_takes_the_rate_of_numbered_frames(tmp_path: Path, capsys) -> None:
     np.save(tmp_path / "b.npy", np.zeros((9, 2, 3)))
     (tmp_path / "b.layout.toml").write_text('unit = "counts"')
     facts = json.loads(call(capsys, "info", tmp_path / "b.npy", "--rate-hz", "10", "--json")[1])
@@ -442,7 +442,7 @@ def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
 
 
 def squares(sides: list[int]) -> tuple[Frames, dict[str, list[int]]]:
-    """Return pictures at 100 Hz of touches that load squares of so many taxels at once, one a second."""
+    """Return frames at 100 Hz of touches that load squares of so many taxels at once, one a second."""
     values = np.random.default_rng(1).normal(0, 1, (100 * (len(sides) + 2), 12, 12))
     starts = 100 + 100 * np.arange(len(sides))
     for start, side in zip(starts, sides, strict=True):

@@ -1,4 +1,4 @@
-"""A plain rule against a loop over frames, written from its documentation; pieces, pictures, files, live, tuning."""
+"""A plain rule against a loop over frames, written from its documentation; pieces, frames, files, live, tuning."""
 
 import math
 from fractions import Fraction
@@ -75,10 +75,10 @@ class ByLoop:
             return t, quantity("area", held), local.at(t, held) if name == "local_load" else quantity(name, held)
 
         if isinstance(source, Frames):
-            self.pictures = [int(t) for t in source.t]
-            for k, (t, picture) in enumerate(zip(self.pictures, source.values, strict=True)):
-                self.frames[k] = [measured(t, picture)]
-            self.end = lambda k: math.ceil(self.pictures[k] + Fraction(frame_us))
+            self.starts = [int(t) for t in source.t]
+            for k, (t, frame) in enumerate(zip(self.starts, source.values, strict=True)):
+                self.frames[k] = [measured(t, frame)]
+            self.end = lambda k: math.ceil(self.starts[k] + Fraction(frame_us))
             return
         period, stamp = Fraction(frame_us), 100 if version == 1 else 1
         now = int(source.t[0])
@@ -105,7 +105,7 @@ class ByLoop:
     def edges(self, threshold, release, frames, which=2):
         """The onsets and ends: (is end, t, known)."""
         loaded, first, since, before, found = False, None, 0, 0.0, []
-        visited = self.frames if hasattr(self, "pictures") else {
+        visited = self.frames if hasattr(self, "starts") else {
             n + more for n in self.frames for more in range(frames + 1)
         }  # fmt: skip
         for n in sorted(visited):
@@ -133,10 +133,10 @@ class ByLoop:
             if is_end:
                 continue
             at = t + age_us
-            if hasattr(self, "pictures"):
-                last = max(k for k, start in enumerate(self.pictures) if start <= at)
-                periods = (at - self.pictures[last]) // Fraction(frame_us) + 1
-                known = math.ceil(self.pictures[last] + periods * Fraction(frame_us))
+            if hasattr(self, "starts"):
+                last = max(k for k, start in enumerate(self.starts) if start <= at)
+                periods = (at - self.starts[last]) // Fraction(frame_us) + 1
+                known = math.ceil(self.starts[last] + periods * Fraction(frame_us))
             else:
                 known = self.end(last := self.frame(at))
             value = self.frames[max(k for k in self.frames if k <= last)][-1][2]
@@ -226,9 +226,9 @@ def test_a_curve_has_the_begins_and_ends_that_the_rule_finds(source, rule, clock
              min_size=1, max_size=12),
     st.one_of(rules, kinds),
 )  # fmt: skip
-def test_every_picture_is_a_frame(pictures, rule):
-    t = np.cumsum([step for step, _ in pictures])
-    source = Frames(np.reshape([values for _, values in pictures], (-1, 3, 4)), t, array=ARRAY)
+def test_each_frame_of_the_input_is_one(steps, rule):
+    t = np.cumsum([step for step, _ in steps])
+    source = Frames(np.reshape([values for _, values in steps], (-1, 3, 4)), t, array=ARRAY)
     found = run(rule, source, frame_us=1000.0, tare=tare())
     assert as_tuples(found, rule) == expected(rule, source, 1000.0)
     stream = rule.stream(frame_us=1000.0, tare=tare())
@@ -476,14 +476,14 @@ def test_tuning_tells_two_kinds_by_area_at_an_age():
     assert found["off"].labels == ("off",)
 
 
-def test_tuning_pictures():
-    source, held, pictures = played(4), np.zeros((12, 12)), []
+def test_tuning_frames():
+    source, held, values = played(4), np.zeros((12, 12)), []
     stamps = np.unique(source.source.t)
     for t in stamps:
         now = source.source[source.source.t == t]
         held[now.y, now.x] = now.intensity
-        pictures.append(held.copy())
-    frames = Frames(pictures, stamps, array=source.source.array)
+        values.append(held.copy())
+    frames = Frames(values, stamps, array=source.source.array)
     rules = tune([Example(frames, source.labels, source.tare)])
     assert rules["hit"] is not None
     assert rules["hit"].labels == ("hit",)

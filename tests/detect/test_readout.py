@@ -207,7 +207,7 @@ def test_known_is_never_before_the_crossing_and_ends_a_frame() -> None:
         assert (found.known - np.round(frames) * frame_us < 1.0).all()
 
 
-def test_pictures_are_known_when_their_frame_ends() -> None:
+def test_detections_in_frames_are_known_when_the_frame_ends() -> None:
     values = np.zeros((40, 8, 8))
     values[10:, 3, 3] = 100.0
     frames = taxel.Frames(values, np.arange(40) * 2000 + 13, array=ARRAY)

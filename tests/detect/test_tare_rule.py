@@ -19,7 +19,7 @@ FLOOR = 6.0
 
 
 def touched(seed: int, drift: float = 0.0, stays: float = 0.0) -> Frames:
-    """Return a minute of pictures of 30 touches on 6 x 6 taxels; a rest that drifts, an object that comes and stays."""
+    """Return a minute of frames of 30 touches on 6 x 6 taxels; a rest that drifts, an object that comes and stays."""
     random = np.random.default_rng(seed)
     values = random.normal(50, 1, (3000, 6, 6)) + drift * np.linspace(0, 1, 3000)[:, None, None]
     values[1200:, 1:5, 1:5] += stays

@@ -83,7 +83,7 @@ def test_the_last_lines_warn_of_labels_that_are_not_found_and_the_readout_is_wri
     assert (code, "warning" in out) == (0, False), "all are found"
 
 
-def test_one_rule_tells_kinds_at_a_picture_of_a_touch_and_says_which_lies_below(tmp_path: Path, capsys) -> None:
+def test_one_rule_tells_kinds_at_a_frame_of_a_touch_and_says_which_lies_below(tmp_path: Path, capsys) -> None:
     frames, truth = touched(1, 80)
     taxel.convert(frames, tmp_path / "kinds.npz")
     rows = [f"{kind},{t}" for kind, times in truth.items() for t in times]
@@ -100,7 +100,7 @@ def test_one_rule_tells_kinds_at_a_picture_of_a_touch_and_says_which_lies_below(
     )
     assert rule, said[0]
     assert said[0] == said[1]
-    # A picture lasts 12.5 ms, and the age is in the middle of one, or 0.
+    # A frame lasts 12.5 ms, and the age is in the middle of one, or 0.
     assert float(rule[1]) in (0.0, *(12.5 * k + 6.25 for k in range(1, 5)))
     # As it is printed it tells the touches that it was tuned on.
     detector = PlainRule("area", float(rule[2]), age_ms=float(rule[1]), labels=("small", "large"), noise_floor=0.012)

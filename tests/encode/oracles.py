@@ -141,11 +141,11 @@ def fa1(t, values, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=None, larg
     return sorted(spikes)
 
 
-def contact_area(t, pictures, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
+def contact_area(t, frames, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
     """Rises and falls of the number of loaded taxels with a loaded neighbour; `rest` is NaN where unknown."""
     before, spikes = 0, []
-    for at, picture in zip(t, pictures, strict=True):
-        loaded = np.nan_to_num(picture - rest, nan=-np.inf) >= floor + TICK_SHIFT
+    for at, frame in zip(t, frames, strict=True):
+        loaded = np.nan_to_num(frame - rest, nan=-np.inf) >= floor + TICK_SHIFT
         wide = np.pad(loaded, 1)
         rows, columns = loaded.shape
         beside = sum(
@@ -164,9 +164,9 @@ def contact_area(t, pictures, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
     return sorted(spikes)
 
 
-def counted(picture, rest, floor):
+def counted(frame, rest, floor):
     """Which taxels are loaded and have a loaded neighbour."""
-    loaded = np.nan_to_num(picture - rest, nan=-np.inf) >= floor + TICK_SHIFT
+    loaded = np.nan_to_num(frame - rest, nan=-np.inf) >= floor + TICK_SHIFT
     return loaded & (ndimage.convolve(loaded.astype(int), np.ones((3, 3)), mode="constant") > 1)
 
 
@@ -180,27 +180,27 @@ def moment_levels(levels, **ranges):
     return every
 
 
-def moment_values(pictures, rest, floor, pitch):
-    """Area, total, peak, and the displacement of the centre in x and in y, of each picture."""
+def moment_values(frames, rest, floor, pitch):
+    """Area, total, peak, and the displacement of the centre in x and in y, of each frame."""
     values, origin = [], None
-    for picture in pictures.astype(np.float64):
-        there = counted(picture, rest, floor)
+    for frame in frames.astype(np.float64):
+        there = counted(frame, rest, floor)
         if not there.any():
             values.append([0.0] * 5)
             origin = None
             continue
-        above = np.where(there, picture - rest, 0.0)
+        above = np.where(there, frame - rest, 0.0)
         y, x = ndimage.center_of_mass(above)
         origin = (x, y) if origin is None else origin
         values.append([there.sum(), above.sum(), above.max(), (x - origin[0]) * pitch, (y - origin[1]) * pitch])
     return np.array(values)
 
 
-def centre_places(pictures, rest, floor):
-    """Column of the centre from -1 to 1, its square, row and that one's square, of each picture."""
+def centre_places(frames, rest, floor):
+    """Column of the centre from -1 to 1, its square, row and that one's square, of each frame."""
     places = []
-    for picture in pictures.astype(np.float64):
-        above = np.where(counted(picture, rest, floor), picture - rest, 0.0)
+    for frame in frames.astype(np.float64):
+        above = np.where(counted(frame, rest, floor), frame - rest, 0.0)
         y, x = ndimage.center_of_mass(above) if above.any() else [(n - 1) / 2 for n in above.shape]
         x, y = (2 * x / (above.shape[1] - 1) - 1, 2 * y / (above.shape[0] - 1) - 1)
         places.append([x, x**2, y, y**2])
@@ -227,9 +227,9 @@ def sampled_moments(t, values, shown, ages, first, places=None):
     return spikes
 
 
-def moments(t, pictures, rest, end, floor, pitch, every, tonic=None):
+def moments(t, frames, rest, end, floor, pitch, every, tonic=None):
     """Crossings of the levels in `every`, and tonic spikes (us) up to `end`."""
-    spikes, values = [], moment_values(pictures, rest, floor, pitch)
+    spikes, values = [], moment_values(frames, rest, floor, pitch)
     for n, (moment, at) in enumerate(every):
         reached = values[:, moment] >= at if at > 0 else values[:, moment] <= at
         begin = None

@@ -48,5 +48,5 @@ def at_times(events, t):
 
 def rest(array, ticks=55):
     """A tare of an array whose taxels all rest at the same value."""
-    pictures = np.full((2, array.rows, array.columns), ticks, np.float32)
-    return Tare.take(Frames(pictures, [0, 1000], unit="ticks", array=array))
+    frames = np.full((2, array.rows, array.columns), ticks, np.float32)
+    return Tare.take(Frames(frames, [0, 1000], unit="ticks", array=array))

@@ -32,11 +32,11 @@ def test_contact_area_counts_loaded_taxels_with_loaded_neighbours(seed, rows, co
     level = rng.choice([50.0, 56.0, 60.0], (rows, columns))
     tare = Tare.take(Frames([level, level], [0, 1000], array=array))
     lift = np.repeat(rng.integers(0, 12, 12), 5)[:, None, None]
-    pictures = np.rint(level + lift * rng.random((60, rows, columns)))
+    frames = np.rint(level + lift * rng.random((60, rows, columns)))
     t = np.arange(60) * 192
     encoder = ContactArea(noise_floor=floor, levels=[1, 2, 4, 8, 16, 32], tare=tare)
-    wanted = oracles.contact_area(t, pictures, level, floor, (1, 2, 4, 8, 16, 32))
-    assert spikes_of(encoder.encode(Frames(pictures, t, array=array))) == wanted
+    wanted = oracles.contact_area(t, frames, level, floor, (1, 2, 4, 8, 16, 32))
+    assert spikes_of(encoder.encode(Frames(frames, t, array=array))) == wanted
 
 
 @settings(max_examples=40, deadline=None)
@@ -45,14 +45,14 @@ def test_contact_area_of_events_is_reckoned_once_a_stamp(seed):
     rng = np.random.default_rng(seed)
     array = Array(6, 7)
     events = touch(rng, array)
-    held, pictures, stamps = np.full((6, 7), -np.inf), [], []
+    held, frames, stamps = np.full((6, 7), -np.inf), [], []
     for k, at in enumerate(events.t):
         if events.present[k]:
             held[events.y[k], events.x[k]] = events.intensity[k]
         if k + 1 == len(events) or events.t[k + 1] != at:
-            pictures.append(held.copy())
+            frames.append(held.copy())
             stamps.append(at)
-    wanted = oracles.contact_area(stamps, pictures, np.full((6, 7), 55.0))
+    wanted = oracles.contact_area(stamps, frames, np.full((6, 7), 55.0))
     spikes = ContactArea(tare=rest(array)).encode(events)
     assert len(spikes) == 10
     assert spikes_of(spikes) == wanted

@@ -284,8 +284,8 @@ def test_permuted_taxels_give_permuted_trains(encoder):
 @pytest.mark.parametrize("encoder", OF_THE_ARRAY.values(), ids=OF_THE_ARRAY)
 def test_an_array_that_is_turned_gives_the_same_trains_as_they_stand_then(encoder):
     rng = np.random.default_rng(13)
-    pictures, t = wander(rng, 200, 12).reshape(200, 3, 4), np.arange(200) * 200
-    plain, turned = (encoder.encode(Frames(p, t, array=ARRAY)) for p in (pictures, pictures[:, ::-1, ::-1]))
+    frames, t = wander(rng, 200, 12).reshape(200, 3, 4), np.arange(200) * 200
+    plain, turned = (encoder.encode(Frames(p, t, array=ARRAY)) for p in (frames, frames[:, ::-1, ::-1]))
     assert spikes_of(plain)
     assert spikes_of(turned) == spikes_of(plain.select(FILES[encoder.name].turned(encoder)))
 
@@ -294,9 +294,9 @@ def test_an_array_that_is_turned_gives_the_same_trains_as_they_stand_then(encode
 def test_a_train_with_a_place_hears_what_is_near_it_and_not_what_is_far(encoder):
     array = Array(20, 20, pitch_mm=1.0)
     t = np.arange(200) * round(encoder.period_ms * 1000)
-    pictures = np.zeros((200, 20, 20))
-    pictures[20:60, 3, 4] = 150
-    spikes = encoder.encode(Frames(pictures, t, array=array))
+    frames = np.zeros((200, 20, 20))
+    frames[20:60, 3, 4] = 150
+    spikes = encoder.encode(Frames(frames, t, array=array))
     places = FILES[encoder.name].places(encoder, array)
     assert len(places) == len(spikes) == encoder.trains(array)
     away = np.hypot(*(places - [4, 3]).T)
@@ -431,11 +431,11 @@ def test_what_cannot_be_encoded_is_refused(encoder):
             stream.push(pieces[-1])
 
     heard = Events([5], [0], [0], [1], array=ARRAY, intensity=[5])
-    picture = Frames(np.zeros((1, 3, 4)), [0], array=ARRAY)
+    frame = Frames(np.zeros((1, 3, 4)), [0], array=ARRAY)
     refuses("without intensities", Events([5], [0], [0], [1], array=ARRAY))
-    refuses("begun with events", heard, picture)
-    refuses("begun with frames", picture, heard)
-    refuses("times ascend", picture, picture)
+    refuses("begun with events", heard, frame)
+    refuses("begun with frames", frame, heard)
+    refuses("times ascend", frame, frame)
     refuses("begun for .* 3 x 4", Events([5], [0], [0], [1], array=Array(4, 4), intensity=[5]))
     refuses("begun for 3 x 4", Frames(np.zeros((1, 4, 4)), [0]))
     refuses("Frames.held fills the missing", Frames(np.full((1, 3, 4), np.nan), [0], array=ARRAY))

@@ -56,16 +56,16 @@ def mean(times, rows, k, start_ms, stop_ms):
 
 
 class Oracle:
-    """The quantities of pictures, with the number of places whose sum is above `bound`, nearly 4."""
+    """The quantities of frames, with the number of places whose sum is above `bound`, nearly 4."""
 
-    def __init__(self, encoder, t, pictures, exists, bound):
+    def __init__(self, encoder, t, readings, exists, bound):
         self.encoder, self.t, self.tare, self.bound = encoder, t, encoder.tare, bound
         self.known = exists & ~np.isnan(self.tare.rest)
         self.sigma = np.maximum(np.nan_to_num(self.tare.noise), encoder.least_noise)
         self.s = np.where(self.known, np.sqrt(self.sigma**2 + encoder.noise_floor**2 / 4), 0.0)
-        self.pictures = np.where(exists, pictures, 0).astype(np.float64)
-        # A taxel that has been 0 since the first picture has no value yet: it is at its rest.
-        self.waiting = np.logical_and.accumulate(self.pictures == 0, axis=0)
+        self.readings = np.where(exists, readings, 0).astype(np.float64)
+        # A taxel that has been 0 since the first frame has no value yet: it is at its rest.
+        self.waiting = np.logical_and.accumulate(self.readings == 0, axis=0)
 
     def of(self, value, times):
         """Area, largest, places and total of values above their baselines."""
@@ -82,28 +82,28 @@ class Oracle:
         ]
 
     def above_rest(self):
-        """The values above the rest, and the pictures in which a taxel without a value is at its rest."""
+        """The values above the rest, and the frames in which a taxel without a value is at its rest."""
         far = np.maximum(self.encoder.noise_floor + 0.5, 5 * self.sigma).astype(np.float32)
         baseline, found = np.where(self.known, self.tare.rest, 0.0), []
-        for k, picture in enumerate(self.pictures):
+        for k, frame in enumerate(self.readings):
             if k > 0 and self.encoder.rest == "tracked":
                 tau_us = np.where(np.abs(found[-1]) < far, 1e6, 20e6)
                 baseline = baseline - np.expm1(-(self.t[k] - self.t[k - 1]) / tau_us) * found[-1]
-            picture[self.waiting[k]] = baseline[self.waiting[k]]
-            found.append(np.float32(picture - baseline).astype(float))
+            frame[self.waiting[k]] = baseline[self.waiting[k]]
+            found.append(np.float32(frame - baseline).astype(float))
         return found
 
     def above_mean(self, tau_ms):
         """The values above running means, after `above_rest`."""
-        baseline, found = self.pictures[0], []
-        for k, picture in enumerate(self.pictures):
+        baseline, found = self.readings[0], []
+        for k, frame in enumerate(self.readings):
             if k > 0:
                 baseline = baseline - np.expm1(-(self.t[k] - self.t[k - 1]) / (1e3 * tau_ms)) * found[-1]
-            found.append(picture - baseline)
+            found.append(frame - baseline)
         return found
 
     def values(self):
-        """The quantities of each picture."""
+        """The quantities of each frame."""
         now = [self.of(u, 3) for u in self.above_rest()]
         for tau in self.encoder.local_ms:
             for k, u in enumerate(self.above_mean(tau)):
@@ -119,9 +119,9 @@ class Oracle:
 def some_tare(rng, array, noise, holes):
     """A tare with noise of its own for each taxel, 0 for some; of some taxels nothing is known."""
     of_each = noise * rng.random(array.shape) * (rng.random(array.shape) < 0.8)
-    pictures = rng.normal(rng.uniform(40, 60, array.shape), of_each, (20, *array.shape))
-    pictures = np.where(array.exists, pictures, 0)
-    tare = json.loads(Tare.take(Frames(pictures, 192 * np.arange(20), unit="ticks", array=array)).to_json())
+    readings = rng.normal(rng.uniform(40, 60, array.shape), of_each, (20, *array.shape))
+    readings = np.where(array.exists, readings, 0)
+    tare = json.loads(Tare.take(Frames(readings, 192 * np.arange(20), unit="ticks", array=array)).to_json())
     unknown = rng.random(array.exists.size) < holes
     for name in ("rest", "noise"):
         tare[name] = [None if hole else value for hole, value in zip(unknown, tare[name], strict=True)]
@@ -147,20 +147,20 @@ def test_quantities_are_those_of_numpy(seed, shape, noise, floor, least, rest_is
     tare = some_tare(rng, array, noise, rng.choice([0.0, 0.2]))
     t = 5 + np.cumsum(rng.choice([100, 192, 2500, pause], n, p=[0.2, 0.7, 0.05, 0.05]))
     still = np.where(np.isnan(tare.rest), 50, tare.rest) + rng.choice([0.0, 8.0, -6.0], shape)
-    pictures = np.rint(rng.normal(still, noise, (n, *shape)))
+    readings = np.rint(rng.normal(still, noise, (n, *shape)))
     for _ in range(3):  # presses and releases, quick and slow, and changes that stay
         first, last = sorted(rng.integers(0, n + 1, 2))
         y, x = (rng.integers(0, size) for size in shape)
-        pictures[first:last, max(0, y - 1) : y + 2, max(0, x - 1) : x + 2] += rng.choice([-40, 3, 15, 100])
+        readings[first:last, max(0, y - 1) : y + 2, max(0, x - 1) : x + 2] += rng.choice([-40, 3, 15, 100])
     stuck = rng.random(shape) < 0.1
-    pictures[n // 2 :, stuck] = rng.choice([0, 150])
-    pictures[: rng.integers(0, n), rng.random(shape) < 0.2] = 0  # no value yet
-    pictures = np.where(array.exists, np.clip(pictures, 0, None), np.nan if missing else 0)
+    readings[n // 2 :, stuck] = rng.choice([0, 150])
+    readings[: rng.integers(0, n), rng.random(shape) < 0.2] = 0  # no value yet
+    readings = np.where(array.exists, np.clip(readings, 0, None), np.nan if missing else 0)
     encoder = LocalLoad(noise_floor=floor, least_noise=least, rest=rest_is, local_ms=local_ms, tare=tare)
-    found = encoder.values(Frames(pictures, t, unit="ticks", array=array))
+    found = encoder.values(Frames(readings, t, unit="ticks", array=array))
     assert found.shape == (n, len(encoder.quantities)) == (n, 21 + 18 * len(local_ms))
-    pictures = np.nan_to_num(pictures)
-    fewest, most = (Oracle(encoder, t, pictures, array.exists, bound).values() for bound in (4.0001, 3.9999))
+    readings = np.nan_to_num(readings)
+    fewest, most = (Oracle(encoder, t, readings, array.exists, bound).values() for bound in (4.0001, 3.9999))
     assert (found >= fewest - 1e-4 * (1 + np.abs(fewest))).all()
     assert (found <= most + 1e-4 * (1 + np.abs(most))).all()
 
@@ -206,12 +206,12 @@ def test_levels_are_crossed_where_the_largest_sums_of_numpy_cross_them(seed, loc
     rng = np.random.default_rng(seed)
     array = Array(5, 7)
     t = 5 + 192 * np.arange(150)
-    pictures = np.rint(rng.normal(55, rng.choice([0.0, 0.5, 2.0]), (150, 5, 7)))
+    readings = np.rint(rng.normal(55, rng.choice([0.0, 0.5, 2.0]), (150, 5, 7)))
     for _ in range(4):
         first, last = sorted(rng.integers(0, 150, 2))
         y, x = rng.integers(0, 5), rng.integers(0, 7)
-        pictures[first:last, max(0, y - 1) : y + 2, max(0, x - 1) : x + 2] += rng.choice([-40, 3, 6, 15])
-    frames = Frames(pictures, t, unit="ticks", array=array)
+        readings[first:last, max(0, y - 1) : y + 2, max(0, x - 1) : x + 2] += rng.choice([-40, 3, 6, 15])
+    frames = Frames(readings, t, unit="ticks", array=array)
     graded = LocalLoad(local_ms=local_ms, tare=rest(array))
     columns = [k for k, name in enumerate(graded.quantities) if name.startswith("largest") and "mean" not in name]
     expected = []
@@ -242,8 +242,8 @@ def test_values_of_a_tare_in_seconds_are_those_of_one_measured_there():
 STILL = np.full((8, 9), 50.0)
 
 
-def largest(pictures, period_us=192, **parameters):
-    frames = Frames(np.array(pictures), np.arange(len(pictures)) * period_us, unit="ticks", array=Array(8, 9))
+def largest(readings, period_us=192, **parameters):
+    frames = Frames(np.array(readings), np.arange(len(readings)) * period_us, unit="ticks", array=Array(8, 9))
     encoder = LocalLoad(tare=rest(Array(8, 9), 50), **parameters)
     return encoder.values(frames)[:, 1]
 
@@ -261,15 +261,15 @@ def test_a_stuck_taxel_or_a_pair_of_them_does_not_reach_4(at):
 @pytest.mark.parametrize("touched", range(10))
 def test_each_of_nine_neighbours_that_are_touched_adds_1(touched):
     """Each is clipped to 3 s, and nine of them have a noise of 3 s."""
-    pictures = np.array([STILL, STILL])
+    readings = np.array([STILL, STILL])
     for k in range(touched):
-        pictures[1, 3 + k // 3, 4 + k % 3] += 10 + k
-    assert largest(pictures).tolist() == [0, pytest.approx(touched)]
+        readings[1, 3 + k // 3, 4 + k % 3] += 10 + k
+    assert largest(readings).tolist() == [0, pytest.approx(touched)]
 
 
 def test_a_drift_of_a_tick_a_minute_is_followed_and_a_touch_is_not():
     seconds = 600
-    drift = STILL + np.arange(seconds * 10)[:, None, None] / 600  # 10 pictures a second, 1 tick a minute
+    drift = STILL + np.arange(seconds * 10)[:, None, None] / 600  # 10 frames a second, 1 tick a minute
     assert largest(drift, 100_000)[-1] < 0.2
     assert largest(drift, 100_000, rest="tare")[-1] > 8
     touched = drift.copy()
@@ -281,9 +281,9 @@ def test_a_drift_of_a_tick_a_minute_is_followed_and_a_touch_is_not():
 
 def test_a_taxel_without_a_value_yet_does_not_hide_a_touch_beside_it():
     """A board with a noise floor reports no taxel that stays at rest: its value reads 0."""
-    pictures = np.zeros((3, 8, 9))
-    pictures[2, 3, 4] = pictures[2, 3, 5] = 90
-    assert largest(pictures).tolist() == [0, 0, pytest.approx(2.0)]
+    readings = np.zeros((3, 8, 9))
+    readings[2, 3, 4] = readings[2, 3, 5] = 90
+    assert largest(readings).tolist() == [0, 0, pytest.approx(2.0)]
 
 
 @pytest.mark.parametrize(

@@ -78,17 +78,17 @@ def test_moments_are_those_of_numpy_and_scipy(seed, levels, left_out, floor, ton
     array = Array(5, 7, 2.67)
     tare = some_rest(rng, array)
     t = 77 + np.cumsum(rng.choice([192, 100, 3333], 150))
-    pictures = wander(rng, 150, 35).reshape(150, 5, 7).astype(np.float32)
-    pictures[rng.random(150) < 0.1] = 40  # touches end and new ones begin
+    frames = wander(rng, 150, 35).reshape(150, 5, 7).astype(np.float32)
+    frames[rng.random(150) < 0.1] = 40  # touches end and new ones begin
     ranges = {name: None if name in left_out else of for name, of in RANGES.items()}
     encoder = Moments(
         levels=levels, noise_floor=floor, tonic_ms=None if tonic is None else tonic / 1000, tare=tare, **ranges
     )
-    spikes = encoder.encode(Frames(pictures, t, unit="ticks", array=array))
+    spikes = encoder.encode(Frames(frames, t, unit="ticks", array=array))
     every = oracles.moment_levels(levels, **ranges)
     assert len(spikes) == encoder.trains(array) == len(every) * (2 if tonic is None else 3)
     assert not spikes.signed
-    wanted = oracles.moments(t.tolist(), pictures, tare.rest, int(t[-1]), floor, 2.67, every, tonic)
+    wanted = oracles.moments(t.tolist(), frames, tare.rest, int(t[-1]), floor, 2.67, every, tonic)
     assert spikes_of(spikes) == wanted
     assert wanted
 
@@ -110,23 +110,23 @@ def test_sampled_moments_and_ages_are_those_of_numpy(seed, levels, left_out, ton
     array = Array(5, 7, 2.67)
     tare = some_rest(rng, array)
     t = 77 + np.cumsum(rng.choice([192, 100, 3333], 150))
-    pictures = wander(rng, 150, 35).reshape(150, 5, 7).astype(np.float32)
-    pictures[rng.random(150) < 0.1] = 40  # touches end and new ones begin
+    frames = wander(rng, 150, 35).reshape(150, 5, 7).astype(np.float32)
+    frames[rng.random(150) < 0.1] = 40  # touches end and new ones begin
     ranges = {name: None if name in left_out else of for name, of in RANGES.items()}
     options = {"levels": levels, "tonic_ms": None if tonic is None else tonic / 1000, "tare": tare, **ranges}
     centre = centre and graded
     encoder = Moments(graded=graded, centre=centre, ages_ms=[age / 1000 for age in ages] or None, **options)
-    spikes = encoder.encode(Frames(pictures, t, unit="ticks", array=array))
+    spikes = encoder.encode(Frames(frames, t, unit="ticks", array=array))
     assert spikes.kind == encoder.kind == ("graded" if graded else "unsigned")
     every = oracles.moment_levels(levels, **ranges)
     first = len(every) * (2 if tonic is None else 3)
     shown = [n for n, name in enumerate(["area", "total", "peak", *["displacement_mm"] * 2]) if ranges[name] and graded]
     assert len(spikes) == encoder.trains(array) == first + len(shown) + 4 * centre + len(ages)
-    values = oracles.moment_values(pictures, tare.rest, 3.0, 2.67)
-    places = oracles.centre_places(pictures, tare.rest, 3.0) if centre else None
+    values = oracles.moment_values(frames, tare.rest, 3.0, 2.67)
+    places = oracles.centre_places(frames, tare.rest, 3.0) if centre else None
     wanted = oracles.sampled_moments(t.tolist(), values, shown, ages, first, places)
     assert [spike for spike in spikes_of(spikes) if spike[1] < first] == oracles.moments(
-        t.tolist(), pictures, tare.rest, int(t[-1]), 3.0, 2.67, every, tonic
+        t.tolist(), frames, tare.rest, int(t[-1]), 3.0, 2.67, every, tonic
     )
     found = sorted(spike for spike in spikes_of(spikes) if spike[1] >= first)
     assert [spike[:2] for spike in found] == [spike[:2] for spike in sorted(wanted)]
@@ -186,11 +186,11 @@ def bump(x, y, height=60.0, shape=(16, 24)):
     return 50 + np.rint(height * np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 3.0))
 
 
-def felt(pictures, encoder=None):
-    pictures = np.array(pictures)
-    array = Array(*pictures.shape[1:], 2.0)
+def felt(frames, encoder=None):
+    frames = np.array(frames)
+    array = Array(*frames.shape[1:], 2.0)
     encoder = (encoder or Moments(levels=9)).with_tare(rest(array, 50))
-    return encoder.encode(Frames(pictures, np.arange(len(pictures)) * 1000, unit="ticks", array=array))
+    return encoder.encode(Frames(frames, np.arange(len(frames)) * 1000, unit="ticks", array=array))
 
 
 STILL = np.full((16, 24), 50.0)
@@ -231,14 +231,14 @@ def test_the_same_touch_elsewhere_gives_the_same_spikes(dx, dy, seed):
 
 def test_a_mirrored_touch_swaps_left_and_right_or_up_and_down():
     way = np.cumsum(np.random.default_rng(3).choice([-0.25, 0.0, 0.25], (60, 2)), axis=0)
-    pictures = np.array([STILL, *[bump(11 + x, 7 + y) for x, y in way], STILL])
+    frames = np.array([STILL, *[bump(11 + x, 7 + y) for x, y in way], STILL])
     encoder = Moments(levels=4, displacement_mm=(0.1234567, 7.654321))
-    plain = felt(pictures, encoder)
+    plain = felt(frames, encoder)
     parts = np.arange(len(plain)).reshape(3, 7, 4)
     for axis, (a, b) in ((2, (3, 4)), (1, (5, 6))):
         swapped = parts.copy()
         swapped[:, [a, b]] = parts[:, [b, a]]
-        mirrored = felt(np.flip(pictures, axis), encoder)
+        mirrored = felt(np.flip(frames, axis), encoder)
         assert spikes_of(mirrored) == spikes_of(plain.select(swapped.ravel()))
 
 

@@ -61,7 +61,7 @@ def test_no_afferent_stands_on_a_taxel_that_does_not_exist():
     assert len(Skin().afferents(Array(2, 2, 1.0, exists=np.zeros((2, 2), bool)))) == 0
 
 
-def felt(pictures, array, x, y, field):
+def felt(frames, array, x, y, field):
     """What afferents feel: the mean of the taxels in their fields, weighed by a Gaussian of half the edge."""
     edge = np.sqrt(field / np.pi)
     rows, columns = np.mgrid[: array.rows, : array.columns] * array.pitch_mm
@@ -72,7 +72,7 @@ def felt(pictures, array, x, y, field):
         weights = np.where((away <= edge) & exists, np.exp(-(away**2) / (2 * (edge / 2) ** 2)), 0)
         if not weights.any():
             weights[round(at[1] / array.pitch_mm), round(at[0] / array.pitch_mm)] = 1
-        means.append(np.tensordot(pictures, weights / weights.sum()))
+        means.append(np.tensordot(frames, weights / weights.sum()))
     return np.stack(means, axis=1)
 
 
@@ -85,9 +85,9 @@ def test_each_train_is_its_type_s_encoder_on_what_its_field_feels(pitch, masked)
     y, x = np.mgrid[:9, :11]
     at = np.stack([np.linspace(1, 9, 600), np.linspace(2, 6, 600)], axis=1)
     bump = np.exp(-((x - at[:, :1, None]) ** 2 + (y - at[:, 1:, None]) ** 2) / 6)
-    pictures = 120 * bump * (1 + 0.3 * np.sin(2 * np.pi * 0.2 * t / 1000))[:, None, None]
+    frames = 120 * bump * (1 + 0.3 * np.sin(2 * np.pi * 0.2 * t / 1000))[:, None, None]
     skin = Skin(seed=3)
-    spikes, afferents = skin.encode(Frames(pictures, t, array=array)), skin.afferents(array)
+    spikes, afferents = skin.encode(Frames(frames, t, array=array)), skin.afferents(array)
     encoders = {
         "SA-1": (SA1(period_ms=0.2), 11.0),
         "FA-1": (FA1(period_ms=0.2, decay="ms", range=150.0), 12.6),
@@ -98,7 +98,7 @@ def test_each_train_is_its_type_s_encoder_on_what_its_field_feels(pitch, masked)
         trains = afferents.trains(kind)
         if not len(trains):
             continue
-        values = felt(pictures.astype(np.float32), array, afferents.x_mm[trains], afferents.y_mm[trains], field)
+        values = felt(frames.astype(np.float32), array, afferents.x_mm[trains], afferents.y_mm[trains], field)
         theirs = encoder.encode(frames_of(t, values))
         assert len(theirs.times), kind
         differ = sum(

@@ -66,8 +66,8 @@ def test_a_saved_tare_comes_back(tmp_path):
 
 
 def test_noise_is_exact_far_from_0():
-    pictures = 3e7 + np.array([0, 2] * 5)[:, None, None] * np.ones((1, 2))
-    assert Tare.take(Frames(pictures, 100 * np.arange(10))).noise == pytest.approx(np.full((1, 2), 1.0), rel=0.01)
+    frames = 3e7 + np.array([0, 2] * 5)[:, None, None] * np.ones((1, 2))
+    assert Tare.take(Frames(frames, 100 * np.arange(10))).noise == pytest.approx(np.full((1, 2), 1.0), rel=0.01)
 
 
 def test_a_taxel_that_does_not_exist_has_no_rest():
@@ -132,7 +132,7 @@ def test_a_file_that_is_no_tare_is_named(tmp_path):
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_held_pressure_counts_from_rest(encoder, seed):
-    """As if the rest had been taken off the pictures; of events, pieces, and of a taxel whose rest is not known."""
+    """As if the rest had been taken off the frames; of events, pieces, and of a taxel whose rest is not known."""
     rng = np.random.default_rng(seed)
     array = Array(4, 5, 2.67, rng.random((4, 5)) < 0.9)
     events = touch(rng, array, 400)

@@ -189,7 +189,7 @@ def write_tekscan(folder: Path, change=lambda rows: rows, unit="raw", name="pres
 
 
 def write_emed(folder: Path, change=lambda rows: rows) -> Path:
-    """Write a step of 3 pictures, of which rows 3 to 6 and columns 2 to 4 of 8 x 10 sensors are printed."""
+    """Write a step of 3 frames, of which rows 3 to 6 and columns 2 to 4 of 8 x 10 sensors are printed."""
     lines = []
     for page in (1, 2, 3):
         lines += [

@@ -33,7 +33,7 @@ def test_an_excerpt_as_published_makes_the_forces_that_it_states_in_every_row_an
         assert values.sum() == pytest.approx(columns[-1], abs=0.0051)
 
 
-def test_margins_are_no_sensors_and_summaries_no_pictures(tmp_path):
+def test_margins_are_no_sensors_and_summaries_no_frames(tmp_path):
     summary = ["\t\t\t\tPage 4", "\tMVP, maximum over all", "\t2\t3\t4\tForce", "3\t9\t9\t9\t1", "Force\t1\t1\t1\t1"]
     (trial,) = emed.trials(write_emed(tmp_path, lambda rows: [*rows, *summary]))
     frames = trial.frames
@@ -68,7 +68,7 @@ def swap(old, new):
     [
         (
             swap("5\t20.00", "5\t21.00"),
-            "line 13: Force is 2.75 N; the cells of picture 1 make 2.775 N .kPa on 0.25 cm2.",
+            "line 13: Force is 2.75 N; the cells of frame 1 make 2.775 N .kPa on 0.25 cm2.",
         ),
         (swap("5\t20.00", "5\t20,00"), "line 11: column 2 has a decimal comma"),
         (swap("5\t20.00", "5\tB"), "line 11: column 2 is 'B', not a number"),
@@ -76,13 +76,13 @@ def swap(old, new):
         (swap("5\t20.00", "4\t20.00"), "line 11: row 4; must ascend, whole numbers of 1 to 10"),
         (swap("\t2\t3\t4", "\t2\t3\t9"), "line 8: column 9; must ascend, whole numbers of 1 to 8"),
         (swap("4\tForce", "4"), "line 8: no line of column numbers that ends in Force"),
-        (swap("Force\t", "Power\t"), "line 19: picture 1 ends without the line Force"),
+        (swap("Force\t", "Power\t"), "line 19: frame 1 ends without the line Force"),
         (swap("Matrix: 8x10", "Matrix: 8"), "no 'Matrix: 64x95' before it"),
         (swap("Matrix: 8x10", "Matrix: 0x10"), "a matrix of 0"),
         (swap("Time/picture:10.0", "Time/picture:0.0"), "a period of 0"),
-        (swap("Pict-No.: 2", "Pict-No.: 1"), "line 20: picture 1 after picture 1"),
-        (lambda rows: [r for r in rows if "Pict-No" not in r], "no page with a picture's number"),
-        (lambda rows: rows[:-5], "picture 3 ends without the line Force"),
+        (swap("Pict-No.: 2", "Pict-No.: 1"), "line 20: frame 1 after frame 1"),
+        (lambda rows: [r for r in rows if "Pict-No" not in r], "no page with a frame's number"),
+        (lambda rows: rows[:-5], "frame 3 ends without the line Force"),
     ],
 )
 def test_a_spoilt_line_is_named(tmp_path, change, said):

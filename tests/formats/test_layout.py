@@ -131,13 +131,13 @@ def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
     assert taxel.open(tmp_path / "turned" / "kept.npz").frames() == recording.frames()
 
 
-def test_pictures_that_would_come_after_the_times_of_files_are_refused(tmp_path: Path) -> None:
+def test_frames_that_would_come_after_the_times_of_files_are_refused(tmp_path: Path) -> None:
     table(tmp_path, lines(np.ones((5, 6))), "rate_hz = 1e-9")
-    with pytest.raises(FormatError, match=r"1e-09 Hz: picture 9 comes at 9e\+09 s; must lie within 142 years"):
+    with pytest.raises(FormatError, match=r"1e-09 Hz: frame 9 comes at 9e\+09 s; must lie within 142 years"):
         table(tmp_path, lines(np.ones((10, 6))), "rate_hz = 1e-9")
 
 
-def test_readings_whose_difference_no_picture_holds_are_named(tmp_path: Path) -> None:
+def test_readings_whose_difference_no_frame_holds_are_named(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"step\.layout\.toml: falls is -3.*; step.* reads 3.*does not fit 32 bits"):
         table(tmp_path, lines(np.full((3, 6), 3.0e38)), "falls = -3e38\nrate_hz = 100")
 
@@ -156,7 +156,7 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
     assert of_it in shown
 
 
-def test_without_times_pictures_are_numbered(tmp_path: Path) -> None:
+def test_without_times_frames_are_numbered(tmp_path: Path) -> None:
     assert table(tmp_path, lines(VALUES), "rows = 2\ncolumns = 3").frames().t.tolist() == [0, 1, 2]
 
 
@@ -220,7 +220,7 @@ def test_arrays_of_every_kind_of_number_open(tmp_path: Path, ending: str, kind: 
     np.testing.assert_array_equal(recording.frames().values, values.astype(np.float32))
 
 
-@pytest.mark.parametrize(("at", "named"), [((3, 1, 2), "picture 3, row 1, column 2"), ((3, 5), "picture 3, taxel 5")])
+@pytest.mark.parametrize(("at", "named"), [((3, 1, 2), "frame 3, row 1, column 2"), ((3, 5), "frame 3, taxel 5")])
 @pytest.mark.parametrize("value", [np.inf, -1e39])
 def test_a_value_that_does_not_fit_names_its_place(tmp_path: Path, at: Any, named: str, value: float) -> None:
     values = np.zeros((5, 2, 3) if len(at) == 3 else (5, 6))
@@ -238,7 +238,7 @@ def test_a_given_sensor_lays_out_arrays_of_somebody_else_and_another_is_refused(
         opened = taxel.open(tmp_path / "a.npy", array=array)
         assert (opened.array.shape, opened.array.pitch_mm) == (array.shape, array.pitch_mm)
         np.testing.assert_array_equal(opened.frames().values.reshape(3, 6), VALUES.astype(np.float32))
-    with pytest.raises(taxel.ProblemError, match=r"array: 5 x 1 taxels; .*a\.npy holds pictures of 1 x 6"):
+    with pytest.raises(taxel.ProblemError, match=r"array: 5 x 1 taxels; .*a\.npy holds frames of 1 x 6"):
         taxel.open(tmp_path / "a.npy", array=Array(5, 1))
     with pytest.raises(taxel.ProblemError, match="array is '2x3'"):
         taxel.open(tmp_path / "a.npy", array="2x3")
@@ -476,7 +476,7 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
             lambda place: np.savez(place, a=np.zeros((2, 6)), b=np.zeros(3)),
             r"holds a \(2 x 6\), b \(3\); say which in the layout",
         ),
-        (lambda place: np.savez(place, a=np.zeros(6)), "must be numbers of shape pictures x rows x columns"),
+        (lambda place: np.savez(place, a=np.zeros(6)), "must be numbers of shape frames x rows x columns"),
         (lambda place: np.savez(place, a=np.array([["x"] * 6])), "must hold numbers"),
         (lambda place: np.savez(place, a=np.zeros((2, 5))), "says 2 x 3 taxels"),
     ],

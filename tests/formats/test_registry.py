@@ -115,7 +115,7 @@ def test_one_changed_byte_never_crashes(write, tmp_path_factory, at, byte):
     except FormatError as error:
         said = str(error)
     else:
-        said = file.name if all(len(trial.frames) for trial in trials) else "a trial without a picture"
+        said = file.name if all(len(trial.frames) for trial in trials) else "a trial without a frame"
     assert file.name in said
     assert "\n" not in said
 
@@ -190,12 +190,12 @@ def test_a_folder_without_its_files_is_a_format_error(name: str, tmp_path: Path)
         list(formats.FORMATS[name].trials(tmp_path))
 
 
-def test_a_trial_may_hold_events_as_well_as_pictures() -> None:
+def test_a_trial_may_hold_events_as_well_as_frames() -> None:
     events = taxel.Events([0, 300], [1, 2], [0, 0], [True, False], array=taxel.Array(1, 3))
     trial = formats.Trial("a", "a", events, {"contact": np.array([0])}, "made here")
     assert trial.events is events
     assert trial.scored == (0, 300)
-    with pytest.raises(ProblemError, match="holds events and no pictures"):
+    with pytest.raises(ProblemError, match="holds events and no frames"):
         _ = trial.frames
 
 

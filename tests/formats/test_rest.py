@@ -13,7 +13,7 @@ from shell import call
 
 import taxel
 from taxel.recording.pressure import readings
-from taxel.recording.rest import of_pictures
+from taxel.recording.rest import of_frames
 
 from .making import SHARED
 
@@ -73,7 +73,7 @@ PRESSED = (("contact", 40_000), ("lift", 220_000))
 
 
 def palm(seed: int, sign: int, share: float, rebound: float = 0.0) -> taxel.Frames:
-    """Pictures of a noisy palm with offsets that is pressed twelve times, so long a share of the time.
+    """Frames of a noisy palm with offsets that is pressed twelve times, so long a share of the time.
 
     After each press it goes so far beyond its rest, as a share of the press.
     """
@@ -92,7 +92,7 @@ def palm(seed: int, sign: int, share: float, rebound: float = 0.0) -> taxel.Fram
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("share", [0.1, 0.4, 0.8])
 def test_values_that_fall_with_pressure_are_said(seed: int, share: float) -> None:
-    risen, fallen = (of_pictures(palm(seed, sign, share)) for sign in (1, -1))
+    risen, fallen = (of_frames(palm(seed, sign, share)) for sign in (1, -1))
     assert (risen.source, risen.falls) == ("quiet", False)
     assert fallen.falls
     assert "falls = true in a layout file" in str(fallen)
@@ -100,7 +100,7 @@ def test_values_that_fall_with_pressure_are_said(seed: int, share: float) -> Non
 
 
 def mat(seed: int, sign: int) -> taxel.Frames:
-    """Pictures of a mat at 50 Hz that creeps, an offset by taxel, each press held for up to a second."""
+    """Frames of a mat at 50 Hz that creeps, an offset by taxel, each press held for up to a second."""
     random, t = np.random.default_rng(seed), np.arange(3000) / 50
     y, x = np.mgrid[:16, :16]
     creep = (np.exp(-t / 30) - 1)[:, None, None] * random.uniform(30, 90, (16, 16))
@@ -127,7 +127,7 @@ def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float 
             values = frames.values.copy()
             values[100::200, 3, 3:5] = bad
             frames = taxel.Frames(values, frames.t, unit="counts", array=frames.array)
-        assert of_pictures(frames).falls == (sign < 0)
+        assert of_frames(frames).falls == (sign < 0)
     taxel.convert(frames, tmp_path / "mat.npz")
     code, shown, _ = call(capsys, "info", tmp_path / "mat.npz")
     assert code == 0
@@ -138,7 +138,7 @@ def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float 
 def test_a_load_that_lay_there_from_the_start_is_no_fall() -> None:
     values = np.random.default_rng(3).normal(500, 2, (2000, 8, 8))
     values[:1500, 2:6, 2:6] += 300
-    assert not of_pictures(taxel.Frames(values, np.arange(2000) * 10_000, unit="counts")).falls
+    assert not of_frames(taxel.Frames(values, np.arange(2000) * 10_000, unit="counts")).falls
 
 
 def test_encode_train_and_detect_hold_missing_values_and_count_them(tmp_path, capsys) -> None:
@@ -195,7 +195,7 @@ def test_info_counts_missing_values_readings_at_full_scale_and_gaps(tmp_path, ca
     counts[counts < 3] = 0
     assert facts["full_scale"] == {"value": 3300, "readings": counts.sum(), "taxels": np.count_nonzero(counts)}
     assert counts.any()
-    # One picture left out is two intervals.
+    # One frame left out is two intervals.
     assert facts["gaps"] == {"count": 2, "longest_us": 40_000, "t_us": 2_990_000}
     code, shown, _ = call(capsys, "info", tmp_path / "flawed.npz")
     assert code == 0
@@ -204,7 +204,7 @@ def test_info_counts_missing_values_readings_at_full_scale_and_gaps(tmp_path, ca
 
 @pytest.mark.parametrize("seed", [3, 19])
 def test_the_tail_of_noise_is_not_at_full_scale(seed, tmp_path, capsys) -> None:
-    """With seed 19 two taxels read the greatest value of all in three pictures each."""
+    """With seed 19 two taxels read the greatest value of all in three frames each."""
     values = np.rint(np.random.default_rng(seed).normal(500, 6.6, (40_000, 2, 2)))
     top = values.max()
     at_top = np.count_nonzero(values == top, axis=0)
@@ -283,7 +283,7 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
 
 
 def test_a_slope_that_all_detections_have_is_no_column(tmp_path, capsys) -> None:
-    """Levels of pictures come in steps, so presses have one slope; the file has it."""
+    """Levels of frames come in steps, so presses have one slope; the file has it."""
     taxel.convert(palm(5, 1, 0.4), tmp_path / "palm.npz")
     rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
     (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))

@@ -40,7 +40,7 @@ def palms(count: int = 6, every_ms: float = 10.0) -> list[bags.Message]:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_a_palm_opens_as_pictures_from_every_kind_of_bag(name: str, tmp_path: Path) -> None:
+def test_a_palm_opens_as_frames_from_every_kind_of_bag(name: str, tmp_path: Path) -> None:
     bag = bags.write(tmp_path / name, palms())
     opened = taxel.open(bag, topic="/palm", field="taxels", array=PALM_ARRAY)
     t = BEGIN_NS // 1000 + np.arange(6) * 10_000
@@ -458,7 +458,7 @@ def test_a_layout_file_says_the_topic_and_that_less_means_more(tmp_path: Path, c
     frames = taxel.open(bag).frames()
     assert np.array_equal(frames.values, np.float32(4095) - PALMS.astype(np.float32))
     assert frames.array.shape == (24, 32)
-    assert json.loads(call(capsys, "info", bag, "--json")[1])["pictures"] == 6
+    assert json.loads(call(capsys, "info", bag, "--json")[1])["frames"] == 6
     layout.write_text('[ros]\ntopics = "/palm"\n')
     with pytest.raises(FormatError, match=r"unknown key ros\.topics; there are topic, field, types, ros"):
         taxel.open(bag)
@@ -520,7 +520,7 @@ def test_from_a_bag_to_a_detection_on_the_command_line(tmp_path: Path, monkeypat
     finger = ("--topic", "/skin", "--field", "patches.taxels", "--array", "2x3")
     assert "--topic /skin --field patches.taxels --array ROWSxCOLUMNS" in call(capsys, "info", "grasp")[1]
     facts = json.loads(call(capsys, "info", "grasp", *finger, "--json")[1])
-    assert (facts["kind"], facts["pictures"], facts["pictures_per_s"]) == ("ros", 600, 100.0)
+    assert (facts["kind"], facts["frames"], facts["frames_per_s"]) == ("ros", 600, 100.0)
     train = call(capsys, "train", "grasp", *finger, "--labels", "labels.csv", "--folds", 0, "-o", "touch.json")
     assert train[0] == 0, train
     detect = ("--readout", "touch.json", "--tare", ".5", "--truth", "labels.csv", "--json")

@@ -229,10 +229,10 @@ def test_a_line_with_too_few_cells_is_named_where_columns_are_left_out(tmp_path:
         taxel.open(tmp_path / "a.csv")
 
 
-def test_a_table_of_one_picture_without_a_layout_prints_no_rate(tmp_path: Path) -> None:
+def test_a_table_of_one_frame_without_a_layout_prints_no_rate(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,x,y\n1,2,3\n")
     said = layout_said_of(tmp_path / "a.csv")
-    assert "pictures/s" not in said
+    assert "frames/s" not in said
     (tmp_path / "a.layout.toml").write_text(said)
     frames = taxel.open(tmp_path / "a.csv").frames()
     assert (frames.values.tolist(), frames.t.tolist()) == ([[[2.0, 3.0]]], [1_000_000])

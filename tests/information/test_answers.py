@@ -9,7 +9,7 @@ import taxel
 from taxel.encode import FA1, ChangeEvents
 from taxel.information import LabelledTrial, answer
 from taxel.information.rasters import event_grams, features, frame_grams
-from taxel.information.sampling import HeldValues, Spikes, contacts, finest_us, pictures_of, spikes_of
+from taxel.information.sampling import HeldValues, Spikes, contacts, finest_us, frames_of, spikes_of
 from taxel.information.spiking import ConeRReadout, TempotronReadout, patterns_of
 from taxel.information.wire_rate import kilobits_per_second
 
@@ -36,7 +36,7 @@ def sampled(trials, period_us, seed=0, **what):
 
 @settings(deadline=None, max_examples=25)
 @given(st.lists(st.tuples(st.integers(0, 500), st.integers(0, 3), st.integers(0, 200)), max_size=60), st.data())
-def test_held_values_are_those_of_the_pictures_that_events_make(rows, data):
+def test_held_values_are_those_of_the_frames_that_events_make(rows, data):
     rows.sort()
     t, x, level = (np.array(column, int) for column in (zip(*rows, strict=True) if rows else ([], [], [])))
     events = taxel.Events(t, x, np.zeros(len(t), int), np.ones(len(t), bool), array=taxel.Array(1, 4), intensity=level)
@@ -132,10 +132,10 @@ def test_inner_products_by_bins_are_those_of_whole_rasters(tau):
         assert size == max(1, len({(x, b) for k, x, b in rows if b < bins[k]}))
 
 
-def test_pictures_are_taken_at_the_times_of_the_events():
+def test_frames_are_taken_at_the_times_of_the_events():
     trials = trials_of(20)
     held, at, spikes = sampled(trials, 1000)
-    values = pictures_of(trials, held, spikes, at, 10)
+    values = frames_of(trials, held, spikes, at, 10)
     assert values.shape == (10, 20, 2)
     assert (values[0].sum(1) == 100).all()
     assert (values[9] == 100).all()
@@ -242,7 +242,7 @@ def test_progress_is_in_proportion_to_the_expected_time_and_settings_are_told_as
     assert {point[:2]: point[2] for point in told} == {(p.period_ms, p.window_ms): p.found.bits for p in found.points}
 
 
-def test_pictures_and_controls_stand_beside_it(answered):
+def test_frames_and_controls_stand_beside_it(answered):
     controls = {c.name: c for c in answered.controls}
     assert set(controls) == {"before contact", "length", "event count"}
     assert controls["event count"].found.bits < 0.1

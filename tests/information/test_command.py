@@ -259,14 +259,14 @@ def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
     assert not (tmp_path / "page.html").exists()
 
 
-def test_pictures_without_times_are_told_so(tmp_path):
+def test_frames_without_times_are_told_so(tmp_path):
     for label in ("a", "b"):
         (tmp_path / label).mkdir()
         values = np.arange(12.0).reshape(12, 1, 1) * np.ones((1, 2, 2))
         for k in range(12):
             taxel.convert(taxel.Frames(values, np.arange(12)), tmp_path / label / f"{k}.npz")
     done = run(tmp_path / "a", tmp_path / "b", "--report", tmp_path / "page.html")
-    assert "its pictures all lie within 11 us, so they have no times" in str(done.exception)
+    assert "its frames all lie within 11 us, so they have no times" in str(done.exception)
 
 
 def test_a_folder_stands_for_its_recordings(tmp_path):
@@ -339,7 +339,7 @@ def test_folders_of_labels_are_named_where_their_folder_is_given(tmp_path):
     assert str(done.exception).endswith("trials: holds no recording; its folders left, right do: name them")
 
 
-def test_numbered_pictures_are_refused_until_a_rate_is_given(tmp_path):
+def test_numbered_frames_are_refused_until_a_rate_is_given(tmp_path):
     rng = np.random.default_rng(4)
     (tmp_path / "hand").mkdir()
     (tmp_path / "hand" / "layout.toml").write_text("rows = 2\ncolumns = 2\n")
@@ -352,7 +352,7 @@ def test_numbered_pictures_are_refused_until_a_rate_is_given(tmp_path):
     for labels in (("--labels", tmp_path / "l.csv"), ("--labels", "notes"), ()):
         refused = run(grasps, *labels, *QUICK, "--report", tmp_path / "page.html")
         assert isinstance(refused.exception, ProblemError)
-        assert "grasps.csv: its pictures have no times; give --rate-hz HZ" in str(refused.exception)
+        assert "grasps.csv: its frames have no times; give --rate-hz HZ" in str(refused.exception)
     assert not (tmp_path / "page.html").exists()
     done = run(
         grasps,

@@ -14,7 +14,7 @@ import taxel
 from taxel import Detection, Note, ProblemError
 from taxel.encode import ChangeEvents
 from taxel.live import Live, Panel, PanelClient
-from taxel.live.client import Curves, Picture, Spikes
+from taxel.live.client import Curves, Frame, Spikes
 
 from .boards import LOOPBACK, SMALL, above_rest, force, play, presses, spikes_of, touch, wait_for
 
@@ -39,8 +39,8 @@ def test_a_recording_is_yielded_to_its_end(tmp_path: Path) -> None:
         items = list(client)
         assert client.warning is None
     assert {(subject.name, subject.rows, subject.columns) for subject, _ in items} == {("one.mcap", *SMALL.shape)}
-    found = {kind: [item for _, item in items if isinstance(item, kind)] for kind in (Picture, Curves, Spikes)}
-    last = found[Picture][-1]
+    found = {kind: [item for _, item in items if isinstance(item, kind)] for kind in (Frame, Curves, Spikes)}
+    last = found[Frame][-1]
     assert last.t == recorded.t[-1]
     np.testing.assert_array_equal(last.above, above_rest(recorded))
     times = np.concatenate([curves.t for curves in found[Curves]])
@@ -61,11 +61,11 @@ def test_a_board_is_yielded_until_the_server_ends() -> None:
             shown = iter(client)
             expected, until = above_rest(events), time.monotonic() + SOON
             _, item = next(shown)
-            while not (isinstance(item, Picture) and np.array_equal(item.above, expected)):
+            while not (isinstance(item, Frame) and np.array_equal(item.above, expected)):
                 assert time.monotonic() < until
                 _, item = next(shown)
             panel.stop()
-            assert all(isinstance(item, Picture | Curves) for _, item in shown)
+            assert all(isinstance(item, Frame | Curves) for _, item in shown)
 
 
 def test_what_is_no_panel_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

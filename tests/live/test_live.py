@@ -181,14 +181,14 @@ def test_a_readout_that_needs_a_tare_and_has_none_is_refused() -> None:
         Live(0, host=LOOPBACK, readout=readout)
 
 
-def test_the_picture_shows_what_the_taxels_hold() -> None:
+def test_the_frame_shows_what_the_taxels_hold() -> None:
     with Live(0, host=LOOPBACK, array=SMALL) as live:
         play(presses(1), live.address[1])
         until = time.monotonic() + 30
-        while live.picture[2, 1] == 0:
+        while live.frame[2, 1] == 0:
             assert time.monotonic() < until
             time.sleep(0.01)
-        assert np.count_nonzero(live.picture) == 1
+        assert np.count_nonzero(live.frame) == 1
 
 
 def test_notes_and_markers_are_kept(tmp_path: Path) -> None:

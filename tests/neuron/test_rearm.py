@@ -129,7 +129,7 @@ def readout() -> Readout:
     return Readout(LevelCrossing([0.3, 0.6]), neurons, array=taxel.Array(2, 4), run_threshold=0.9)
 
 
-def pictures() -> taxel.Frames:
+def made_frames() -> taxel.Frames:
     random = np.random.default_rng(8)
     times = np.arange(0, 4_000_000, 2000)
     phase = random.uniform(0, 6, (1, 2, 4))
@@ -145,7 +145,7 @@ def test_files_hold_it_and_readouts_stream_it(tmp_path) -> None:
     kept = json.loads(one.to_json())["neurons"]
     assert kept["a"]["neuron"]["rearm"] == 0.4
     assert "rearm" not in kept["b"]["neuron"], "a file without it is as it was"
-    frames = pictures()
+    frames = made_frames()
     found = run(again, frames)
     trains = one.encoder.encode(frames).split_by_sign()
     for label, trained in one.neurons.items():

@@ -52,9 +52,9 @@ def calibrations(draw):
 
 
 @given(calibrations(), st.lists(st.floats(0.0, 200.0), min_size=2, max_size=8))
-def test_more_reading_is_never_less_load(calibration, readings):
-    pictures = np.sort(np.array(readings))[:, None, None] * np.ones(ARRAY.shape)
-    values = calibration.apply(frames(pictures, calibration.of)).values
+def test_more_reading_is_never_less_load(calibration, given):
+    readings = np.sort(np.array(given))[:, None, None] * np.ones(ARRAY.shape)
+    values = calibration.apply(frames(readings, calibration.of)).values
     assert (np.diff(values, axis=0) >= 0).all()
     assert (values >= 0).all()
     assert np.isfinite(values).all()
@@ -103,13 +103,13 @@ def test_the_law_finds_the_force_of_a_ball_that_the_emulated_board_felt():
     events = taxel.simulate.play(acts, seed=1, sensor=sensor).events
     contacts, force = taxel.simulate.truth(acts)
     law = Calibration.law(events.array, sensor=sensor)
-    pictures = Frames.from_events(events, 960, int(contacts[0].start_us), int(contacts[0].stop_us))
+    touched = Frames.from_events(events, 960, int(contacts[0].start_us), int(contacts[0].stop_us))
     # A taxel without any event is at rest.
     rest = law.readings(frames(0.0, "N", events.array)).values[0]
-    held = Frames(np.maximum(pictures.values, rest), pictures.t, unit="ticks", array=events.array)
+    held = Frames(np.maximum(touched.values, rest), touched.t, unit="ticks", array=events.array)
     assert held.values.max() < 150
     felt, k = law.apply(held).total(), int(law.apply(held).total().argmax())
-    assert felt[k] == pytest.approx((2.29 / 2.67) ** 2 * force[int(pictures.t[k] / 192)], rel=0.1)
+    assert felt[k] == pytest.approx((2.29 / 2.67) ** 2 * force[int(touched.t[k] / 192)], rel=0.1)
 
 
 # fits
@@ -256,7 +256,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each: no load determines a single taxel"),
         (
             lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
-            "pictures of load 2: in ticks; the calibration takes counts",
+            "frames of load 2: in ticks; the calibration takes counts",
         ),
         (lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]), "of is 'N': must say what is read"),
         (lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"), r"readings\[1\] is 1: must rise"),
@@ -269,7 +269,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         (lambda: Calibration.law(ARRAY, date="yesterday"), "date is 'yesterday': must be a day as 2026-11-21"),
         (lambda: Calibration.law(ARRAY, rest=[[1.0]]), "rest has shape"),
         (lambda: Calibration.law(ARRAY, gain=0.0), "gain: must be above 0"),
-        (lambda: Calibration.law(ARRAY).apply(frames(1.0)), "the pictures: in counts; the calibration takes ticks"),
+        (lambda: Calibration.law(ARRAY).apply(frames(1.0)), "the frames: in counts; the calibration takes ticks"),
     ],
 )
 def test_what_makes_no_sense_is_said(call, said):

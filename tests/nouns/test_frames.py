@@ -90,8 +90,8 @@ def test_what_was_not_measured_is_equal_to_itself() -> None:
 
 @given(some())
 def test_repr_is_one_line(frames: Frames) -> None:
-    pictures = "1 picture" if len(frames) == 1 else f"{len(frames)} pictures"
-    assert repr(frames).startswith(f"Frames({pictures} of {frames.array.rows} x {frames.array.columns} ")
+    count = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
+    assert repr(frames).startswith(f"Frames({count} of {frames.array.rows} x {frames.array.columns} ")
     assert "\n" not in repr(frames)
 
 

@@ -22,7 +22,7 @@ def test_what_is_no_recording_and_no_health_is_refused_in_one_line(draw: Any, wr
         draw(wrong)
 
 
-def test_the_map_of_pictures_is_the_largest_pressure_of_each_taxel(tmp_path: Path) -> None:
+def test_the_map_of_frames_is_the_largest_pressure_of_each_taxel(tmp_path: Path) -> None:
     values = np.zeros((20, 3, 4))
     values[5:9, 1, 2], values[7, 0, 3] = 40.0, 15.0
     taxel.convert(taxel.Frames(values, np.arange(20) * 10_000, unit="kPa"), tmp_path / "a.npz")

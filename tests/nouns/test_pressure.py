@@ -23,15 +23,15 @@ def drawn(seed: int) -> Frames:
 @given(st.integers(0, 10**6), st.sampled_from([0.0, 1.5]))
 def test_area_peak_sum_and_centre_are_scipy_s(seed: int, above: float) -> None:
     frames = drawn(seed)
-    for k, picture in enumerate(frames.values.astype(np.float64)):
-        loaded = picture > above
+    for k, frame in enumerate(frames.values.astype(np.float64)):
+        loaded = frame > above
         assert frames.area(above)[k] == loaded.sum() * 6.25
-        assert frames.peak()[k] == picture.max()
-        assert frames.total()[k] == pytest.approx(picture.sum(), abs=1e-9)
+        assert frames.peak()[k] == frame.max()
+        assert frames.total()[k] == pytest.approx(frame.sum(), abs=1e-9)
         if not loaded.any():
             assert np.isnan(frames.centre(above)[k]).all()
         else:
-            y, x = ndimage.center_of_mass(np.where(loaded, picture, 0.0))
+            y, x = ndimage.center_of_mass(np.where(loaded, frame, 0.0))
             np.testing.assert_allclose(frames.centre(above)[k], [2.5 * x, 2.5 * y], 1e-9, 1e-9)
 
 

@@ -33,7 +33,7 @@ class Client:
         how = {"origin": f"http://{self.host}", "subprotocols": ["taxel.panel.1", f"token.{panel.token}"], **changed}
         self.door = client.connect(f"ws://{self.host}/socket", max_size=None, open_timeout=SOON, **how)
         self.socket = self.door.__enter__()
-        self.pictures, self.said, self.ids, self.asked = [], [], 0, 0
+        self.frames, self.said, self.ids, self.asked = [], [], 0, 0
 
     def __enter__(self):
         return self
@@ -47,7 +47,7 @@ class Client:
     def next(self):
         message = self.socket.recv(timeout=SOON)
         if isinstance(message, bytes):
-            self.pictures.append(message)
+            self.frames.append(message)
             self.send(type="credit", n=1)
             return message
         self.said.append(json.loads(message))
@@ -58,7 +58,7 @@ class Client:
         while time.monotonic() < until:
             message = self.next()
             if isinstance(message, bytes):
-                if kind == "picture":
+                if kind == "frame":
                     return message
             elif message["type"] == kind and all(message[key] == value for key, value in wanted.items()):
                 return message
@@ -81,17 +81,17 @@ class Client:
                 return answer
 
 
-def head(picture):
+def head(frame):
     names = ("magic", "bytes", "flags", "number", "rows", "columns", "t_us", "made_ns", "events", "watched")
     names += ("column_us", "first", "count", "none")
-    values = struct.unpack_from("<4sHHIHHqqQIIqII", picture)
-    sections = struct.unpack_from("<20I", picture, 64)
+    values = struct.unpack_from("<4sHHIHHqqQIIqII", frame)
+    sections = struct.unpack_from("<20I", frame, 64)
     return dict(zip(names, values, strict=True)), list(zip(sections[::2], sections[1::2], strict=True))
 
 
-def section(picture, k, dtype):
-    start, size = head(picture)[1][k]
-    return np.frombuffer(picture, dtype, count=size // np.dtype(dtype).itemsize, offset=start)
+def section(frame, k, dtype):
+    start, size = head(frame)[1][k]
+    return np.frombuffer(frame, dtype, count=size // np.dtype(dtype).itemsize, offset=start)
 
 
 def parts_of(column, column_us):
@@ -142,8 +142,8 @@ def page_of_a_board(folder, *options):
 
 
 def spikes_of(page, columns):
-    """The section of spikes, by column of time, of the last picture."""
-    picture = page.pictures[-1]
-    first, rows = head(picture)[0]["first"], head(picture)[0]["rows"]
-    ups = section(picture, 6, "u1").reshape(-1, rows)
+    """The section of spikes, by column of time, of the last frame."""
+    frame = page.frames[-1]
+    first, rows = head(frame)[0]["first"], head(frame)[0]["rows"]
+    ups = section(frame, 6, "u1").reshape(-1, rows)
     return {column: list(np.flatnonzero(ups[column - first])) for column in columns}

@@ -141,7 +141,7 @@ def test_who_is_refused_over_and_over_is_let_go(panel):
     assert closed.value.rcvd.code == 1008
 
 
-def test_a_hundred_visitors_half_of_whom_never_read_cost_no_event_and_no_picture_of_another(live, panel):
+def test_a_hundred_visitors_half_of_whom_never_read_cost_no_event_and_no_frame_of_another(live, panel):
     visitors = [Client(panel) for _ in range(99)]
     try:
         for k, visitor in enumerate(visitors):
@@ -157,11 +157,11 @@ def test_a_hundred_visitors_half_of_whom_never_read_cost_no_event_and_no_picture
         with Client(panel) as page:
             page.send(type="credit", n=2)
             sender.start()
-            before = len(page.pictures)
+            before = len(page.frames)
             while sender.is_alive():
-                page.until("picture")
+                page.until("frame")
             sender.join()
-            assert len(page.pictures) - before >= 10, "a page that reads goes on being shown pictures"
+            assert len(page.frames) - before >= 10, "a page that reads goes on being shown frames"
             heard(live, sent["datagrams"] * 60)
             counters = page.until("counters")
             assert counters["viewers"] == 100

@@ -77,20 +77,20 @@ def test_a_board_that_was_reset_is_shown_anew(live, panel):
     board = Board(Registers(wire_version=2), version_2=Version2(states_us=0))
 
     def said(columns, ticks):
-        pictures = np.zeros((8, 64, 64), np.uint16)
-        pictures[1:, 5, :columns] = ticks + 4 * np.arange(7)[:, None]
-        return [datagram for picture in pictures for datagram in board.frame(picture.ravel())]
+        frames = np.zeros((8, 64, 64), np.uint16)
+        frames[1:, 5, :columns] = ticks + 4 * np.arange(7)[:, None]
+        return [datagram for frame in frames for datagram in board.frame(frame.ravel())]
 
     with Client(panel) as page:
         page.send(type="credit", n=1)
         say(live, *said(40, 60))
-        while np.sum(section(page.until("picture"), 0, "<u2") != 65_535) != 40:
+        while np.sum(section(page.until("frame"), 0, "<u2") != 65_535) != 40:
             pass
-        while head(page.until("picture"))[0]["flags"] & 4:
+        while head(page.until("frame"))[0]["flags"] & 4:
             pass
-        here = len(page.pictures)
+        here = len(page.frames)
         board.reset()
         say(live, *said(5, 80))
-        while np.sum(section(page.until("picture"), 0, "<u2") != 65_535) != 5:
+        while np.sum(section(page.until("frame"), 0, "<u2") != 65_535) != 5:
             pass
-        assert any(head(picture)[0]["flags"] & 4 for picture in page.pictures[here:])
+        assert any(head(frame)[0]["flags"] & 4 for frame in page.frames[here:])

@@ -15,7 +15,7 @@ from formats.bags import BEGIN_NS, PALM
 from formats.making import write_icub
 from panel.browser import running
 from panel.protocol import Client
-from panel.test_pictures import opened, values_at
+from panel.test_frames import opened, values_at
 from shell import call
 
 import taxel
@@ -53,7 +53,7 @@ def test_a_bag_is_walked_to_the_page_by_the_options_of_its_topic(name, tmp_path)
     bag, values = palms(tmp_path, name)
     with viewed(tmp_path, bag, "--topic", "/palm", "--array", "24x32") as page:
         about = opened(page, name)
-        assert (about["pictures"]["count"], about["array"]["rows"], about["array"]["columns"]) == (40, 24, 32)
+        assert (about["frames"]["count"], about["array"]["rows"], about["array"]["columns"]) == (40, 24, 32)
         t = BEGIN_NS // 1000
         assert (about["start_us"], about["stop_us"]) == (t, t + 390_000)
         shown, _ = values_at(page, about, t + 300_000)
@@ -95,7 +95,7 @@ def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
         opened_as.clear()
         opens = _opening(FileOptions(topic=["/palm"], array=["24x32"]), None, shown)
         with Panel(shown, opens=opens) as panel, Client(panel) as page:
-            assert opened(page, "grasp.bag")["pictures"]["count"] == 40
+            assert opened(page, "grasp.bag")["frames"]["count"] == 40
         assert len(opened_as) == 1
 
 
@@ -132,7 +132,7 @@ def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_pat
         inside = sum(file.stat().st_size for file in (folder / "grasp").iterdir())
         assert files["grasp"] == inside
         for name in KINDS:
-            assert opened(page, name)["pictures"]["count"] == 40
+            assert opened(page, name)["frames"]["count"] == 40
     code, _, errors = call(capsys, "view", folder, "--no-open", "--seconds", 1)
     assert code == 2
     assert "ROS bag; open a topic by --topic /palm" in errors
@@ -150,7 +150,7 @@ def presses(folder, names, topics=("/palm",)):
         begins = 40 + 3 * number + 50 * np.arange(5)
         for begin in begins:
             values[begin : begin + 20, 5:9, 6:12] += 400
-        made = [bags.palm(np.rint(picture)) for picture in values]
+        made = [bags.palm(np.rint(frame)) for frame in values]
         bags.write(
             folder / name, [(t, PALM, 10.0 * k + 2, 10.0 * k, one) for k, one in enumerate(made) for t in topics]
         )
@@ -218,11 +218,11 @@ def test_a_layout_and_a_rate_are_those_of_the_page(tmp_path):
     file = write_icub(tmp_path)
     with viewed(tmp_path, file, "--rate-hz", 50) as page:
         about = opened(page, file.name)
-        assert (about["pictures"]["picture_us"], about["stop_us"]) == (None, 40_000)
+        assert (about["frames"]["number_us"], about["stop_us"]) == (None, 40_000)
 
 
 def tables(folder):
-    """Write the same pictures as tables and arrays of other programs, and the layout that describes them."""
+    """Write the same frames as tables and arrays of other programs, and the layout that describes them."""
     folder.mkdir()
     values = np.random.default_rng(5).integers(0, 1000, (40, 6))
     np.save(folder / "palm.npy", values)
@@ -238,10 +238,10 @@ TABLES = ("palm.csv", "palm.dat", "palm.npy", "palm.txt", "palm.txt.gz")
 
 
 def shown_alike(page, names, values):
-    """Check that the page shows the same pictures of each file."""
+    """Check that the page shows the same frames of each file."""
     for name in names:
         about = opened(page, name)
-        assert (about["pictures"]["count"], about["stop_us"]) == (40, 390_000)
+        assert (about["frames"]["count"], about["stop_us"]) == (40, 390_000)
         shown, _ = values_at(page, about, 200_000)
         assert np.array_equal(shown, values[20])
 
@@ -274,17 +274,17 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
         shown_alike(page, TABLES, values)
 
 
-def test_pictures_are_in_the_unit_of_a_calibration(capsys, tmp_path):
+def test_frames_are_in_the_unit_of_a_calibration(capsys, tmp_path):
     frames = Frames(np.arange(12.0).reshape(3, 2, 2) * 10, [0, 10_000, 20_000], unit="counts", array=Array(2, 2))
     taxel.convert(frames, tmp_path / "press.npz")
     calibration = Calibration.table(Array(2, 2), [100], [5], unit="N", date="2026-11-23")
     calibration.save(tmp_path / "of another name.json")
     with viewed(tmp_path, "press.npz", "--calibration", "of another name.json") as page:
         about = opened(page, "press.npz")
-        assert about["pictures"]["unit"] == "N"
+        assert about["frames"]["unit"] == "N"
         shown, _ = values_at(page, about, 20_000)
-        assert np.allclose(shown, calibration.apply(frames).values[2], atol=about["pictures"]["step"])
-        assert [one["rest"] for one in about["pictures"]["sources"]] == ["given"]
+        assert np.allclose(shown, calibration.apply(frames).values[2], atol=about["frames"]["step"])
+        assert [one["rest"] for one in about["frames"]["sources"]] == ["given"]
     taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="counts", array=Array(3, 2)), tmp_path / "other.npz")
     words = (tmp_path / "other.npz", "--calibration", tmp_path / "of another name.json", "--seconds", 1)
     code, _, errors = call(capsys, "view", *words)

@@ -45,7 +45,7 @@ def test_the_arrivals_of_a_recording_are_judged(
         assert CAUSE in pace["doubt"]
 
 
-def test_pictures_have_no_arrivals(tmp_path: Path) -> None:
+def test_frames_have_no_arrivals(tmp_path: Path) -> None:
     frames = taxel.Frames(np.zeros((2, 3, 2)), [0, 1000], unit="N", array=taxel.Array(3, 2))
     taxel.convert(frames, tmp_path / "mat.npz")
     with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:

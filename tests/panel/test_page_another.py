@@ -16,7 +16,7 @@ from taxel import Array, Frames
 
 pytestmark = pytest.mark.timeout(600)
 
-#: All that a person reads, but for the pictures a second.
+#: All that a person reads, but for the frames a second.
 PARTS = "#source, #views, aside, footer, #notice:not([hidden])"
 
 

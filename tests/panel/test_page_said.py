@@ -22,7 +22,7 @@ from taxel.live import Panel
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.recording.pressure import readings
-from taxel.recording.rest import of_pictures
+from taxel.recording.rest import of_frames
 
 __all__ = ["recording"]
 
@@ -164,7 +164,7 @@ def test_detections_of_a_recording_are_in_order_and_the_time_stays_without_them(
         rows = page.locator("#detection-list .when")
         until(lambda: rows.all_inner_texts() == [f"{t / 1e6:.3f} s" for t in times], "as the labels are listed")
         rows.nth(1).click()
-        until(lambda: clock(page) == 2, "its picture")
+        until(lambda: clock(page) == 2, "its frame")
         page.locator("#readout").select_option("")
         shows(page, "detections-none", "^None in this recording")
         assert still(page) == 2
@@ -258,7 +258,7 @@ def test_why_a_file_was_not_opened_is_said_once_with_its_name_and_fits_a_phone(c
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
-def test_of_pictures_there_are_no_maps_to_choose_from_and_no_counters_of_a_board(
+def test_of_frames_there_are_no_maps_to_choose_from_and_no_counters_of_a_board(
     chromium: Any, recording: Path, tmp_path: Path
 ) -> None:
     frames = Frames(np.ones((40, 4, 4)), np.arange(40) * 20_000, unit="N", array=Array(4, 4))
@@ -282,7 +282,7 @@ def test_what_lay_there_while_the_rest_was_taken_is_said_above_the_maps(chromium
     values[:300, 2:5, 4:7] += 200
     values[400:460, 1:4, 1:4] += 500
     frames = Frames(np.round(values), np.arange(600) * 10_000, unit="counts", array=Array(8, 8))
-    where = of_pictures(frames).preload_at
+    where = of_frames(frames).preload_at
     assert where.startswith("rows 2 to 4, columns 4 to 6")
     taxel.convert(frames, tmp_path / "mat.npz")
     with shown(chromium, tmp_path / "mat.npz") as page:

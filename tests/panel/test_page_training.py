@@ -1,4 +1,4 @@
-"""Play, label, train on the labels, watch the new readout: in a real browser, on events and on pictures."""
+"""Play, label, train on the labels, watch the new readout: in a real browser, on events and on frames."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ __all__ = ["live", "page", "recording"]
 pytestmark = pytest.mark.timeout(600)
 
 
-def pictures() -> tuple[taxel.Frames, dict[str, list[int]]]:
-    """Return pictures of a mat in counts, on which something is pressed eight times, and when."""
+def frames_of_mat() -> tuple[taxel.Frames, dict[str, list[int]]]:
+    """Return frames of a mat in counts, on which something is pressed eight times, and when."""
     rng, t = np.random.default_rng(3), np.arange(900) * 5000
     values = 40 + rng.normal(0, 0.5, (900, 8, 8))
     begins = [150 + 90 * k for k in range(8)]
@@ -55,8 +55,8 @@ def board(folder: Path) -> dict[str, list[int]]:
 
 
 def mat(folder: Path) -> dict[str, list[int]]:
-    """Write pictures of a mat, and return their labels."""
-    frames, truth = pictures()
+    """Write frames of a mat, and return their labels."""
+    frames, truth = frames_of_mat()
     taxel.convert(frames, folder / "played.npz")
     return truth
 
@@ -79,7 +79,7 @@ OPTIONS = ("--topic", "/hand/palm", "--field", "taxels", "--array", "24x32", "--
 
 @pytest.mark.parametrize(
     ("name", "written", "options", "extra"),
-    # Labels by click are a pixel late or early, for which a picture more may count.
+    # Labels by click are a pixel late or early, for which a frame more may count.
     [
         ("played.mcap", board, (), 0),
         ("played.npz", mat, (), 1),

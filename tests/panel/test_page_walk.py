@@ -128,7 +128,7 @@ def test_neither_marks_nor_lines_cover_the_headings_of_the_lanes(
         )
         assert lane["bottom"] <= mark["y"]
         assert mark["bottom"] <= head["y"]
-        # The line at the picture's time and the cursor's stand over the lanes; their headings stand over the lines.
+        # The line at the time shown and the cursor's stand over the lanes; their headings stand over the lines.
         order = """() => { const z = name => Number(getComputedStyle(document.querySelector(name)).zIndex);
             return [z("#force-block h2"), z("#track")]; }"""
         above, below = page.evaluate(order)
@@ -184,7 +184,7 @@ def test_the_notes_of_one_sensor_are_labels_of_all_of_it(chromium: Any, tmp_path
         assert [(note.text, note.t) for note in taxel.open(tmp_path / "mat.mcap").notes] == [("heel", 250_000)]
         until(lambda: page.locator("[title^='label heel at 0.25']").count() == 1, "the page has the new time")
         page.locator("#label-list li button").nth(0).click()
-        until(lambda: clock(page) == 0.25, "the picture at the new time")
+        until(lambda: clock(page) == 0.25, "the frame at the new time")
         page.locator("#label-list li button").nth(1).click()
         shows(page, "label-count", "^0 labels$")
         assert not taxel.open(tmp_path / "mat.mcap").notes
@@ -219,19 +219,19 @@ def test_what_is_being_read_is_named(chromium: Any, tmp_path: Path) -> None:
         page.context.close()
 
 
-def test_a_label_of_numbered_pictures_is_at_a_picture_and_not_at_a_second(chromium: Any, tmp_path: Path) -> None:
+def test_a_label_of_numbered_frames_is_at_a_frame_and_not_at_a_second(chromium: Any, tmp_path: Path) -> None:
     values = np.zeros((60, 4, 5))
     values[20:30, 1:3, 2:4] = 9.0
     np.savetxt(tmp_path / "mat.csv", values.reshape(60, -1), fmt="%g", delimiter=",")
     (tmp_path / "mat.layout.toml").write_text("rows = 4\ncolumns = 5\n")
     with walked(chromium, tmp_path, "mat.csv") as page:
-        shows(page, "clock", "^picture 20$")
+        shows(page, "clock", "^frame 20$")
         page.locator("#label-name").fill("touch")
         page.locator("#mark").click()
         shows(page, "label-count", "^1 label$")
         time = page.locator("#label-list li input").nth(1)
-        assert f"picture {time.input_value()}" == page.locator("#clock").inner_text()
-        assert time.get_attribute("aria-label") == "time of touch, pictures"
+        assert f"frame {time.input_value()}" == page.locator("#clock").inner_text()
+        assert time.get_attribute("aria-label") == "time of touch, frames"
         time.fill("25")
         time.press("Enter")
         table = tmp_path / "mat.notes.csv"
@@ -288,7 +288,7 @@ def test_notes_have_the_room_of_their_tab(chromium: Any, tmp_path: Path) -> None
         assert last.evaluate(LOW) < page.locator(".detections-block").bounding_box()["y"], "without scrolling"
 
 
-def test_the_head_of_pictures_has_their_number_and_each_foot_and_no_words_on_losses_that_no_such_file_counts(
+def test_the_head_of_frames_has_their_number_and_each_foot_and_no_words_on_losses_that_no_such_file_counts(
     chromium: Any, tmp_path: Path
 ) -> None:
     file = write_gaitpdb(tmp_path)
@@ -296,7 +296,7 @@ def test_the_head_of_pictures_has_their_number_and_each_foot_and_no_words_on_los
     assert {foot.verdict.status for foot in feet} == {"unknown"}
     with shown(chromium, file) as page:
         count = f"{sum(len(foot.frames()) for foot in feet):,}"
-        shows(page, "source", rf"^{re.escape(file.name)} · {count} pictures, left 1 × 8, right 1 × 8$")
+        shows(page, "source", rf"^{re.escape(file.name)} · {count} frames, left 1 × 8, right 1 × 8$")
 
 
 def test_the_values_above_the_lanes_are_in_full_on_a_phone(chromium: Any, tmp_path: Path) -> None:
@@ -315,7 +315,7 @@ def test_the_values_above_the_lanes_are_in_full_on_a_phone(chromium: Any, tmp_pa
 
 
 @pytest.mark.parametrize("seconds", [2, 4, 60])
-def test_a_picture_of_missing_values_alone_has_no_force(seconds: int, chromium: Any, tmp_path: Path) -> None:
+def test_a_frame_of_missing_values_alone_has_no_force(seconds: int, chromium: Any, tmp_path: Path) -> None:
     values = np.zeros((100 * seconds // 2, 6, 4))
     values[20:40], values[60:80] = 10.0, np.nan
     taxel.convert(Frames(values, np.arange(len(values)) * 20_000, unit="N", array=Array(6, 4)), tmp_path / "walk.npz")

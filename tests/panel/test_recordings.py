@@ -65,15 +65,15 @@ def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # n
         assert (opened["events"], opened["start_us"]) == (len(recording.events), recording.events.t[0])
         middle = int(recording.events.t[len(recording.events) // 2])
         assert page.ask("seek", t_us=middle)["type"] == "done"
-        while head(page.until("picture"))[0]["t_us"] != middle:
+        while head(page.until("frame"))[0]["t_us"] != middle:
             pass
-        picture = section(page.pictures[-1], 0, "<u2").reshape(64, 64)
+        frame = section(page.frames[-1], 0, "<u2").reshape(64, 64)
         seen = recording.events.t <= middle
         for x in range(64):
             here = seen & (recording.events.x == x)
             if here.any():
-                assert picture[7, x] == recording.events.intensity[here][-1]
-        assert picture[9, 9] == 77, "what was held when it began"
+                assert frame[7, x] == recording.events.intensity[here][-1]
+        assert frame[9, 9] == 77, "what was held when it began"
         assert page.ask("mark", label="contact", t_us=middle)["type"] == "done"
         labels = next(m for m in reversed(page.said) if m["type"] == "labels")["labels"]
         before = (tmp_path / "step1.mcap").read_bytes()
@@ -151,7 +151,7 @@ def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
             for t_us in (9_000_000, 6_500_000, 100, 8_250_000):
                 assert page.ask("seek", t_us=t_us)["type"] == "done"
                 while True:
-                    about = head(page.until("picture"))[0]
+                    about = head(page.until("frame"))[0]
                     if about["t_us"] == t_us and about["flags"] & 4:
                         break
                 assert about["column_us"] == column_us
@@ -159,8 +159,8 @@ def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
                 assert about["first"] + about["count"] - 1 == last
                 assert about["first"] <= max(0, last - 1249) + 1
                 shown = range(about["first"], last + 1)
-                raster = section(page.pictures[-1], 2, "u1").reshape(-1, 8)
-                sums = section(page.pictures[-1], 3, "<u4").reshape(-1, 4)[:, 0]
+                raster = section(page.frames[-1], 2, "u1").reshape(-1, 8)
+                sums = section(page.frames[-1], 3, "<u4").reshape(-1, 4)[:, 0]
                 for column in shown:
                     ups, downs = (
                         sum(t // column_us == column and t <= t_us for t in t[p == which]) for which in (True, False)
@@ -175,7 +175,7 @@ def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
                 changed = {int(k) for k in t[(t < t_us) & (t > 0)] // column_us} & set(shown)
                 assert spikes_of(page, changed) == {column: [2] for column in changed}
                 assert (
-                    not section(page.pictures[-1], 6, "u1")
+                    not section(page.frames[-1], 6, "u1")
                     .reshape(-1, 8)[[c - shown[0] for c in shown if c not in changed]]
                     .any()
                 )
@@ -198,15 +198,15 @@ def test_a_seek_brings_the_rest_of_its_time_at_once(tmp_path):
         for t_us, known in ((1_000_000, [50, 65_535]), (3_000_000, [50, 60]), (1_000_000, [50, 65_535])):
             assert page.ask("seek", t_us=t_us)["type"] == "done"
             page.send(type="credit", n=1)
-            while head(page.until("picture"))[0]["t_us"] != t_us:
+            while head(page.until("frame"))[0]["t_us"] != t_us:
                 pass
-            sent = section(page.pictures[-1], 5, "<u2")
+            sent = section(page.frames[-1], 5, "<u2")
             rest = sent if len(sent) else rest
             assert rest[1:3].tolist() == known, t_us
-        # Each step is a picture that stands, faster than the rest is sent while time moves.
+        # Each step is a frame that stands, faster than the rest is sent while time moves.
         for known in ([50, 60], [50, 60]):
             assert page.ask("step", frames=1)["type"] == "done"
-            sent = section(page.until("picture"), 5, "<u2")
+            sent = section(page.until("frame"), 5, "<u2")
             rest = sent if len(sent) else rest
             assert rest[1:3].tolist() == known
 
@@ -250,11 +250,11 @@ def test_a_taxel_is_zeroed_for_all_and_the_next_recording_begins_with_it(live, t
                 one.until("zeroed")
             (told,) = all_told[-1]["taxels"]
             assert (told["taxel"], told["rest"], told["before"]) == ([3, 5], 90.0, None)
-        # The picture's rest is the new one, and a lower value does not change it.
+        # The frame's rest is the new one, and a lower value does not change it.
         say(live, word(6000, 3, 5, 80), word(7000, 3, 5, 95))
         heard(live, 4)
         page.send(type="credit", n=8)
-        while not (rest := section(page.until("picture"), 5, "<u2")).size or rest[5 * 64 + 3] != 90:
+        while not (rest := section(page.until("frame"), 5, "<u2")).size or rest[5 * 64 + 3] != 90:
             page.send(type="credit", n=1)
         assert page.ask("record", name="after")["type"] == "done"
         page.since_asked("recorder", state="recording")
@@ -302,7 +302,7 @@ def test_labels_that_change_at_once_are_in_the_file_as_the_page_shows_them(tmp_p
 
 
 def test_a_label_outside_the_recording_is_refused(tmp_path):
-    """A late label of the last touch may lie a second behind the last event, one of pictures on the last of them."""
+    """A late label of the last touch may lie a second behind the last event, one of frames on the last of them."""
     t = np.arange(2_000_000, 3_000_000, 1000)
     events = taxel.Events(t, t % 4, t % 3, t % 2 == 0, array=taxel.Array(4, 4))
     taxel.convert(events, tmp_path / "walk.mcap")
@@ -314,7 +314,7 @@ def test_a_label_outside_the_recording_is_refused(tmp_path):
         for name, first, last, late, far in (
             ("walk.mcap", 2_000_000, 2_999_000, 1_000_000, "1.000 s"),
             ("mat.npz", 0, 1_980_000, 20_000, "0.020 s"),
-            ("table.csv", 0, 590_000, 10_000, "2 pictures"),
+            ("table.csv", 0, 590_000, 10_000, "2 frames"),
         ):
             assert page.ask("open", name=name)["type"] == "done"
             assert page.ask("mark", label="a", t_us=last + late)["type"] == "done"

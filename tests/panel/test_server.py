@@ -20,32 +20,32 @@ from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 
 
-def test_a_picture_shows_what_came(live, panel):
+def test_a_frame_shows_what_came(live, panel):
     with Client(panel) as page:
         assert page.until("hello")["protocol"] == 1
         page.send(type="credit", n=2)
-        assert np.all(section(page.until("picture"), 0, "<u2") == 65_535)
-        frame = b"".join(word(4000, x, 5, 48) for x in range(64))
-        send([frame, word(9000, 3, 5, 90)], *live.address, each=2, seconds=1e-4)
+        assert np.all(section(page.until("frame"), 0, "<u2") == 65_535)
+        sent = b"".join(word(4000, x, 5, 48) for x in range(64))
+        send([sent, word(9000, 3, 5, 90)], *live.address, each=2, seconds=1e-4)
         heard(live, 65)
-        while head(page.until("picture"))[0]["events"] < 65:
+        while head(page.until("frame"))[0]["events"] < 65:
             pass
-        picture = page.pictures[-1]
-        about, sections = head(picture)
-        assert (about["magic"], about["bytes"], about["rows"], about["columns"]) == (b"TXP1", 144, 64, 64)
+        frame = page.frames[-1]
+        about, sections = head(frame)
+        assert (about["magic"], about["bytes"], about["rows"], about["columns"]) == (b"TXF1", 144, 64, 64)
         assert all(start % 8 == 0 for start, _ in sections)
-        pressure = section(picture, 0, "<u2").reshape(64, 64)
+        pressure = section(frame, 0, "<u2").reshape(64, 64)
         assert pressure[5, 3] == 90
         assert np.all(np.delete(pressure[5], 3) == 48)
         assert np.all(np.delete(pressure, 5, axis=0) == 65_535)
         # The rest is tracked from the first values on: slowly where a value is far from it.
-        while not (rest := section(page.until("picture"), 5, "<u2")).size or rest[5 * 64 + 4] != 48:
+        while not (rest := section(page.until("frame"), 5, "<u2")).size or rest[5 * 64 + 4] != 48:
             pass
         assert 48 <= rest[5 * 64 + 3] < (48 + 90) / 2
         assert page.ask("watch", taxel=[3, 5])["type"] == "done"
-        while head(page.until("picture"))[0]["watched"] != 5 * 64 + 3:
+        while head(page.until("frame"))[0]["watched"] != 5 * 64 + 3:
             pass
-        assert 90 in section(page.pictures[-1], 4, "<u2").reshape(-1, 3)[:, 1]
+        assert 90 in section(page.frames[-1], 4, "<u2").reshape(-1, 3)[:, 1]
 
 
 def test_a_source_that_stalled_is_shown_at_its_own_time_again(live, panel):
@@ -58,20 +58,20 @@ def test_a_source_that_stalled_is_shown_at_its_own_time_again(live, panel):
         while t_us < 900_000:
             # Without datagrams, time advances by the host's clock.
             page.send(type="credit", n=1)
-            t_us = head(page.until("picture"))[0]["t_us"]
+            t_us = head(page.until("frame"))[0]["t_us"]
         send([word(400_000, 4, 5, 99)], *live.address, seconds=0.01)
         since = time.monotonic()
         for _ in range(100):
             page.send(type="credit", n=1)
-            t_us = head(page.until("picture"))[0]["t_us"]
+            t_us = head(page.until("frame"))[0]["t_us"]
             if t_us < 700_000:
                 break
         assert t_us >= 400_000, "not before what was heard"
-        assert head(page.pictures[-1])[0]["flags"] & 4, "columns that never were are forgotten"
-        assert section(page.pictures[-1], 0, "<u2").reshape(64, 64)[5, 4] == 99
+        assert head(page.frames[-1])[0]["flags"] & 4, "columns that never were are forgotten"
+        assert section(page.frames[-1], 0, "<u2").reshape(64, 64)[5, 4] == 99
         # The board's time continues from there, and does not jump to the host's estimate.
         for _ in range(8):
-            t_us = head(page.until("picture"))[0]["t_us"]
+            t_us = head(page.until("frame"))[0]["t_us"]
         assert 400_000 < t_us < 600_000 + 1e6 * (time.monotonic() - since)
 
 
@@ -80,7 +80,7 @@ def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
         assert page.until("hello")["delta_intensity"] is False
         page.send(type="credit", n=2)
         say(panel.live, word(1000, 3, 5, 90))
-        while head(page.until("picture"))[0]["events"] < 1:
+        while head(page.until("frame"))[0]["events"] < 1:
             pass
         where = panel.live.address
         assert page.ask("delta_intensity", on="yes")["field"] == "on"
@@ -93,9 +93,9 @@ def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
             *(word(t, 3, 5, n, more) for t, more, n in ((1000, True, 40), (2000, True, 8), (3000, False, 18))),
         )
         say(panel.live, word(4000, 4, 5, 7))
-        while head(page.until("picture"))[0]["events"] < 4:
+        while head(page.until("frame"))[0]["events"] < 4:
             pass
-        assert list(section(page.pictures[-1], 0, "<u2").reshape(64, 64)[5, 3:5]) == [30, 7]
+        assert list(section(page.frames[-1], 0, "<u2").reshape(64, 64)[5, 3:5]) == [30, 7]
         assert page.ask("record", name="delta")["type"] == "done"
         assert "recording runs" in page.ask("delta_intensity", on=False)["reason"]
         say(panel.live, word(5000, 3, 5, 1))
@@ -115,21 +115,21 @@ def test_narrow_and_wide_columns_follow_the_board_too(live, panel):
                 say(live, word(20_000 * sent, 3, 5, 40 + sent % 2 * 20, sent % 2 == 1))
                 time.sleep(0.002)
             heard(live, sent)
-            seen, complete = {}, len(page.pictures)
+            seen, complete = {}, len(page.frames)
             while True:
-                picture = page.until("picture")
-                about = head(picture)[0]
+                frame = page.until("frame")
+                about = head(frame)[0]
                 if about["column_us"] != column_us:
                     continue
                 if about["flags"] & 4:
                     seen = {}
-                raster = section(picture, 2, "u1").reshape(-1, 64)
+                raster = section(frame, 2, "u1").reshape(-1, 64)
                 seen.update((about["first"] + k, raster[k, 5]) for k in range(about["count"]))
-                # The next picture contains the events that arrived while this one was made.
-                if about["events"] >= sent and len(page.pictures) > complete + 2:
+                # The next frame contains the events that arrived while this one was made.
+                if about["events"] >= sent and len(page.frames) > complete + 2:
                     break
                 if about["events"] < sent:
-                    complete = len(page.pictures)
+                    complete = len(page.frames)
             last = 20_000 * sent // column_us
             for n in range(sent, 0, -1):
                 column = 20_000 * n // column_us
@@ -151,7 +151,7 @@ def test_health_of_what_is_shown_is_that_of_taxel_health(live, panel):
     heard(live, sent["datagrams"] * 24)
     with Client(panel) as page:
         page.send(type="credit", n=1)
-        while head(page.until("picture"))[0]["events"] < 192:
+        while head(page.until("frame"))[0]["events"] < 192:
             pass
         assert page.ask("health")["type"] == "done"
         health = next(m for m in page.said if m["type"] == "health")
@@ -177,7 +177,7 @@ def test_a_dead_taxel_of_a_board_of_version_2_is_found_though_states_tell_of_it(
     with Client(panel) as page:
         page.send(type="credit", n=1)
         # Waits until a state has reported the value of the dead taxel.
-        while section(page.until("picture"), 0, "<u2").reshape(64, 64)[7, 4] != 0:
+        while section(page.until("frame"), 0, "<u2").reshape(64, 64)[7, 4] != 0:
             pass
         dead = []
         for _ in range(200):

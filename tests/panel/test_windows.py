@@ -35,11 +35,11 @@ def steps(tmp_path):
     return tmp_path / "steps.mcap"
 
 
-def picture_at(page, t_us):
-    """The next picture of this time."""
-    while head(page.until("picture"))[0]["t_us"] != t_us:
+def frame_at(page, t_us):
+    """The next frame of this time."""
+    while head(page.until("frame"))[0]["t_us"] != t_us:
         pass
-    return page.pictures[-1]
+    return page.frames[-1]
 
 
 def near(force, of):
@@ -47,14 +47,14 @@ def near(force, of):
     return math.floor(of * math.exp(-0.5 / 20)) <= force <= of
 
 
-def columns_of(pictures):
+def columns_of(frames):
     """Sum of ticks above rest by column of time, from the last restart on."""
     sums = {}
-    for picture in pictures:
-        about = head(picture)[0]
+    for frame in frames:
+        about = head(frame)[0]
         if about["flags"] & 4:
             sums = {}
-        one = section(picture, 3, "<u4").reshape(-1, 4)[:, 0]
+        one = section(frame, 3, "<u4").reshape(-1, 4)[:, 0]
         sums |= {about["first"] + k: int(force) for k, force in enumerate(one)}
     return sums
 
@@ -68,15 +68,15 @@ def test_the_window_ends_where_it_is_asked_to_and_the_time_moves_in_it(steps, co
         end = 8_300_000
         assert page.ask("zoom", column_us=column_us, end_us=end)["type"] == "done"
         page.ask("seek", t_us=2_100_000)
-        picture_at(page, 2_100_000)
-        begin = len(page.pictures)
+        frame_at(page, 2_100_000)
+        begin = len(page.frames)
         for t_us in (5_200_000, 400_000, 8_250_000):
             page.ask("seek", t_us=t_us)
-            picture = picture_at(page, t_us)
-            held = section(picture, 0, "<u2").reshape(8, 8)[2, 3]
+            frame = frame_at(page, t_us)
+            held = section(frame, 0, "<u2").reshape(8, 8)[2, 3]
             assert held == {5_200_000: 100, 400_000: 40, 8_250_000: 130}[t_us]
-        assert not any(head(picture)[0]["flags"] & 4 for picture in page.pictures[begin:]), "columns are sent once"
-        sums = columns_of(page.pictures)
+        assert not any(head(frame)[0]["flags"] & 4 for frame in page.frames[begin:]), "columns are sent once"
+        sums = columns_of(page.frames)
         assert max(sums) == end // column_us
         assert min(sums) == max(0, end // column_us - 1249)
         for column, force in sums.items():
@@ -97,10 +97,10 @@ def test_a_view_that_plays_beyond_its_window_takes_it_along(steps):
         page.ask("seek", t_us=1_900_000)
         page.ask("play", speed=2.0)
         until = time.monotonic() + SOON
-        while head(page.until("picture"))[0]["t_us"] < 2_300_000:
+        while head(page.until("frame"))[0]["t_us"] < 2_300_000:
             assert time.monotonic() < until
         page.ask("pause")
-        sums = columns_of(page.pictures)
+        sums = columns_of(page.frames)
         assert [sums[column] for column in (1998, 2001, 2200)] == [0, 30, 30]
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-#: Pictures of a table have as many columns.
+#: Frames of a table have as many columns.
 COLUMNS = 64
 RNG = np.random.default_rng(5)
 
@@ -176,8 +176,8 @@ def popu(folder: Path, size: int) -> Path:
 def tekscan(folder: Path, size: int) -> Path:
     head = "DATA_TYPE MOVIE\nROWS 60\nCOLS 21\nROW_SPACING 5 mm\nCOL_SPACING 5 mm\nSECONDS_PER_FRAME 0.01\nUNITS kPa\n"
     row = ",".join(map(str, range(21)))
-    picture = "\n".join([row] * 60)
-    parts = texts(size // (4 * 60 * 21), lambda k: f"Frame {k + 1}\n{picture}\n\n", head + "ASCII_DATA @@\n\n")
+    frame = "\n".join([row] * 60)
+    parts = texts(size // (4 * 60 * 21), lambda k: f"Frame {k + 1}\n{frame}\n\n", head + "ASCII_DATA @@\n\n")
     file = write(folder / "press.asf", parts)
     with file.open("a") as more:
         more.write("@@\n")
@@ -220,14 +220,14 @@ def bag(ending: str) -> Callable[[Path, int], Path]:
 #: How large files of each kind are written; the formats of other makers have their names.
 KINDS: dict[str, Callable[[Path, int], Path]] = {
     "mcap of events": converted("a.mcap", events),
-    "mcap of pictures": converted("a.mcap", frames),
+    "mcap of frames": converted("a.mcap", frames),
     "lsa": converted("a.lsa", events),
     "npz of events": converted("a.npz", events),
-    "npz of pictures": converted("a.npz", frames),
+    "npz of frames": converted("a.npz", frames),
     "h5 of events": converted("a.h5", events),
-    "h5 of pictures": converted("a.h5", frames),
+    "h5 of frames": converted("a.h5", frames),
     "csv of events": csv_events,
-    "csv of pictures": csv_frames,
+    "csv of frames": csv_frames,
     "npy": plain_npy,
     "npz of another program": foreign_npz,
     "h5 of another program": foreign_h5,
@@ -248,7 +248,7 @@ KINDS: dict[str, Callable[[Path, int], Path]] = {
     "plate": plate,
 }
 #: Those whose arrays are written and read in moments.
-QUICK = ("mcap of events", "mcap of pictures", "lsa", "npz of events", "npz of pictures", "npy", "gaitndd", "popu")
+QUICK = ("mcap of events", "mcap of frames", "lsa", "npz of events", "npz of frames", "npy", "gaitndd", "popu")
 
 
 def arrays_of(every: Any) -> int:

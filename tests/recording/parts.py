@@ -35,7 +35,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "losses.remarks": ("the remark: ",),
     "losses.truncated": ("that its end is missing",),
     "losses.rebuilt": ("what reading had to put up with",),
-    "readings.untimed": ("that its pictures have no times",),
+    "readings.untimed": ("that its frames have no times",),
     "readings.turned": ("that its readings were turned",),
     "lines.columns": ("the names of the columns",),
     "lines.samples": ("the lines of the stream as they came",),

@@ -15,9 +15,9 @@ from .test_pressure import pressed
 
 
 def weighed(path: Path) -> None:
-    """Pictures of a sensor that reads 2 counts a newton: nothing, 3 N in all, 12 N in all, one second each."""
-    picture = np.array([[[1.0, 2.0], [3.0, 0.0]]])
-    values = np.concatenate([np.repeat(picture * load / 3, 10, axis=0) for load in (0, 3, 12)])
+    """Frames of a sensor that reads 2 counts a newton: nothing, 3 N in all, 12 N in all, one second each."""
+    frame = np.array([[[1.0, 2.0], [3.0, 0.0]]])
+    values = np.concatenate([np.repeat(frame * load / 3, 10, axis=0) for load in (0, 3, 12)])
     frames = taxel.Frames(values, np.arange(30) * 100_000, array=taxel.Array(2, 2, 4.0, name="pad"))
     taxel.convert(frames, path)
 

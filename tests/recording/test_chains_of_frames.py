@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import taxel
 from taxel import Array, Frames, Note, _core
-from taxel.recording.contents import Contents, Pictures, Source, alone, source_from
+from taxel.recording.contents import Contents, FrameSource, Source, alone, source_from
 from taxel.recording.once import known
 from taxel.recording.parts import Losses, Marks, Origin, Sensor
 
@@ -178,8 +178,8 @@ def same(recording: taxel.Recording, m: Model, where: str) -> None:
     np.testing.assert_array_equal(frames.t, m.t, where)
     np.testing.assert_array_equal(frames.values, m.values, where)
     assert (frames.unit, recording.side, recording.heel, recording.timed) == (m.unit, m.side, m.heel, True), where
-    one = recording._contents.one
-    assert isinstance(one, Pictures)
+    one = recording._contents.main
+    assert isinstance(one, FrameSource)
     assert one.readings.turned == m.turned, where
     assert (recording.columns if recording.is_stream else None) == m.columns, where
     assert sorted((n.text, str(n.t)) for n in recording.notes) == sorted((text, str(t)) for text, t in m.notes), where

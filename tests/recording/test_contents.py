@@ -12,13 +12,13 @@ import pytest
 import taxel
 from taxel import Note
 from taxel.recording.between import between
-from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, parts_of
+from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, parts_of
 from taxel.recording.cut import region
+from taxel.recording.frames import as_frames, calibrated
 from taxel.recording.merge import merged
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
 from taxel.recording.parts import Lines, Timing
-from taxel.recording.pictures import calibrated, pictures
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
 from taxel.recording.stored import stored
@@ -30,7 +30,7 @@ from .test_chains import ARRAY, KINDS, write
 def full(folder: Path, kind: type[Source]) -> Contents:
     """Return contents of a type of source with something in every field, beside another source."""
     (folder / "calibration.json").write_text(taxel.Calibration.law(ARRAY, date="2026-11-21").to_json())
-    one = taxel.open(write(folder / "full.mcap"))._contents.one
+    one = taxel.open(write(folder / "full.mcap"))._contents.main
     assert isinstance(one, Board)
     losses = replace(
         one.losses,
@@ -49,13 +49,13 @@ def full(folder: Path, kind: type[Source]) -> Contents:
     )
     one = replace(one, sensor=replace(one.sensor, side="left", heel="top"), losses=losses, wire=wire)
     header = {name: getattr(one, name) for name in ("origin", "sensor", "settings", "marks", "timing", "losses")}
-    drawn = pictures(one, 100)
+    drawn = as_frames(one, 100)
     readings, five = replace(drawn.readings, untimed=True, turned=255.0), np.arange(5)
     samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
     every: dict[type[Source], Source] = {
         Board: one,
         Drawn: Drawn(readings=readings, wire=wire, **header),
-        Pictures: Pictures(readings=readings, **header),
+        FrameSource: FrameSource(readings=readings, **header),
         Stream: Stream(readings=readings, lines=Lines(tuple(f"c{k}" for k in range(10)), known(samples)), **header),
     }
     own = every[kind]
@@ -64,8 +64,8 @@ def full(folder: Path, kind: type[Source]) -> Contents:
 
 def marked(of: Contents) -> Contents:
     """Return contents that are a part by time on another clock."""
-    timing = Timing(of.one.timing.clock, "other", known((0, 300_000)))
-    return Contents(replace(of.one, timing=timing), of.sources)
+    timing = Timing(of.main.timing.clock, "other", known((0, 300_000)))
+    return Contents(replace(of.main, timing=timing), of.sources)
 
 
 #: The functions: from the contents before to those after, and the fields that they set anew, which other tests check.
@@ -81,7 +81,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
         {*TABLE, "sensor.array", "sensor.calibration", "settings.held", "marks.zeroings", "lines.columns"},
     ),
     "merge": (
-        lambda of, _: merged([of, of], gap=0 if isinstance(of.one, Pictures) else None),
+        lambda of, _: merged([of, of], gap=0 if isinstance(of.main, FrameSource) else None),
         {*TABLE, *TIMED, *NAMED, "losses.verdict", "timing.stretch"},
     ),
     "on_clock": (
@@ -89,9 +89,9 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
         {*TABLE, *TIMED, "marks.board_changes", "timing.clock", "timing.clock_of", "losses.verdict"},
     ),
     "with_notes": (lambda of, _: with_notes(of, (Note("more", 5, 0),)), {"marks.notes"}),
-    "pictures": (lambda of, _: replace(of, one=pictures(of.one)), {*TABLE, "settings.held"}),
+    "as_frames": (lambda of, _: replace(of, main=as_frames(of.main)), {*TABLE, "settings.held"}),
     "calibrated": (
-        lambda of, _: replace(of, one=calibrated(of.one)),
+        lambda of, _: replace(of, main=calibrated(of.main)),
         {*TABLE, "settings.held", "sensor.calibration"},
     ),
     **{
@@ -112,13 +112,13 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("kind", [Board, Pictures, Drawn, Stream])
+@pytest.mark.parametrize("kind", [Board, FrameSource, Drawn, Stream])
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
     tmp_path: Path, function: str, kind: type[Source]
 ) -> None:
     of = full(tmp_path, kind)
-    for name, value in flat(marked(of).one).items():
+    for name, value in flat(marked(of).main).items():
         assert holds(value), f"fill {name} too"
     if function not in ("between", "on_clock"):
         of = marked(of)
@@ -126,10 +126,10 @@ def test_each_function_carries_each_field_or_changes_it_or_says_that_it_is_lost(
     if function == ".lsa" and kind is not Board:
         return
     after = work(of, tmp_path)
-    said = after.one.losses.lost()
+    said = after.main.losses.lost()
     assert "something" in said
-    assert unsaid(of.one, after.one, said, {*anew, "losses.lost"}) == []
-    if function not in ("between", "on_clock", "with_notes", "pictures", "calibrated"):
+    assert unsaid(of.main, after.main, said, {*anew, "losses.lost"}) == []
+    if function not in ("between", "on_clock", "with_notes", "as_frames", "calibrated"):
         assert "the source other" in said
 
 
@@ -143,6 +143,6 @@ class Coloured(Board):
 @pytest.mark.parametrize("function", ["between", "region", "on_clock", *KINDS])
 def test_a_part_without_a_rule_is_refused_by_each_function(tmp_path: Path, function: str) -> None:
     of = full(tmp_path, Board)
-    one = Coloured(**parts_of(of.one if function in ("between", "on_clock") else marked(of).one))
+    one = Coloured(**parts_of(of.main if function in ("between", "on_clock") else marked(of).main))
     with pytest.raises((AssertionError, AttributeError), match=r"'red'|'str' object has no attribute 'lines'"):
         FUNCTIONS[function][0](Contents(one, {"board": one, "other": of.sources["other"]}), tmp_path)

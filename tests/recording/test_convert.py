@@ -147,7 +147,7 @@ def test_a_npz_keeps_notes_detections_registers_and_the_sensor(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(("first", "second"), list(itertools.product((".npz", ".csv", ".mcap"), repeat=2)))
-def test_pictures_survive_to_the_last_bit(tmp_path: Path, first: str, second: str) -> None:
+def test_frames_survive_to_the_last_bit(tmp_path: Path, first: str, second: str) -> None:
     frames = some_frames()
     one, two = tmp_path / f"one{first}", tmp_path / f"two{second}"
     taxel.convert(frames, one)
@@ -158,7 +158,7 @@ def test_pictures_survive_to_the_last_bit(tmp_path: Path, first: str, second: st
     assert not taxel.open(two).has_events
 
 
-def test_a_csv_of_pictures_has_a_column_a_taxel_that_exists(tmp_path: Path) -> None:
+def test_a_csv_of_frames_has_a_column_a_taxel_that_exists(tmp_path: Path) -> None:
     exists = np.array([[True, False], [True, True]])
     frames = taxel.Frames(np.array([[[1, 0], [2.5, 3]]]), [100], array=taxel.Array(2, 2, exists=exists))
     path = tmp_path / "a.csv"
@@ -170,10 +170,10 @@ def test_a_csv_of_pictures_has_a_column_a_taxel_that_exists(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 4096])
-def test_a_csv_of_pictures_keeps_each_value_to_the_bit(
+def test_a_csv_of_frames_keeps_each_value_to_the_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
 ) -> None:
-    monkeypatch.setattr(taxel.recording.write_csv, "_PICTURES", at_once)
+    monkeypatch.setattr(taxel.recording.write_csv, "_FRAMES", at_once)
     values = np.array([[0.0, -0.0, np.nan], [0.1, 1e-30, 1e30], [7.0, -7.5, 0.1]], np.float32)
     taxel.convert(taxel.Frames(values[:, None], [0, 5, 9]), tmp_path / "a.csv")
     read = taxel.open(tmp_path / "a.csv").frames()
@@ -191,15 +191,15 @@ def test_a_csv_of_events_has_the_columns_that_the_field_knows(tmp_path: Path) ->
     assert taxel.open(path).events == events
 
 
-def test_pictures_of_events_are_written_where_a_rate_is_asked_for(tmp_path: Path) -> None:
+def test_frames_of_events_are_written_where_a_rate_is_asked_for(tmp_path: Path) -> None:
     events = some_events()
     taxel.convert(events, tmp_path / "a.csv", frames_hz=1000)
     back = taxel.open(tmp_path / "a.csv").frames()
     assert np.array_equal(back.values, Frames.from_events(events, 1000).values)
 
 
-def test_pictures_do_not_go_into_files_of_events(tmp_path: Path) -> None:
-    with pytest.raises(ProblemError, match="holds events and no pictures"):
+def test_frames_do_not_go_into_files_of_events(tmp_path: Path) -> None:
+    with pytest.raises(ProblemError, match="holds events and no frames"):
         taxel.convert(some_frames(), tmp_path / "a.lsa")
     assert not list(tmp_path.iterdir())
 
@@ -240,7 +240,7 @@ def test_a_slice_of_a_recording_is_converted_as_a_slice(tmp_path: Path) -> None:
         (("E", "a.npz", {"frames_hz": 0}), "frames_hz is 0"),
         (("E", "a.npz", {"frames_hz": "fast"}), "frames_hz is 'fast'"),
         (("E", "a.npz", {"frames_hz": float("nan")}), "frames_hz is nan"),
-        (("F", "a.npz", {"frames_hz": 10}), "pictures keep their own times"),
+        (("F", "a.npz", {"frames_hz": 10}), "frames keep their own times"),
         (("E", "a.npz", {"overwrite": "yes"}), "overwrite is 'yes'"),
     ],
 )

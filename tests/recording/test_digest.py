@@ -34,7 +34,7 @@ def converted(folder: Path, kind: str) -> Path:
     lost = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 12345}})
     held = np.full((64, 64), 3, np.uint16)
     path = folder / f"b.{kind}"
-    one = replace(contents.one, losses=replace(contents.one.losses, verdict=known(lost)))
+    one = replace(contents.main, losses=replace(contents.main.losses, verdict=known(lost)))
     one = replace(one, settings=replace(one.settings, held=known(held)))
     taxel.convert(taxel.Recording(Contents.of(one)), path)
     assert "12345" in taxel.open(path).verdict
@@ -140,7 +140,7 @@ def test_both_formats_have_the_checksum_that_the_page_states(order: Any, tmp_pat
 
 
 def test_rows_without_bytes_take_no_time(tmp_path: Path) -> None:
-    columns = columns_of(taxel.open(converted(tmp_path, "npz"))._contents.one) | {
+    columns = columns_of(taxel.open(converted(tmp_path, "npz"))._contents.main) | {
         "held": np.empty((2**60, 0), np.uint16)
     }
     with pytest.raises(FormatError, match=DAMAGED):
@@ -154,7 +154,7 @@ def test_merged_recordings_have_their_doubtful_times_by_the_merged_times(tmp_pat
         told = "nothing lost" if after is None else "nothing lost; times after 700 us are doubtful"
         status = "complete" if after is None else "damaged"
         verdict = Verdict.from_dict({"status": status, "text": told, "doubtful_after_us": after})
-        one = taxel.open(tmp_path / f"{name}.mcap")._contents.one
+        one = taxel.open(tmp_path / f"{name}.mcap")._contents.main
         one = replace(one, losses=replace(one.losses, verdict=known(verdict)))
         parts.append(taxel.Recording(Contents.of(one)))
     merged = taxel.merge(parts, gap_us=1000)

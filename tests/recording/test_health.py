@@ -296,7 +296,7 @@ def test_a_taxel_that_shows_one_value_only_is_stuck() -> None:
         assert taxel.health(taxel.Events(**columns, array=odd.array)).stuck[3, 2] == (count == 3)
 
 
-def test_pictures_tell_too() -> None:
+def test_frames_tell_too() -> None:
     rng = np.random.default_rng(3)
     pressed = 40 * np.clip(np.sin(np.arange(80) / 3), 0, None)
     values = np.rint(rng.normal(10, 2, (80, 10, 10)) + pressed[:, None, None])
@@ -325,7 +325,7 @@ def test_a_taxel_that_flickers_is_noisy_and_leaves_the_judgement_of_others_alone
     touched[:, 3, 12] = 300
     touched[np.arange(5, 1200, 60), 2:5, 11:14] = 4095
     assert not flickering(taxel.Frames(touched, one.t)).any()
-    # Nor are channels, few pictures, or a taxel that misses values.
+    # Nor are channels, few frames, or a taxel that misses values.
     assert not flickering(taxel.Frames(values.reshape(1200, 1, -1), one.t)).any()
     assert not flickering(one.between(0, 4_000_000)).any()
     values[3, 3, 12] = np.nan
@@ -333,7 +333,7 @@ def test_a_taxel_that_flickers_is_noisy_and_leaves_the_judgement_of_others_alone
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_changes_of_pictures_are_those_of_each_taxel_alone(seed: int) -> None:
+def test_changes_of_frames_are_those_of_each_taxel_alone(seed: int) -> None:
     random = np.random.default_rng(seed)
     n, rows, columns = (int(random.integers(*among)) for among in ((0, 40), (1, 4), (1, 5)))
     values = random.integers(0, 3, (n, rows, columns)).astype(np.float32)
@@ -358,7 +358,7 @@ def test_nonsense_is_refused(recorded: object) -> None:
         taxel.health(recorded)
 
 
-def test_a_missing_cell_of_pictures_was_not_pressed() -> None:
+def test_a_missing_cell_of_frames_was_not_pressed() -> None:
     touch = np.array([0, 40, 80, 40, 0])[:, None, None] * np.ones((3, 3))
     values = np.concatenate([touch] * 2)
     values[:, 1, 1] = np.nan

@@ -165,11 +165,11 @@ def test_few_events_on_a_large_sensor_take_little_memory(tmp_path: Path) -> None
     code += "print(re.search(r'VmHWM:\\s+(\\d+) kB', pathlib.Path('/proc/self/status').read_text())[1])"
     said = subprocess.run([sys.executable, "-c", code, tmp_path / "a.npz"], capture_output=True, text=True, check=True)
     assert "contact area" in said.stdout
-    # Whole pictures of this second would be 1.6 GB, and counts of touches of all taxels .4 GB.
+    # Whole frames of this second would be 1.6 GB, and counts of touches of all taxels .4 GB.
     assert int(said.stdout.split()[-1]) < 300_000
 
 
-def test_pressure_over_time_is_that_of_whole_pictures(tmp_path: Path) -> None:
+def test_pressure_over_time_is_that_of_whole_frames(tmp_path: Path) -> None:
     from taxel.recording.pressure import Series, above_rest, series
 
     for k, recording in enumerate([taxel.open(write(tmp_path / "a.mcap")), taxel.open(write(tmp_path / "b.mcap", 1))]):

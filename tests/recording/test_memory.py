@@ -128,7 +128,7 @@ def gzip_bomb(folder: Path) -> Path:
 
 
 def npz_bomb(folder: Path, pieces: int = 300) -> Path:
-    """Write pictures of 300 MiB in .3 MB; of the 3 GiB of 3 times 1024 pieces the file holds the description alone."""
+    """Write frames of 300 MiB in .3 MB; of the 3 GiB of 3 times 1024 pieces the file holds the description alone."""
     with zipfile.ZipFile(folder / "a.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         n = pieces << 8
         for name, descr, shape in (("values", "<f4", (n, 32, 32)), ("t", "<i8", (n,))):
@@ -192,7 +192,7 @@ def write_packed(path: Path) -> None:
     (to if path.suffix == ".bag" else next(to.glob("*.mcap"))).rename(path)
 
 
-def test_large_pictures_of_one_value_open_whatever_they_are_packed_to(tmp_path: Path) -> None:
+def test_large_frames_of_one_value_open_whatever_they_are_packed_to(tmp_path: Path) -> None:
     """What taxel wrote always opens, though a bomb is packed as well."""
     frames = taxel.Frames(np.zeros((100, 512, 512), np.float32), np.arange(100) * 1000)
     path = tmp_path / "a.mcap"
@@ -201,14 +201,14 @@ def test_large_pictures_of_one_value_open_whatever_they_are_packed_to(tmp_path: 
     assert taxel.open(path).frames() == frames
 
 
-def pictures(dtype: str, size: int, order: Any = "C") -> np.ndarray[Any, Any]:
-    """Return pictures that take so many bytes as float32."""
+def frames(dtype: str, size: int, order: Any = "C") -> np.ndarray[Any, Any]:
+    """Return frames that take so many bytes as float32."""
     return np.ones((size // 4 // 4096, 64, 64), dtype, order)
 
 
 def of_anybody(folder: Path, size: int, kind: str, dtype: str) -> Path:
-    """Write pictures as people save them, of any dtype and order."""
-    values = pictures(dtype.removesuffix(" F"), size, "F" if dtype.endswith("F") else "C")
+    """Write frames as people save them, of any dtype and order."""
+    values = frames(dtype.removesuffix(" F"), size, "F" if dtype.endswith("F") else "C")
     t = np.arange(len(values))
     path = folder / f"a.{kind.partition(' ')[0]}"
     if kind == "h5":
@@ -230,7 +230,7 @@ def of_anybody(folder: Path, size: int, kind: str, dtype: str) -> Path:
     return path
 
 
-#: Types of pictures that are all converted alike: where a layout says more, one of them is enough in a quick run.
+#: Types of frames that are all converted alike: where a layout says more, one of them is enough in a quick run.
 ALIKE = ("u1", "?", ">f4", "f4 F")
 
 
@@ -242,7 +242,7 @@ ALIKE = ("u1", "?", ">f4", "f4 F")
         for dtype in (*ALIKE, ">i2", "f8", "f8 F")
     ],
 )
-def test_pictures_of_every_dtype_are_in_memory_once(kind: str, dtype: str, tmp_path: Path, opened: Opened) -> None:
+def test_frames_of_every_dtype_are_in_memory_once(kind: str, dtype: str, tmp_path: Path, opened: Opened) -> None:
     sizes = {}
     for size in (MIB, 16 * MIB):
         (folder := tmp_path / str(size)).mkdir()
@@ -283,7 +283,7 @@ def test_what_a_layout_says_of_a_single_taxel_takes_little_memory(
 
 
 @pytest.mark.parametrize("kind", ["npz", "h5"])
-def test_pictures_of_taxel_itself_that_fall_are_in_memory_once(kind: str, tmp_path: Path, opened: Opened) -> None:
+def test_frames_of_taxel_itself_that_fall_are_in_memory_once(kind: str, tmp_path: Path, opened: Opened) -> None:
     (tmp_path / "layout.toml").write_text("falls = 9\n")
     n = 1000
     columns = {"values": np.ones((n, 64, 64), "f4"), "t": np.arange(n) * 1000}
@@ -371,15 +371,15 @@ STRANGE: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {
     "markers": (lambda: as_events(markers=np.zeros((4_000_000, 2), np.int64)), "at most 262144 markers"),
     "lists": (lambda: as_events(about=np.array('{"notes":[' + "[]," * 5_000_000 + "[]]}")), "a larger limit"),
     "a long about": (lambda: as_events(about=np.array('{"a":"' + "x" * 40_000_000 + '"}')), "a larger limit"),
-    "a unit": (lambda: of_pictures(3, unit=np.array("N" * 40_000_000)), "a larger limit"),
-    "times": (lambda: of_pictures(3, t=np.zeros(20_000_000, np.int64)), "a time for each of 3 pictures"),
+    "a unit": (lambda: of_frames(3, unit=np.array("N" * 40_000_000)), "a larger limit"),
+    "times": (lambda: of_frames(3, t=np.zeros(20_000_000, np.int64)), "a time for each of 3 frames"),
     "held": (lambda: as_events(held=np.zeros((9000, 9000), np.uint16)), "at most 4194304"),
     "columns": (lambda: as_events(x=np.zeros(20_000_000)), "as many as t has"),
-    "complex pictures": (lambda: of_pictures(20_000, values=np.zeros((20_000, 8, 64), "c16")), "complex128"),
+    "complex frames": (lambda: of_frames(20_000, values=np.zeros((20_000, 8, 64), "c16")), "complex128"),
 }
 
 
-def of_pictures(n: int, **more: Any) -> dict[str, Any]:
+def of_frames(n: int, **more: Any) -> dict[str, Any]:
     return {"values": np.ones((n, 2, 2)), "t": np.arange(n)} | more
 
 
@@ -422,7 +422,7 @@ def test_times_that_do_not_fit_are_refused_before_they_are_read(tmp_path: Path, 
         h5.create_dataset("p", (100, 8), "i1")
         h5.create_dataset("t", (400_000_000,), "i1", chunks=(1_000_000,))
     said = opened(tmp_path / "a.h5")
-    assert "400000000 times for 100 pictures" in said["refused"]
+    assert "400000000 times for 100 frames" in said["refused"]
     assert said["peak"] < 192 * MIB
 
 

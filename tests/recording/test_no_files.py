@@ -109,7 +109,7 @@ BESIDE = [
 
 @pytest.mark.parametrize("name", BESIDE)
 def test_what_lies_beside_a_recording_does_not_stop_it(name: str, no_file: Any, tmp_path: Path) -> None:
-    """The pictures open; labels of a whole folder that are none say so."""
+    """The frames open; labels of a whole folder that are none say so."""
     taxel.convert(some_frames(), tmp_path / "walk.npz")
     no_file[0](tmp_path / name)
     assert taxel.open(tmp_path / "walk.npz").frames() == some_frames()

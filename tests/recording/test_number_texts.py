@@ -18,7 +18,7 @@ def events_table(number):
     return f"t_us,x,y,p\n{number},1,2,1\n"
 
 
-def pictures_table(number):
+def frames_table(number):
     return f"t_us,x0y0,x1y0\n0,1,{number}\n"
 
 
@@ -46,7 +46,7 @@ def open_trials(file):
 
 READERS = {
     "a table of events": (events_table, open_one),
-    "a table of pictures": (pictures_table, open_one),
+    "a table of frames": (frames_table, open_one),
     "a table of another program": (lambda n: f"time,a,b\n0.0,1,2\n0.1,1,{n}\n", open_laid_out),
     "times of another program": (lambda n: f"time,a,b\n0.0,1,2\n{n},1,3\n", open_laid_out),
     "a table of labels": (lambda n: f"label,t_us\nheel,{n}\n", lambda file: Labels(file).rows),

@@ -159,30 +159,30 @@ def test_a_table_with_a_layout_beside_a_recording_is_left_out_with_a_warning(tmp
 
 
 @pytest.mark.parametrize("ending", ["npz", "h5"])
-def test_pictures_on_a_given_array_of_another_size_are_refused_by_its_name(tmp_path: Path, ending: str) -> None:
+def test_frames_on_a_given_array_of_another_size_are_refused_by_its_name(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"a.{ending}"
     taxel.convert(Frames(np.zeros((2, 4, 4), np.float32), [0, 7]), path)
     for array in (taxel.Array(3, 5), taxel.Array(2, 8), taxel.Array(1, 16)):
         size = " x ".join(map(str, array.shape))
-        with pytest.raises(taxel.ProblemError, match=f"array: {size} taxels; .*a.{ending} holds pictures of 4 x 4$"):
+        with pytest.raises(taxel.ProblemError, match=f"array: {size} taxels; .*a.{ending} holds frames of 4 x 4$"):
             taxel.open(path, array=array)
     assert taxel.open(path, array=taxel.Array(4, 4, 5.0)).array.pitch_mm == 5.0
 
 
-@pytest.mark.parametrize("pictures", [False, True])
+@pytest.mark.parametrize("are_frames", [False, True])
 def test_a_csv_is_the_same_however_much_of_it_is_read_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pictures: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, are_frames: bool
 ) -> None:
     path, random = tmp_path / "a.csv", np.random.default_rng(3)
     frames = Frames(random.normal(size=(40, 2, 3)).astype(np.float32), np.arange(40) * 7, array=taxel.Array(2, 3))
-    taxel.convert(frames if pictures else some_events(50), path)
-    table = frames if pictures else taxel.open(path).events
+    taxel.convert(frames if are_frames else some_events(50), path)
+    table = frames if are_frames else taxel.open(path).events
     lines = path.read_bytes().split(b"\n")
     wrong = [*lines[:20], b"", lines[20].rpartition(b",")[0] + b",abc", *lines[21:]]
     for size in (1, 37, 400, 1 << 22):
         monkeypatch.setattr(taxel.recording.read_csv, "_AT_ONCE", size)
         path.write_bytes(b"\r\n".join(lines))
-        read = taxel.open(path).frames() if pictures else taxel.open(path).events
+        read = taxel.open(path).frames() if are_frames else taxel.open(path).events
         assert read == table
         path.write_bytes(b"\n".join(wrong))
         with pytest.raises(FormatError, match=r"line 22, column \w+: could not convert"):
@@ -265,7 +265,7 @@ def test_frames_hold_what_came_and_a_slice_knows_what_came_before_it(rec: taxel.
             rec.frames(rate)
 
 
-def test_frames_of_a_file_of_pictures_are_its_own_or_the_last_at_each_time(tmp_path: Path) -> None:
+def test_frames_of_a_file_of_frames_are_its_own_or_the_last_at_each_time(tmp_path: Path) -> None:
     own = taxel.Frames(np.arange(12, dtype=np.float32).reshape(3, 2, 2), [0, 1000, 2500])
     taxel.convert(own, tmp_path / "a.npz")
     rec = taxel.open(tmp_path / "a.npz")
@@ -274,12 +274,12 @@ def test_frames_of_a_file_of_pictures_are_its_own_or_the_last_at_each_time(tmp_p
     assert held.t.tolist() == [0, 1000, 2000]
     assert held.values[:, 0, 0].tolist() == [0, 4, 4]
     assert rec.between(500, 3000).frames().t.tolist() == [1000, 2500]
-    with pytest.raises(ProblemError, match="holds pictures and no events"):
+    with pytest.raises(ProblemError, match="holds frames and no events"):
         _ = rec.events
     with pytest.raises(ProblemError, match=r"only \.mcap does"):
         rec.datagrams()
     assert rec.clock is None
-    assert "3 pictures" in repr(rec)
+    assert "3 frames" in repr(rec)
 
 
 def test_a_recording_draws_itself(rec: taxel.Recording, tmp_path: Path) -> None:

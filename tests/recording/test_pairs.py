@@ -89,7 +89,7 @@ READERS: dict[str, Callable[[Path], taxel.Recording]] = {
     "a part by time": lambda folder: taxel.open(write(folder / "of.mcap")).between(10_000, 200_000),
     "on the host's clock": lambda folder: taxel.open(write(folder / "of.mcap")).on_clock("host"),
     **{f"events{kind}": converted(kind, False) for kind in KINDS},
-    **{f"pictures{kind}": converted(kind, True) for kind in KINDS if kind != ".lsa"},
+    **{f"frames{kind}": converted(kind, True) for kind in KINDS if kind != ".lsa"},
     **{name: of_format(name) for name in FORMATS},
 }
 
@@ -99,12 +99,12 @@ READERS: dict[str, Callable[[Path], taxel.Recording]] = {
 def test_what_a_recording_holds_is_there_again_or_said(tmp_path: Path, reader: str, kind: str) -> None:
     recording = READERS[reader](tmp_path)
     if kind == ".lsa" and not recording.has_events:
-        with pytest.raises(taxel.ProblemError, match="holds events and no pictures"):
+        with pytest.raises(taxel.ProblemError, match="holds events and no frames"):
             taxel.convert(recording, tmp_path / f"new{kind}")
         return
     said = taxel.convert(recording, tmp_path / f"new{kind}")
     again = taxel.open(tmp_path / f"new{kind}")
-    before, after = recording._contents.one, again._contents.one
+    before, after = recording._contents.main, again._contents.main
     assert unsaid(before, after, said, STORED) == []
     if kind in (".mcap", ".npz", ".h5"):
         assert again.counts == (recording.counts or again.counts)

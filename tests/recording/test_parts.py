@@ -173,7 +173,7 @@ def test_a_part_beyond_the_array_is_refused(tmp_path: Path, asked: dict[str, sli
     assert taxel.cut(rec, columns=slice(3, 6), rows=slice(-2, None))[0].array.shape == (2, 3)
 
 
-def test_pictures_are_cut_and_put_beside_to_the_last_bit(tmp_path: Path) -> None:
+def test_frames_are_cut_and_put_beside_to_the_last_bit(tmp_path: Path) -> None:
     frames = some_frames(9)
     rec = opened(frames, tmp_path)
     halves = [taxel.cut(rec, columns=c)[0] for c in (slice(2), slice(2, None))]
@@ -206,7 +206,7 @@ def test_merge_refuses_what_does_not_go_together(tmp_path: Path) -> None:
     events, frames = opened(some_events(20), tmp_path), opened(some_frames(), tmp_path, "f.npz")
     small = opened(taxel.Events([0], [0], [0], [True], array=taxel.Array(2, 2)), tmp_path, "s.npz")
     for parts, said in (
-        ([events, frames], "holds events, .* pictures; convert one of them"),
+        ([events, frames], "holds events, .* frames; convert one of them"),
         ([], "one or more"),
         ([events, small], "different"),
     ):

@@ -56,7 +56,7 @@ def test_area_peak_sum_and_centre_are_said_written_and_drawn(tmp_path: Path) -> 
     assert "contact area        at most 8 mm2, at 1100000 us" in run("info", path).stdout
 
 
-def test_pictures_rest_at_zero_and_events_without_intensities_have_no_pressure(tmp_path: Path) -> None:
+def test_frames_rest_at_zero_and_events_without_intensities_have_no_pressure(tmp_path: Path) -> None:
     frames = taxel.Frames(np.eye(3)[None] * [[[1.0]], [[2.0]]], [0, 1000], unit="N")
     taxel.convert(frames, tmp_path / "f.npz")
     found = json.loads(run("info", tmp_path / "f.npz", "--json").stdout)["pressure"]
@@ -124,8 +124,8 @@ def test_noise_has_no_centre_and_each_press_has_one(spread: float, share: float)
     assert (found <= (12.0, 9.0)).all()
 
 
-def test_what_is_largest_between_two_pictures_of_events_is_said(tmp_path: Path) -> None:
-    # A bounce of 4 ms between the pictures at 1.1 and 1.11 s; at 1.104 s both taxels change, and one is back at rest.
+def test_what_is_largest_between_two_frames_of_events_is_said(tmp_path: Path) -> None:
+    # A bounce of 4 ms between the frames at 1.1 and 1.11 s; at 1.104 s both taxels change, and one is back at rest.
     path, table = tmp_path / "a.npz", tmp_path / "a.csv"
     t = [0, 0, 0, 1_103_000, 1_104_000, 1_104_000, 1_107_000, 1_300_000]
     x, ticks = [1, 2, 4, 2, 4, 2, 4, 1], [60, 50, 40, 80, 60, 50, 40, 60]
@@ -133,12 +133,12 @@ def test_what_is_largest_between_two_pictures_of_events_is_said(tmp_path: Path) 
     found = json.loads(run("info", path, "--table", table, "--json").stdout)["pressure"]
     assert found["area_mm2"] == {"most": 4.0, "t_us": 1_103_000}
     assert found["peak"] == found["sum"] == {"most": pytest.approx(30.0), "t_us": 1_103_000}
-    # The table's pictures, every 10 ms, have nothing of it.
+    # The table's frames, every 10 ms, have nothing of it.
     assert {float(row["sum_ticks"]) for row in csv.DictReader(table.open())} == {0.0}
 
 
 @pytest.mark.parametrize("chunk", [64, 1 << 16])
-def test_the_largest_are_those_of_pictures_at_all_events(monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
+def test_the_largest_are_those_of_frames_at_all_events(monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
     from taxel.recording import pressure
     from taxel.recording.contents import Contents, source_from
     from taxel.recording.recording import Recording
@@ -163,7 +163,7 @@ def test_the_largest_are_those_of_pictures_at_all_events(monkeypatch: pytest.Mon
     assert found.total.max() < found.largest.total.max()
 
 
-def test_pictures_of_missing_values_alone_are_no_peak(tmp_path: Path) -> None:
+def test_frames_of_missing_values_alone_are_no_peak(tmp_path: Path) -> None:
     values = np.zeros((40, 4, 4))
     values[10:15], values[20:30] = 7.0, np.nan
     taxel.convert(taxel.Frames(values, np.arange(40) * 10_000, unit="N"), tmp_path / "a.npz")

@@ -87,7 +87,7 @@ def test_a_tare_comes_first_then_the_calibrations_rest_then_a_quiet_stretch(tmp_
     assert "the tare is of 3 x 2 taxels" in run("info", path, "--tare", tmp_path / "other.json").stderr
 
 
-def test_pictures_of_force_rest_at_0_and_others_where_they_are_quiet(tmp_path: Path) -> None:
+def test_frames_of_force_rest_at_0_and_others_where_they_are_quiet(tmp_path: Path) -> None:
     values = np.full((40, 2, 2), 20.0)
     values[20:30, 0, :] = 80.0
     values[20:30, 1, :] = 60.0
@@ -131,10 +131,10 @@ def preloaded(
     if not events:
         return frames, truth
     rows, last = [], np.full(values.shape[1:], np.nan)
-    for at, picture in zip(t, values, strict=True):
-        for y, x in np.argwhere(~(np.abs(picture - last) <= 3)):
-            rows.append((at, x, y, not picture[y, x] < last[y, x], picture[y, x]))
-            last[y, x] = picture[y, x]
+    for at, frame in zip(t, values, strict=True):
+        for y, x in np.argwhere(~(np.abs(frame - last) <= 3)):
+            rows.append((at, x, y, not frame[y, x] < last[y, x], frame[y, x]))
+            last[y, x] = frame[y, x]
     t, x, y, p, ticks = map(np.array, zip(*rows, strict=True))
     return taxel.Events(t, x, y, p, array=frames.array, intensity=ticks.astype(int)), truth
 

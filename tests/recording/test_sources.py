@@ -184,7 +184,7 @@ def test_the_command_line_shows_and_writes_one_source(
     several: tuple[Path, dict[str, taxel.Events]], tmp_path: Path
 ) -> None:
     said = json.loads(run("info", several[0], "--json").stdout)["sources"]
-    assert {name: one.get("events", one.get("pictures")) for name, one in said.items()} == {
+    assert {name: one.get("events", one.get("frames")) for name, one in said.items()} == {
         "right": 30, "left": 20, "imu": 50, "given": 5,
     }  # fmt: skip
     assert said["imu"]["columns"] == ["ax", "ay"]

@@ -603,7 +603,7 @@ def test_conversions_keep_a_verdict_with_its_numbers(kind: str, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.5, 0.8, 0.99])
-@pytest.mark.parametrize("of", ["events", "lines", "pictures", "two"])
+@pytest.mark.parametrize("of", ["events", "lines", "frames", "two"])
 def test_a_converted_file_that_is_cut_says_what_its_source_lost(of: str, share: float, tmp_path: Path) -> None:
     source = tmp_path / "a.mcap"
     if of in ("events", "lines"):
@@ -619,7 +619,7 @@ def test_a_converted_file_that_is_cut_says_what_its_source_lost(of: str, share: 
     else:
         frames = taxel.Frames(np.random.default_rng(2).normal(size=(300, 16, 16)).astype(np.float32), np.arange(300))
         verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 7}})
-        names = "a" if of == "pictures" else "ab"
+        names = "a" if of == "frames" else "ab"
         origins = {name: Origin(tmp_path, "a.bag", "ros", name) for name in names}
         losses = Losses(verdict=known(verdict))
         first = taxel.Recording(alone({n: source_from(frames, origin, losses=losses) for n, origin in origins.items()}))

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel.simulate import Board, Pictures, Scene, Silence, Version2, emulate, play, truth
+from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, emulate, play, truth
 from taxel.simulate.circuit import Circuit, VirtualGround
 from taxel.wire import Registers
 
 
 def heard(board: Board, frames: np.ndarray) -> taxel.Events:
     """What a host decodes of frames."""
-    sent = [datagram for picture in frames for datagram in board.frame(picture)]
+    sent = [datagram for frame in frames for datagram in board.frame(frame)]
     decoder = taxel.wire.Decoder(2, array=board.array)
     pieces = [decoder.push(datagram) for datagram in sent]
     assert (decoder.counts.intact, decoder.counts.missing) == (len(sent), 0)
@@ -65,8 +65,8 @@ def test_what_a_host_holds_is_within_the_floor_and_steps_are_no_larger():
     registers = Registers(array=array, wire_version=2, noise_floor=4)
     board, decoder = Board(registers, array, asynchronous=True), taxel.wire.Decoder(2, array=array)
     walk = random.integers(0, 151, (200, 9)).astype(np.uint16)
-    for picture in [*walk, walk[-1], walk[-1]]:
-        for datagram in board.frame(picture):
+    for frame in [*walk, walk[-1], walk[-1]]:
+        for datagram in board.frame(frame):
             decoder.push(datagram)
     assert (np.abs(decoder.held.ravel() - walk[-1].astype(int)) <= 4).all()
 
@@ -89,7 +89,7 @@ def test_a_slow_press_is_told_between_the_frames_of_a_scan():
     """Taxels that rise by a tick each 2 ms: whole frames when scanned, their own times when not."""
     slope_us, frames = 2000.0, 1000
     values = np.broadcast_to(np.arange(frames)[:, None, None] * 192.0 / slope_us / 150.0, (frames, 64, 64))
-    acts = [Silence(1.0), Pictures(values.astype(np.float32), 192.0)]
+    acts = [Silence(1.0), FrameSequence(values.astype(np.float32), 192.0)]
     quiet = {"noise_ticks": 0.0, "gain_spread": 0.0, "offset_mv": 0.0}
     scanned, alone = (
         play(acts, seed=1, tare_ms=0.0, sensor=quiet, wire=2, asynchronous=which).events for which in (False, True)

@@ -233,7 +233,7 @@ def test_cells_that_make_no_sense_get_one_line_with_the_place(tmp_path, cells, s
     assert str(caught.value).startswith(str(place))
 
 
-def test_a_layer_refuses_cells_and_pictures_that_do_not_fit():
+def test_a_layer_refuses_cells_and_frames_that_do_not_fit():
     for cells in (0, 17, 1.5, "two"):
         with pytest.raises(ProblemError, match="cells_per_pitch"):
             Layer(cells_per_pitch=cells)

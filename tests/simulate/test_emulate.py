@@ -218,7 +218,7 @@ def test_a_recording_of_another_sensor_is_played_with_all_its_values(listener, t
     assert again.intensity.tolist() == values.ravel().tolist()
 
 
-def test_pictures_are_played_by_the_boards_rules(listener):
+def test_frames_are_played_by_the_boards_rules(listener):
     values = np.zeros((20, 64, 64), np.float32)
     values[5:, 3, 4], values[10:, 3, 4] = 5.0, 10.0
     frames = taxel.Frames(values, np.arange(20) * 1000, unit="N")

@@ -86,11 +86,11 @@ def test_bodies_side_by_side_share_the_foam():
     def held(*bodies):
         scene = Scene({"bodies": list(bodies), "foam": {"modulus_kpa": 1000.0, "dashpot_ms": 0.0}})
         events = play([Silence(100.0), scene], seed=1, sensor=quiet).events
-        picture = np.zeros((64, 64))
+        frame = np.zeros((64, 64))
         for event in range(len(events)):
             if events.t[event] < 100_000 + 40_000 + 18_000:
-                picture[events.y[event], events.x[event]] = events.intensity[event]
-        return picture
+                frame[events.y[event], events.x[event]] = events.intensity[event]
+        return frame
 
     two = held(block(26 * pitch, 9), block(34 * pitch, 9))
     one = held(block(30 * pitch, 17))

@@ -7,7 +7,7 @@ import pytest
 from refusal import refused
 
 from taxel import Array, ProblemError, SceneError
-from taxel.simulate import Pictures, Scene, Silence, play, truth
+from taxel.simulate import FrameSequence, Scene, Silence, play, truth
 
 FRAME_US = 192.0
 
@@ -121,11 +121,11 @@ def test_without_noise_an_untouched_board_is_silent_after_the_tare():
     assert (played.datagrams, played.words) == (2, 2)
 
 
-def test_pictures_touch_from_the_empty_one_before_to_the_empty_one_after():
+def test_frames_touch_from_the_empty_one_before_to_the_empty_one_after():
     values = np.zeros((5, 64, 64))
     values[2:4, 20:30, 20:30] = 0.5
-    contacts, _ = truth([Pictures(values, 2000.0)])
-    assert [(c.kind, c.start_us, c.stop_us) for c in contacts] == [("pictures", 2000.0, 8000.0)]
+    contacts, _ = truth([FrameSequence(values, 2000.0)])
+    assert [(c.kind, c.start_us, c.stop_us) for c in contacts] == [("frames", 2000.0, 8000.0)]
 
 
 @pytest.mark.parametrize(
@@ -155,11 +155,11 @@ def test_pictures_touch_from_the_empty_one_before_to_the_empty_one_after():
         ),
         (lambda: Scene.draw(1).motion(0), SceneError, "step"),
         (lambda: Scene.draw(1).motion("fast"), ProblemError, "step_us"),
-        (lambda: Pictures(np.zeros((2, 3)), 2000), ProblemError, "shape"),
-        (lambda: Pictures(np.full((1, 2, 2), 1.5), 2000), ProblemError, "0 to 1"),
-        (lambda: Pictures(np.full((1, 2, 2), np.nan), 2000), ProblemError, "0 to 1"),
-        (lambda: truth([Pictures(np.zeros((1, 64, 64)), 10.0)]), SceneError, "act 0"),
-        (lambda: truth([Pictures(np.zeros((1, 8, 8)), 2000)]), ProblemError, "act 0"),
+        (lambda: FrameSequence(np.zeros((2, 3)), 2000), ProblemError, "shape"),
+        (lambda: FrameSequence(np.full((1, 2, 2), 1.5), 2000), ProblemError, "0 to 1"),
+        (lambda: FrameSequence(np.full((1, 2, 2), np.nan), 2000), ProblemError, "0 to 1"),
+        (lambda: truth([FrameSequence(np.zeros((1, 64, 64)), 10.0)]), SceneError, "act 0"),
+        (lambda: truth([FrameSequence(np.zeros((1, 8, 8)), 2000)]), ProblemError, "act 0"),
         (lambda: truth([Silence(1.0), Silence(-1.0)]), SceneError, "act 1"),
         (lambda: truth(["silence"]), ProblemError, "act 0"),
         (lambda: truth([], preset="9 kHz"), ProblemError, "preset"),

@@ -9,7 +9,7 @@ from sound.things import ARRAY, EVENTS, FRAMES, TARE, Sound, plain
 from taxel.recording.contents import Contents, source_from
 from taxel.recording.parts import Origin
 
-#: A recording of numbered pictures, without times.
+#: A recording of numbered frames, without times.
 NUMBERED = Contents.of(source_from(FRAMES, Origin(Path("grasp"), "grasp", "icub"), untimed=True))
 
 #: A valid call of every public function and class with arguments, by its full name.

@@ -91,7 +91,7 @@ SOUND: dict[str, Sound] = {
         taxel.simulate.Board, "frame", ticks=np.zeros(4096, np.uint16), most=5, accepted=np.ones(4096, bool)
     ),
     "taxel.simulate.Board.record": fresh(taxel.simulate.Board, "record", start=True),
-    "taxel.simulate.Pictures": plain(taxel.simulate.Pictures, values=np.zeros((3, 64, 64)), period_us=192.0),
+    "taxel.simulate.FrameSequence": plain(taxel.simulate.FrameSequence, values=np.zeros((3, 64, 64)), period_us=192.0),
     "taxel.simulate.Scene": plain(lambda **given: taxel.simulate.Scene(**given).motion(), parameters=SCENE.parameters),
     "taxel.simulate.Scene.draw": plain(taxel.simulate.Scene.draw, seed=1, index=0, left_to_rest=False, array=None),
     "taxel.simulate.Scene.motion": method(SCENE, "motion", step_us=100.0, array=None),

@@ -31,7 +31,7 @@ def board(folder: Path, seed: int = 9) -> Path:
 
 
 def mat(folder: Path, seed: int = 3) -> Path:
-    """Write pictures of a mat in counts; return the file."""
+    """Write frames of a mat in counts; return the file."""
     rng, hz = np.random.default_rng(seed), 100
     values = 40 + rng.normal(0, 0.5, (6 * hz, 6, 6))
     begins = [hz + 60 * k for k in range(8)]
@@ -46,7 +46,7 @@ def mat(folder: Path, seed: int = 3) -> Path:
 
 
 def trials(folder: Path) -> Path:
-    """Write a folder of pictures in N, each with its labels; return it."""
+    """Write a folder of frames in N, each with its labels; return it."""
     place = folder / "trials"
     place.mkdir()
     for seed in range(3):

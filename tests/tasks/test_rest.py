@@ -23,9 +23,9 @@ from .recordings import board, mat, trials
 def test_forces_rest_at_0_and_other_values_at_their_first_quiet_stretch(tmp_path: Path) -> None:
     force = rest(taxel.open_all(trials(tmp_path))[0])
     assert (force.source, force.tare.rest.any(), force.to_dict()["us"]) == ("unit", np.False_, None)
-    pictures = rest(taxel.open(mat(tmp_path)))
-    assert (pictures.source, pictures.to_dict()["us"], pictures.detect_from_us) == ("quiet", [0, 500_000], None)
-    assert np.abs(pictures.tare.rest - 40).max() < 0.5
+    of_frames = rest(taxel.open(mat(tmp_path)))
+    assert (of_frames.source, of_frames.to_dict()["us"], of_frames.detect_from_us) == ("quiet", [0, 500_000], None)
+    assert np.abs(of_frames.tare.rest - 40).max() < 0.5
     events = rest(taxel.open(board(tmp_path)))
     assert (events.source, events.tare.stop_us - events.tare.start_us) == ("quiet", 500_000)
     assert events.tare.stop_us < 700_000

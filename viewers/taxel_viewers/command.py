@@ -59,7 +59,7 @@ def show(
 ) -> None:
     """Show a board or a recording in Rerun or Foxglove, beside the panel or without it.
 
-    A viewer that is missing, slow or stuck loses pictures, which are counted; it never delays what is received.
+    A viewer that is missing, slow or stuck loses frames, which are counted; it never delays what is received.
 
     Example: taxel show 'http://127.0.0.1:8080/#token=...' rerun --encoder fa1
     Example: taxel show walk.mcap foxglove --speed 0.1

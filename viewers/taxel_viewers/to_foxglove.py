@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import Detection, Note
-from taxel.live.client import Curves, Item, Picture, Spikes, Subject
-
-__all__ = ["ToFoxglove"]
+from taxel.live.client import Curves, Frame, Item, Spikes, Subject
 
 #: Messages that wait for each client; beyond them the server drops the oldest.
 _BACKLOG = 512
@@ -113,7 +111,7 @@ class ToFoxglove:
         """Why no viewer is connected."""
         return "no Foxglove is connected"
 
-    def begin(self, subject: Subject) -> None:  # noqa: ARG002  pictures bring its name
+    def begin(self, subject: Subject) -> None:  # noqa: ARG002  frames bring its name
         """Show another subject from now on."""
         if self._begun:
             # Time may begin anew, so that clients must discard what they have.
@@ -123,7 +121,7 @@ class ToFoxglove:
     def show(self, subject: Subject, item: Item) -> None:
         """Show the next item."""
         match item:
-            case Picture():
+            case Frame():
                 for name, (encoding, draw) in _IMAGES.items():
                     self._image(name, subject, item.t, encoding, draw(item))
             case Curves():
@@ -172,20 +170,20 @@ class ToFoxglove:
         self._images[name].log(image, log_time=_ns(t))
 
 
-def _pressure(picture: Picture) -> NDArray[np.uint8]:
-    scaled = np.minimum(picture.above.astype(np.int64) * 255 // picture.full, 255)
+def _pressure(frame: Frame) -> NDArray[np.uint8]:
+    scaled = np.minimum(frame.above.astype(np.int64) * 255 // frame.full, 255)
     drawn: NDArray[np.uint8] = _colours()[scaled]
-    drawn[~picture.known] = _UNKNOWN
+    drawn[~frame.known] = _UNKNOWN
     return drawn
 
 
-def _ticks(picture: Picture) -> NDArray[np.uint16]:
-    return picture.above.astype("<u2")
+def _ticks(frame: Frame) -> NDArray[np.uint16]:
+    return frame.above.astype("<u2")
 
 
-def _change(picture: Picture) -> NDArray[np.uint8]:
-    strength = np.abs(picture.change.astype(np.int16))[:, :, None] / picture.full_change
-    colour = np.where(picture.change[:, :, None] > 0, (255, 150, 50), (70, 150, 255))
+def _change(frame: Frame) -> NDArray[np.uint8]:
+    strength = np.abs(frame.change.astype(np.int16))[:, :, None] / frame.full_change
+    colour = np.where(frame.change[:, :, None] > 0, (255, 150, 50), (70, 150, 255))
     drawn: NDArray[np.uint8] = (strength * colour).astype(np.uint8)
     return drawn
 
@@ -199,8 +197,8 @@ def _colours() -> NDArray[np.uint8]:
     return table
 
 
-#: Pictures by topic, in colours and in numbers.
-_IMAGES: dict[str, tuple[str, Callable[[Picture], NDArray[Any]]]] = {
+#: Images by topic, in colours and in numbers.
+_IMAGES: dict[str, tuple[str, Callable[[Frame], NDArray[Any]]]] = {
     "/pressure": ("rgb8", _pressure),
     "/pressure/ticks": ("16UC1", _ticks),
     "/change": ("rgb8", _change),

@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 
 from taxel import Detection, Note
-from taxel.live.client import Curves, Item, Picture, Spikes, Subject
+from taxel.live.client import Curves, Frame, Item, Spikes, Subject
 from taxel.spikes import to_ms
 from taxel_viewers.kinds import Disconnected
-
-__all__ = ["ToRerun"]
 
 #: Name of the time line, which has the board's times.
 _TIME = "board"
@@ -77,8 +75,8 @@ class ToRerun:
     def show(self, subject: Subject, item: Item) -> None:  # noqa: ARG002  `begin` has set the subject
         """Show the next item."""
         match item:
-            case Picture():
-                self._picture(item)
+            case Frame():
+                self._frame(item)
             case Curves():
                 values = {"force_ticks": item.force, "area_taxels": item.area, "centre/x": item.x, "centre/y": item.y}
                 for name, column in values.items():
@@ -137,22 +135,22 @@ class ToRerun:
         times = self._rerun.TimeColumn(_TIME, duration=t_us.astype("timedelta64[us]"))
         self._stream.send_columns(name, [times], self._rerun.Scalars.columns(scalars=values.astype(np.float64)))
 
-    def _picture(self, picture: Picture) -> None:
-        self._at(picture.t)
-        colours = {"meter": 1.0, "colormap": "viridis", "depth_range": [0.0, float(picture.full)]}
-        self._stream.log("pressure", self._rerun.DepthImage(picture.above, **colours))
-        most = float(picture.full_change)
+    def _frame(self, frame: Frame) -> None:
+        self._at(frame.t)
+        colours = {"meter": 1.0, "colormap": "viridis", "depth_range": [0.0, float(frame.full)]}
+        self._stream.log("pressure", self._rerun.DepthImage(frame.above, **colours))
+        most = float(frame.full_change)
         colours = {"meter": 1.0, "colormap": "cyantoyellow", "depth_range": [-most, most]}
-        self._stream.log("change", self._rerun.DepthImage(picture.change.astype(np.int16), **colours))
-        if self._known is None or not np.array_equal(self._known, picture.known):
-            self._known = picture.known
-            self._stream.log("pressure/unknown", self._rerun.SegmentationImage((~picture.known).astype(np.uint8)))
+        self._stream.log("change", self._rerun.DepthImage(frame.change.astype(np.int16), **colours))
+        if self._known is None or not np.array_equal(self._known, frame.known):
+            self._known = frame.known
+            self._stream.log("pressure/unknown", self._rerun.SegmentationImage((~frame.known).astype(np.uint8)))
 
 
 def _layout() -> Any:
     """Return the arrangement of the views, which the user may change."""
     layout: Any = importlib.import_module("rerun.blueprint")
-    pictures = layout.Vertical(
+    images = layout.Vertical(
         layout.Spatial2DView(origin="pressure", name="Pressure above rest, ticks"),
         layout.Spatial2DView(origin="change", name="Change, ticks"),
     )
@@ -163,7 +161,7 @@ def _layout() -> Any:
         layout.TimeSeriesView(origin="contact/centre", name="Centre, taxels"),
         layout.TextLogView(origin="/", name="Detections and notes"),
     )
-    return layout.Blueprint(layout.Horizontal(pictures, curves), collapse_panels=True)
+    return layout.Blueprint(layout.Horizontal(images, curves), collapse_panels=True)
 
 
 def _described(detection: Detection) -> str:

@@ -14,13 +14,13 @@ from types import TracebackType
 from taxel import Detection, Note, ProblemError
 from taxel.encode import Encoder
 from taxel.live import Panel, PanelClient
-from taxel.live.client import Curves, Item, Picture, Spikes, Subject
+from taxel.live.client import Curves, Frame, Item, Spikes, Subject
 from taxel_viewers.kinds import Disconnected, viewer_at
 
-__all__ = ["MOST_OTHERS", "MOST_PICTURES", "BoundedQueue", "Viewer", "Viewing"]
+__all__ = ["MOST_FRAMES", "MOST_OTHERS", "BoundedQueue", "Viewer", "Viewing"]
 
-#: The largest numbers of waiting pictures and of other waiting items: curves, spikes, detections, notes.
-MOST_PICTURES, MOST_OTHERS = 32, 1024
+#: The largest numbers of waiting frames and of other waiting items: curves, spikes, detections, notes.
+MOST_FRAMES, MOST_OTHERS = 32, 1024
 
 #: The least and the greatest speed of a recording: board time over real time.
 SPEEDS = 0.001, 100.0
@@ -36,7 +36,7 @@ class Viewing:
     Parameters
     ----------
     sent, lost : dict
-        Numbers of pictures, times of the curves ("curves"), spikes, detections and notes that the viewer has received,
+        Numbers of frames, times of the curves ("curves"), spikes, detections and notes that the viewer has received,
         and of those that were dropped because it was not connected or too slow.
     there : bool
         Whether a viewer is connected.
@@ -47,7 +47,7 @@ class Viewing:
 
     Examples
     --------
-    >>> Viewing(sent={"pictures": 3}, there=True).lost
+    >>> Viewing(sent={"frames": 3}, there=True).lost
     {}
     """
 
@@ -63,7 +63,7 @@ class BoundedQueue:
 
     def __init__(self) -> None:
         self._items: deque[tuple[Subject, Item]] = deque()
-        self._pictures = 0
+        self._frames = 0
         self._changed = threading.Condition()
         self._in_hand: list[tuple[Subject, Item]] = []
         self.lost: Counter[str] = Counter()
@@ -71,20 +71,20 @@ class BoundedQueue:
     def put(self, subject: Subject, item: Item) -> None:
         """Append an item."""
         with self._changed:
-            is_picture = isinstance(item, Picture)
-            if is_picture and self._pictures == MOST_PICTURES:
-                self._drop(pictures=True)
-            elif not is_picture and len(self._items) - self._pictures == MOST_OTHERS:
-                self._drop(pictures=False)
+            is_frame = isinstance(item, Frame)
+            if is_frame and self._frames == MOST_FRAMES:
+                self._drop(frames=True)
+            elif not is_frame and len(self._items) - self._frames == MOST_OTHERS:
+                self._drop(frames=False)
             self._items.append((subject, item))
-            self._pictures += is_picture
+            self._frames += is_frame
             self._changed.notify()
 
-    def _drop(self, *, pictures: bool) -> None:
-        oldest = next(n for n, (_, item) in enumerate(self._items) if isinstance(item, Picture) == pictures)
+    def _drop(self, *, frames: bool) -> None:
+        oldest = next(n for n, (_, item) in enumerate(self._items) if isinstance(item, Frame) == frames)
         self.lost += _counted([self._items[oldest]])
         del self._items[oldest]
-        self._pictures -= pictures
+        self._frames -= frames
 
     def take_all(self, timeout: float) -> list[tuple[Subject, Item]]:
         """Return all items, which stay in hand until `done`; an empty list if none arrives within `timeout` s."""
@@ -92,7 +92,7 @@ class BoundedQueue:
             self._changed.wait_for(lambda: self._items, timeout)
             self._in_hand = list(self._items)
             self._items.clear()
-            self._pictures = 0
+            self._frames = 0
             return self._in_hand
 
     def waiting(self) -> Counter[str]:
@@ -109,10 +109,10 @@ class BoundedQueue:
 class Viewer:
     """Show a board, or a recording, in a Rerun viewer or in Foxglove. A context manager.
 
-    It is sent, on the board's time line: the picture above rest and the change, both with colours; force, area and
+    It is sent, on the board's time line: the frame above rest and the change, both with colours; force, area and
     centre of the contact as curves; an encoder's spikes, detections with their latency, a recording's notes. It is one
     more client of the panel, with threads of its own, so that a viewer that is missing, slow, stuck or ended delays
-    nothing. 32 pictures and 1024 other messages wait for it; beyond that the oldest are dropped, and counted.
+    nothing. 32 frames and 1024 other messages wait for it; beyond that the oldest are dropped, and counted.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class Viewer:
     speed : float, 0.001 to 100
         Of a recording: board time over real time.
     rate_hz : float, 1 to 60
-        Maximum number of pictures a second.
+        Maximum number of frames a second.
 
     Raises
     ------
@@ -263,8 +263,8 @@ def _counted(items: Iterable[tuple[Subject, Item]]) -> Counter[str]:
     count: Counter[str] = Counter()
     for _, item in items:
         match item:
-            case Picture():
-                count["pictures"] += 1
+            case Frame():
+                count["frames"] += 1
             case Curves():
                 count["curves"] += len(item.t)
             case Spikes():

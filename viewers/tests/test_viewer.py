@@ -34,9 +34,9 @@ from taxel import Detection, Note, ProblemError
 from taxel.cli import main
 from taxel.encode import ChangeEvents
 from taxel.live import Live, Panel
-from taxel.live.client import Picture, Subject
+from taxel.live.client import Frame, Subject
 from taxel_viewers import Viewer
-from taxel_viewers.viewer import MOST_OTHERS, MOST_PICTURES, BoundedQueue
+from taxel_viewers.viewer import MOST_FRAMES, MOST_OTHERS, BoundedQueue
 
 client = pytest.importorskip("websockets.sync.client", reason="the test extra brings websockets")
 
@@ -194,13 +194,13 @@ def test_foxglove_hears_a_recording_as_it_is(tmp_path: Path) -> None:
     heard = page.heard
     assert state.lost == {}
     assert state.sent == {
-        "pictures": len(heard["/pressure"]),
+        "frames": len(heard["/pressure"]),
         "curves": len(heard["/contact"]),
         "spikes": len(spikes_of(recording.events)),
         "detections": len(said),
         "notes": 1,
     }
-    # The last picture is that of the file's end, in colours and in ticks, whose brightest is pressed most.
+    # The last frame is that of the file's end, in colours and in ticks, whose brightest is pressed most.
     t_ns, last = heard["/pressure/ticks"][-1]
     assert (t_ns, last.width, last.height, last.encoding) == (1000 * recording.events.t[-1], 4, 4, "16UC1")
     ticks = np.frombuffer(last.data, "<u2").reshape(4, 4)
@@ -253,7 +253,7 @@ def test_rerun_hears_a_recording_as_it_is(tmp_path: Path, port: int) -> None:
             state = viewer.stop()
         kept = eventually(lambda: found if len((found := rows(tmp_path)).get("/detections", [])) == len(said) else None)
     assert state.lost == {}
-    assert state.sent["pictures"] == len(kept["/pressure"]) == len(kept["/change"])
+    assert state.sent["frames"] == len(kept["/pressure"]) == len(kept["/change"])
     t, last = kept["/pressure"][-1]
     assert t == recording.events.t[-1]
     (shape,) = last["DepthImage:format"]
@@ -378,11 +378,11 @@ def test_a_rerun_that_comes_back_is_shown_what_comes_then(tmp_path: Path, port: 
     ):
         for n in range(2):
             with receiver(tmp_path, port):
-                before = viewer.state.sent.get("pictures", 0)
+                before = viewer.state.sent.get("frames", 0)
                 play(presses(2), live.address[1])
-                eventually(lambda before=before: viewer.state.there and viewer.state.sent.get("pictures", 0) > before)
+                eventually(lambda before=before: viewer.state.there and viewer.state.sent.get("frames", 0) > before)
             eventually(lambda: not viewer.state.there)
-            assert n or viewer.state.sent["pictures"]
+            assert n or viewer.state.sent["frames"]
     assert len(list(tmp_path.glob("*.rrd"))) == 2
 
 
@@ -390,12 +390,12 @@ def test_what_waits_is_bounded_and_what_goes_is_counted() -> None:
     queue, one = BoundedQueue(), Subject("board", 1, 1)
     zero = np.zeros((1, 1), np.uint16)
     for t in range(3000):
-        queue.put(one, Picture(t, zero, zero == 0, zero.astype(np.int8), 1, 1))
+        queue.put(one, Frame(t, zero, zero == 0, zero.astype(np.int8), 1, 1))
         queue.put(one, Note("here", t))
-    assert queue.waiting() == {"pictures": MOST_PICTURES, "notes": MOST_OTHERS}
-    assert queue.lost == {"pictures": 3000 - MOST_PICTURES, "notes": 3000 - MOST_OTHERS}
+    assert queue.waiting() == {"frames": MOST_FRAMES, "notes": MOST_OTHERS}
+    assert queue.lost == {"frames": 3000 - MOST_FRAMES, "notes": 3000 - MOST_OTHERS}
     items = queue.take_all(0.0)
-    assert [item.t for _, item in items if isinstance(item, Picture)] == list(range(3000 - MOST_PICTURES, 3000))
+    assert [item.t for _, item in items if isinstance(item, Frame)] == list(range(3000 - MOST_FRAMES, 3000))
     assert [item.t for _, item in items if isinstance(item, Note)] == list(range(3000 - MOST_OTHERS, 3000))
     assert queue.waiting().total() == len(items)
     queue.done()

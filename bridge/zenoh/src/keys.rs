@@ -7,8 +7,8 @@ const ROOT: &str = "taxel";
 pub(crate) const BLOCK: &str = "wire/block";
 /// The same parcels for viewers: a slow subscriber loses some.
 pub(crate) const DROP: &str = "wire/drop";
-/// Low-rate pictures.
-pub(crate) const PICTURE: &str = "picture";
+/// Low-rate frames.
+pub(crate) const FRAME: &str = "frame";
 /// Detections, one at a time.
 pub(crate) const DETECTION: &str = "detection";
 /// Description of the sensor (queryable).

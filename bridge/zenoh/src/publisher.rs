@@ -75,7 +75,7 @@ struct Open {
     session: Session,
     block: Lane,
     drop: Lane,
-    pictures: zenoh::pubsub::Publisher<'static>,
+    frames: zenoh::pubsub::Publisher<'static>,
     detections: zenoh::pubsub::Publisher<'static>,
 }
 
@@ -135,9 +135,9 @@ impl Publisher {
         })
     }
 
-    /// Sends a picture.
-    fn picture(&self, py: Python<'_>, picture: Vec<u8>) -> PyResult<()> {
-        self.with(py, |open| open.pictures.put(picture).wait())
+    /// Sends a frame.
+    fn frame(&self, py: Python<'_>, frame: Vec<u8>) -> PyResult<()> {
+        self.with(py, |open| open.frames.put(frame).wait())
     }
 
     /// Sends a detection.
@@ -195,7 +195,7 @@ fn begin(session: Session, name: &str, about: Arc<RwLock<String>>, skew: Skew) -
             .express(true)
             .wait()
     };
-    let pictures = declare(keys::PICTURE, Priority::DataLow)?;
+    let frames = declare(keys::FRAME, Priority::DataLow)?;
     let detections = declare(keys::DETECTION, Priority::InteractiveHigh)?;
-    Ok(Open { session, block, drop, pictures, detections })
+    Ok(Open { session, block, drop, frames, detections })
 }

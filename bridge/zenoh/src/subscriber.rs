@@ -88,7 +88,7 @@ impl Subscriber {
         found.map_err(|e| PyConnectionError::new_err(first_line(&e)))
     }
 
-    /// Subscribes to `name`: to "block", "drop", "picture" or "detection".
+    /// Subscribes to `name`: to "block", "drop", "frame" or "detection".
     fn listen(&self, py: Python<'_>, name: &str, what: &str) -> PyResult<()> {
         if !is_name(name) {
             return Err(PyValueError::new_err(format!("name is {name:?}: must be 1 to 64 letters, digits, - _ or .")));
@@ -96,9 +96,9 @@ impl Subscriber {
         let what = match what {
             "block" => keys::BLOCK,
             "drop" => keys::DROP,
-            "picture" => keys::PICTURE,
+            "frame" => keys::FRAME,
             "detection" => keys::DETECTION,
-            _ => return Err(PyValueError::new_err(format!("{what:?}: must be block, drop, picture or detection"))),
+            _ => return Err(PyValueError::new_err(format!("{what:?}: must be block, drop, frame or detection"))),
         };
         py.detach(|| {
             let (give, messages) = channel::bounded(WAITING);

@@ -28,7 +28,7 @@ pub mod touch;
 mod trajectory;
 mod waves;
 
-pub use act::{Act, Pictures};
+pub use act::{Act, FrameSequence};
 pub use body::{Along, Body, Ending, Material, Move, Press};
 pub use bonded::Bonded;
 pub use foam::Foam;

@@ -210,7 +210,7 @@ impl Encoder {
         collect(&*stream, &out, events.t.first().copied(), end)
     }
 
-    /// Encodes a whole recording of pictures.
+    /// Encodes a whole recording of frames.
     ///
     /// # Errors
     ///

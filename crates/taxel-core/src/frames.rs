@@ -1,20 +1,20 @@
-//! Views of pictures of the whole array over time.
+//! Views of frames: values of the whole array over time.
 
 use crate::{Array, Result, Stop, problem};
 
-/// Pictures in memory of a caller (a file, NumPy), who must not change them meanwhile; this crate never copies many.
+/// Frames in memory of a caller (a file, NumPy), who must not change them meanwhile; this crate never copies many.
 #[derive(Debug, Clone, Copy)]
 pub struct FramesView<'a> {
     /// The sensor.
     pub array: &'a Array,
-    /// Time of each picture, us, ascending.
+    /// Time of each frame, us, ascending.
     pub t: &'a [i64],
-    /// Values, picture after picture, row by row, in the sensor's unit.
+    /// Values, frame after frame, row by row, in the sensor's unit.
     pub values: &'a [f32],
 }
 
 impl<'a> FramesView<'a> {
-    /// Checks that the number of values is that of pictures times taxels.
+    /// Checks that there is a value for each taxel of each frame.
     ///
     /// # Errors
     ///
@@ -24,15 +24,15 @@ impl<'a> FramesView<'a> {
         if n.checked_mul(taxels) == Some(values) {
             return Ok(());
         }
-        Err(problem!("frames: {values} values for {n} pictures of {taxels} taxels"))
+        Err(problem!("frames: {values} values for {n} frames of {taxels} taxels"))
     }
 
-    /// Each picture with its time, us.
+    /// Each frame with its time, us.
     pub fn iter(self) -> impl Iterator<Item = (i64, &'a [f32])> {
         self.t.iter().copied().zip(self.values.chunks_exact(self.array.len().max(1)))
     }
 
-    /// The changes of each taxel from picture to picture; one from or to a NaN has no direction and is none.
+    /// The changes of each taxel from frame to frame; one from or to a NaN has no direction and is none.
     ///
     /// # Errors
     ///
@@ -41,10 +41,10 @@ impl<'a> FramesView<'a> {
         let taxels = self.array.len();
         let mut changes = Changes { number: vec![0; taxels], on: vec![0; taxels] };
         let mut last = vec![0_i8; taxels];
-        for ((_, before), (_, picture)) in self.iter().zip(self.iter().skip(1)) {
+        for ((_, before), (_, frame)) in self.iter().zip(self.iter().skip(1)) {
             stop.check()?;
             let counts = changes.number.iter_mut().zip(&mut changes.on).zip(&mut last);
-            for ((&value, &before), ((number, on), last)) in picture.iter().zip(before).zip(counts) {
+            for ((&value, &before), ((number, on), last)) in frame.iter().zip(before).zip(counts) {
                 let way = i8::from(value > before) - i8::from(value < before);
                 *number += u32::from(way != 0);
                 *on += u32::from(way != 0 && way == *last);
@@ -55,7 +55,7 @@ impl<'a> FramesView<'a> {
     }
 }
 
-/// The changes of each taxel of pictures.
+/// The changes of each taxel of frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Changes {
     /// Number of changes.

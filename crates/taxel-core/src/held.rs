@@ -64,8 +64,8 @@ impl Held {
         self.values.fill(UNKNOWN);
     }
 
-    /// The values as a picture shows them, in which a taxel without any event so far is 0.
-    pub fn picture(&self) -> impl Iterator<Item = u16> {
+    /// The values as a frame shows them, in which a taxel without any event so far is 0.
+    pub fn frame(&self) -> impl Iterator<Item = u16> {
         self.values.iter().map(|&value| if value == UNKNOWN { 0 } else { value })
     }
 }

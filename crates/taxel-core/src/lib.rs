@@ -4,7 +4,7 @@
 //! Python, so the same bytes give the same result on a machine, however often they are processed and in however many
 //! threads.
 //!
-//! `Frames` exists here as a view only: pictures are read one by one from memory of the caller (a file, NumPy), so this
+//! `Frames` exists here as a view only: frames are read one by one from memory of the caller (a file, NumPy), so this
 //! crate never holds many.
 //!
 //! On another machine, the decoder, the board and everything that adds and multiplies in [`vectors`]' plain loops give

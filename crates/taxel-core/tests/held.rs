@@ -91,7 +91,7 @@ fn events_of_held_values_are_repaired_and_lead_back_to_them() {
     let mut held = Held::unknown(6);
     held.push(events.view());
     assert_eq!(held.values(), values);
-    assert_eq!(held.picture().collect::<Vec<_>>(), [5, 0, 0, 7, 0, 9]);
+    assert_eq!(held.frame().collect::<Vec<_>>(), [5, 0, 0, 7, 0, 9]);
     held.clear();
     assert_eq!(held, Held::unknown(6));
 }

@@ -53,7 +53,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["messages"],
             &["clients", "encoded_spikes", "recorder"],
             &["player"],
-            &["labels", "picture", "presets"],
+            &["frame", "labels", "presets"],
             &["live_source"],
             &["indexed"],
             &["folder"],

@@ -212,7 +212,7 @@ fn soak(registers: Registers, faults: Faults, seed: u64) {
     if *network
         == (taxel_core::board::NetworkCounts { given: network.given, delivered: network.given, ..Default::default() })
     {
-        assert_eq!(heard, counts.changes + decoder.two().counts().repaired);
+        assert_eq!(heard, counts.changes + decoder.version_2().counts().repaired);
     } else {
         assert!(heard > counts.changes / 2);
     }

@@ -146,6 +146,6 @@ fn one_delayed_datagram_is_no_restart() {
         for (at, one) in &arriving[1..] {
             sender.push(one, Some(9_000_000 + at), &mut events);
         }
-        assert_eq!((sender.two().counts().resets, sender.two().counts().missing), (0, 0), "seed {seed}");
+        assert_eq!((sender.version_2().counts().resets, sender.version_2().counts().missing), (0, 0), "seed {seed}");
     }
 }

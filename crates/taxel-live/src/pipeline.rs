@@ -4,7 +4,7 @@
 //! another thread before it calls a sink (`threads`). While a recording runs, which a disk may delay, there are
 //! separate threads for receiving ([`crate::capture`]), for decoding with recording, and for reading out; reading out
 //! also has its own thread if it is slower than the events arrive. The queues between the threads are bounded, and what
-//! does not fit is counted where it was lost. Viewers receive copies ([`Live::counters`], [`Live::picture`]) and cannot
+//! does not fit is counted where it was lost. Viewers receive copies ([`Live::counters`], [`Live::frame`]) and cannot
 //! slow the pipeline.
 
 mod ahead;
@@ -172,7 +172,7 @@ impl Live {
             (Some(record), None) => Some(Recorder::create(record, &options, &sources, receiver.place())?),
             (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, receiver.place())),
         };
-        let published = Published { picture: vec![0; options.array.len()], ..Published::default() };
+        let published = Published { frame: vec![0; options.array.len()], ..Published::default() };
         let shared = Arc::new(Shared {
             receiver,
             readout_queue: ReadoutQueue::new(&options.array, options.readout_events),
@@ -324,8 +324,8 @@ impl Live {
 
     /// The taxels' values, ticks, by taxel index, updated ten times a second; 0 for a taxel without any event so far.
     #[must_use]
-    pub fn picture(&self) -> Vec<u16> {
-        self.shared.published().picture.clone()
+    pub fn frame(&self) -> Vec<u16> {
+        self.shared.published().frame.clone()
     }
 
     /// The fresh tare, once it is complete.

@@ -9,6 +9,7 @@
 
 mod damage;
 mod event_pictures;
+mod frames;
 mod grey_picture;
 mod limits;
 mod lsa;
@@ -16,7 +17,6 @@ mod mcap_reader;
 mod mcap_writer;
 mod metadata;
 mod output;
-mod pictures;
 mod stream;
 mod topic;
 mod verdict;
@@ -30,11 +30,11 @@ use taxel_core::{Array, problem};
 pub(crate) use damage::{ADDRESS, EMPTY, REFUSED, add_order};
 pub use damage::{Found, LeftOut, damage, damage_of_version_1};
 pub use event_pictures::EventPictures;
+pub use frames::{Encoding, FrameSource, Frames};
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Message, Numbers, Place, Reader, Remarks, Unread, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
-pub use pictures::{Encoding, PictureSource, Pictures};
 pub use stream::{Faults, Samples, Stream, fields};
 pub use topic::Topic;
 pub(crate) use verdict::JUMPED_BEFORE;
@@ -46,8 +46,8 @@ pub use verdict::{Basis, Condition, Counts, Ending, NOTHING_LOST, Rebuilt, Statu
 /// machine.
 pub const FLUSH_EVERY: Duration = Duration::from_millis(20);
 
-/// From one low-rate picture to the next: in recordings where something comes, as the pipeline publishes them, and to other computers.
-pub const PICTURE_EVERY: Duration = Duration::from_millis(100);
+/// From one low-rate frame to the next: in recordings where something comes, as the pipeline publishes them, and to other computers.
+pub const LOW_RATE_EVERY: Duration = Duration::from_millis(100);
 
 /// Age of the oldest queued message at which the writing thread counts as starved of the processor: the next caller
 /// writes the queue.
@@ -85,10 +85,10 @@ pub struct Header {
     /// For a stream of numbers, the content of its lines; none for a board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<Stream>,
-    /// For a source of pictures, their unit and more; none for a board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pictures: Option<PictureSource>,
-    /// The other sources of the file: pictures on the same clock, any other with a clock of its own.
+    /// For a source of frames, their unit and more; none for a board.
+    #[serde(default, skip_serializing_if = "Option::is_none", alias = "pictures")]
+    pub frames: Option<FrameSource>,
+    /// The other sources of the file: frames on the same clock, any other with a clock of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Header>,
 }
@@ -180,13 +180,13 @@ impl std::str::FromStr for Compression {
 }
 
 impl Header {
-    /// The channels of the source: a board, a stream of numbers, or pictures.
+    /// The channels of the source: a board, a stream of numbers, or frames.
     fn topics(&self) -> impl Iterator<Item = Topic> {
-        let (stream, pictures) = (self.stream.is_some(), self.pictures.is_some());
+        let (stream, frames) = (self.stream.is_some(), self.frames.is_some());
         let belongs = move |topic: &Topic| match topic {
             Topic::Samples => stream,
-            Topic::Pictures => pictures,
-            Topic::Datagrams => !stream && !pictures,
+            Topic::Frames => frames,
+            Topic::Datagrams => !stream && !frames,
             Topic::Counts | Topic::Notes | Topic::Detections => true,
             _ => !stream,
         };
@@ -210,10 +210,10 @@ impl Header {
                 return Err(problem!("source {}: {n} columns of values, and {} taxels", self.name, self.array.len()));
             }
         }
-        if let Some(pictures) = &self.pictures {
-            pictures.check(&self.name, self.array.columns)?;
+        if let Some(frames) = &self.frames {
+            frames.check(&self.name, self.array.columns)?;
             if self.stream.is_some() {
-                return Err(problem!("source {}: is both a stream of numbers and pictures", self.name));
+                return Err(problem!("source {}: is both a stream of numbers and frames", self.name));
             }
         }
         let driven = self.driven.as_ref().unwrap_or(&self.array);
@@ -251,7 +251,7 @@ impl Header {
             name: board(),
             placement: Placement::default(),
             stream: None,
-            pictures: None,
+            frames: None,
             sources: vec![],
         }
     }

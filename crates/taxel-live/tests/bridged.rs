@@ -114,7 +114,7 @@ fn bridged(
                 }
                 k += 1;
             }
-            Some(Copied::Picture(_) | Copied::Detection(_)) => {}
+            Some(Copied::Frame(_) | Copied::Detection(_)) => {}
             None if copies.is_over() => break,
             None => {}
         }

@@ -88,7 +88,10 @@ fn what_was_written_is_read_back_with_any_compression() {
             Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5, repaired: true }
         );
         assert_eq!(remarks.registers[0].1, header().registers.unwrap());
-        assert_eq!((remarks.datagrams, remarks.datagram_bytes, remarks.pictures), (3000, 4_200_000, 1));
+        assert_eq!(
+            (remarks.datagrams, remarks.datagram_bytes, remarks.messages[&Topic::Pressure]),
+            (3000, 4_200_000, 1)
+        );
         let Some(Ending::Finished { counts }) = reader.ending() else { panic!("not finished") };
         assert_eq!((counts.received, counts.recorded, counts.verdict().text.as_str()), (3000, 3000, NOTHING_LOST));
     }

@@ -45,11 +45,11 @@ pub struct Keyframe {
 /// Where the rest comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RestSource {
-    /// A tare, or the values held at a moment; 0 of pictures of force or pressure.
+    /// A tare, or the values held at a moment; 0 of frames of force or pressure.
     Given,
     /// A quiet stretch, from which it is tracked.
     Quiet,
-    /// There was no quiet stretch so far: the taxels' first values, from which it is tracked; 0 of pictures.
+    /// There was no quiet stretch so far: the taxels' first values, from which it is tracked; 0 of frames.
     None,
 }
 
@@ -101,8 +101,8 @@ pub struct ArrayState {
     columns: usize,
     centre: Coordinates,
     weights: Weights,
-    /// Where the rest of pictures comes from, if pictures are shown ([`ArrayState::of_pictures`]).
-    pictures: Option<RestSource>,
+    /// Where the rest of frames comes from, if frames are shown ([`ArrayState::of_frames`]).
+    frames: Option<RestSource>,
     held: Held,
     rest: Rest<u16>,
     /// The rest as it is tracked; `None` where it was given.
@@ -147,7 +147,7 @@ impl ArrayState {
             columns,
             centre: Coordinates::new(array),
             weights: Weights::default(),
-            pictures: None,
+            frames: None,
             held: from.held.clone().into(),
             rest: Rest::measured(from.rest.clone()),
             tracked: Some(from.tracked.clone().unwrap_or_else(|| Box::new(tracked_from(columns, &from.rest)))),
@@ -174,11 +174,11 @@ impl ArrayState {
         state
     }
 
-    /// The state where pictures are shown: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change without
-    /// a value is a value that is missing from then on, and pictures are counted as events are. The sums have a floor of
+    /// The state where frames are shown: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change without
+    /// a value is a value that is missing from then on, and frames are counted as events are. The sums have a floor of
     /// steps above rest, and the columns of the array are of these sources.
     #[must_use]
-    pub(crate) fn of_pictures(
+    pub(crate) fn of_frames(
         mut self,
         from: &Keyframe,
         rest: RestSource,
@@ -186,7 +186,7 @@ impl ArrayState {
         weights: &Weights,
         source_of: Arc<[usize]>,
     ) -> Self {
-        (self.pictures, self.sum_floor) = (Some(rest), sum_floor);
+        (self.frames, self.sum_floor) = (Some(rest), sum_floor);
         (self.weights, self.source_of) = (weights.clone(), source_of);
         self.loads = vec![Load::default(); self.source_of.last().map_or(0, |last| last + 1)];
         self.time_columns = self.time_columns.with_sources(self.loads.len());
@@ -231,7 +231,7 @@ impl ArrayState {
         for together in changes.chunk_by(|one, next| one.t == next.t) {
             let t = together[0].t;
             self.advance(t);
-            self.events += if self.pictures.is_some() { 1 } else { together.len() as u64 };
+            self.events += if self.frames.is_some() { 1 } else { together.len() as u64 };
             together.iter().for_each(|change| self.apply_to_taxel(change));
             let column = match self.column {
                 Some(column) if self.within.contains(&t) => column,
@@ -252,7 +252,7 @@ impl ArrayState {
     #[inline]
     fn apply_to_taxel(&mut self, change: &Change) {
         let taxel = change.taxel as usize;
-        if change.ticks == UNKNOWN && self.pictures.is_some() {
+        if change.ticks == UNKNOWN && self.frames.is_some() {
             let above = self.above(taxel);
             self.held.set(taxel, UNKNOWN);
             return self.change_above_rest(taxel, above, 0);
@@ -427,7 +427,7 @@ impl ArrayState {
     /// Where the rest comes from.
     #[must_use]
     pub fn rest_source(&self) -> RestSource {
-        match (self.pictures, &self.tracked) {
+        match (self.frames, &self.tracked) {
             (Some(source), _) => source,
             (None, None) => RestSource::Given,
             (None, Some(tracked)) if tracked.quiet().is_some() => RestSource::Quiet,
@@ -506,7 +506,7 @@ impl ArrayState {
 
     /// Writes the current curve, and the values that have a curve each, into a column.
     fn store_curve(&mut self, column: i64) {
-        let missing = self.pictures.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN);
+        let missing = self.frames.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN);
         let curve = |load: &Load| load.curve(&self.centre, &self.weights);
         let whole = if missing { MISSING } else { curve(&self.load) };
         self.time_columns.set_curve(column, whole);

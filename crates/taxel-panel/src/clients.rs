@@ -28,8 +28,8 @@ pub(super) enum Broadcast {
 /// See the module.
 pub(super) struct Clients {
     messages: broadcast::Sender<Broadcast>,
-    /// Counts up when a new picture can be shown.
-    pictures: watch::Sender<u64>,
+    /// Counts up when a new frame can be shown.
+    frames: watch::Sender<u64>,
     count: Arc<AtomicUsize>,
 }
 
@@ -46,7 +46,7 @@ impl Clients {
     pub(super) fn new() -> Self {
         Self {
             messages: broadcast::channel(MOST_WAITING).0,
-            pictures: watch::channel(0).0,
+            frames: watch::channel(0).0,
             count: Arc::new(AtomicUsize::new(0)),
         }
     }
@@ -71,12 +71,12 @@ impl Clients {
         self.send(Broadcast::Text(message.text().into()));
     }
 
-    /// Announces to all sessions that a new picture can be shown.
-    pub(super) fn new_picture(&self) {
-        self.pictures.send_modify(|n| *n += 1);
+    /// Announces to all sessions that a new frame can be shown.
+    pub(super) fn new_frame(&self) {
+        self.frames.send_modify(|n| *n += 1);
     }
 
     pub(super) fn subscribe(&self) -> (broadcast::Receiver<Broadcast>, watch::Receiver<u64>) {
-        (self.messages.subscribe(), self.pictures.subscribe())
+        (self.messages.subscribe(), self.frames.subscribe())
     }
 }

@@ -41,7 +41,7 @@ impl Listener for LimitedListener {
             // axum's implementation retries after errors.
             let (stream, address) = Listener::accept(&mut self.listener).await;
             if let Ok(permit) = Arc::clone(&self.permits).try_acquire_owned() {
-                // Without this option pictures are sent a little later, which loses nothing.
+                // Without this option frames are sent a little later, which loses nothing.
                 let _ = stream.set_nodelay(true);
                 let quiet = Box::pin(tokio::time::sleep(QUIET));
                 return (LimitedConnection { stream, quiet, _permit: permit }, address);

@@ -1,4 +1,4 @@
-//! Spikes that an encoder makes of the changes or the pictures in a view: one by one, and counted by column of time.
+//! Spikes that an encoder makes of the changes or the frames in a view: one by one, and counted by column of time.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -9,7 +9,7 @@ use serde_json::json;
 use taxel_core::encode::{Encoder, Stream};
 use taxel_core::{Array, Events, Hint, Intensities, Spike, SpikeKind, problem};
 
-use super::keyframe_index::Pictures;
+use super::keyframe_index::FrameSources;
 use super::messages::Message;
 use super::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
@@ -22,14 +22,14 @@ const MOST: usize = 4096;
 /// Maximum number of changes converted at a time, which bounds the temporary memory.
 const PIECE: usize = 1 << 16;
 
-/// An encoder applied to the changes of a board, or to the pictures of each source.
+/// An encoder applied to the changes of a board, or to the frames of each source.
 #[derive(Clone)]
 pub(super) struct EncodedSpikes {
     name: String,
-    /// One of a board; of pictures one a source.
+    /// One of a board; of frames one a source.
     encoders: Vec<OfSource>,
-    /// What is encoded, if it is pictures.
-    pictures: Option<Arc<dyn Pictures>>,
+    /// What is encoded, if it is frames.
+    frames: Option<Arc<dyn FrameSources>>,
     array: Array,
     column_us: i64,
     /// Spike counts of each row by column of time, ascending by number.
@@ -48,7 +48,7 @@ struct OfSource {
     /// Number of its first train among those of all sources.
     first: u32,
     rows: usize,
-    /// Number of the next picture.
+    /// Number of the next frame.
     next: usize,
 }
 
@@ -65,7 +65,7 @@ impl EncodedSpikes {
         Ok(Self {
             name,
             encoders,
-            pictures: None,
+            frames: None,
             array: array.clone(),
             column_us,
             columns: VecDeque::new(),
@@ -95,44 +95,44 @@ impl EncodedSpikes {
         Ok(spikes)
     }
 
-    /// Begins an encoder for each source with its last picture up to `since` (us), or with its first one.
+    /// Begins an encoder for each source with its last frame up to `since` (us), or with its first one.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the encoder does not fit a sensor, or the pictures have no times.
-    pub(super) fn of_pictures(
+    /// `Core(Problem)` where the encoder does not fit a sensor, or the frames have no times.
+    pub(super) fn of_frames(
         encoder: &Encoder,
-        pictures: &Arc<dyn Pictures>,
+        frames: &Arc<dyn FrameSources>,
         column_us: i64,
         since: Option<i64>,
     ) -> Result<Self> {
-        if pictures.numbered() {
-            let text = "spikes have times, and these pictures are numbered, so their rate is not known";
+        if frames.numbered() {
+            let text = "spikes have times, and these frames are numbered, so their rate is not known";
             return Err(problem!("{text}").helped_by("rate_hz", Hint::Give).into());
         }
-        let sensors = pictures.sensors();
-        let mut spikes = Self::begun(encoder, &sensors, pictures.array(), column_us)?;
-        spikes.pictures = Some(Arc::clone(pictures));
+        let sensors = frames.sensors();
+        let mut spikes = Self::begun(encoder, &sensors, frames.array(), column_us)?;
+        spikes.frames = Some(Arc::clone(frames));
         if let Some(t) = since {
             for (source, of) in spikes.encoders.iter_mut().enumerate() {
-                of.next = pictures.until(source, t).saturating_sub(1);
+                of.next = frames.until(source, t).saturating_sub(1);
             }
-            spikes.push_pictures(t);
+            spikes.push_frames(t);
             spikes.forget();
         }
         Ok(spikes)
     }
 
-    /// Encodes the first two pictures of each source.
+    /// Encodes the first two frames of each source.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` where the encoder does not encode them.
     pub(super) fn check(mut self) -> Result<()> {
-        if let Some(pictures) = self.pictures.clone() {
-            let second = (0..self.encoders.len()).filter_map(|source| pictures.picture(source, 1));
+        if let Some(frames) = self.frames.clone() {
+            let second = (0..self.encoders.len()).filter_map(|source| frames.frame(source, 1));
             if let Some(t) = second.map(|(t, _)| t).max() {
-                self.push_pictures(t);
+                self.push_frames(t);
             }
         }
         self.failed.map_or(Ok(()), |reason| Err(problem!("{reason}").into()))
@@ -144,9 +144,9 @@ impl EncodedSpikes {
         self.columns.clear();
     }
 
-    /// Encodes the next changes; pictures are read from their index as time advances.
+    /// Encodes the next changes; frames are read from their index as time advances.
     pub(super) fn push(&mut self, changes: &[Change]) {
-        if self.pictures.is_some() {
+        if self.frames.is_some() {
             return;
         }
         for piece in changes.chunks(PIECE) {
@@ -155,9 +155,9 @@ impl EncodedSpikes {
         }
     }
 
-    /// Informs the encoder that no change before `t` (us) will follow; pictures up to then are encoded.
+    /// Informs the encoder that no change before `t` (us) will follow; frames up to then are encoded.
     pub(super) fn advance(&mut self, t: i64) {
-        self.push_pictures(t);
+        self.push_frames(t);
         if self.failed.is_none() {
             let from = self.pending.len();
             self.encoders.iter_mut().for_each(|of| emit(&mut self.pending, of, |stream, out| stream.advance(t, out)));
@@ -175,14 +175,12 @@ impl EncodedSpikes {
         self.pushed(pushed, from);
     }
 
-    /// Encodes the pictures up to `t` (us) that have not been encoded yet.
-    fn push_pictures(&mut self, t: i64) {
-        let Some(pictures) = self.pictures.clone().filter(|_| self.failed.is_none()) else { return };
+    /// Encodes the frames up to `t` (us) that have not been encoded yet.
+    fn push_frames(&mut self, t: i64) {
+        let Some(frames) = self.frames.clone().filter(|_| self.failed.is_none()) else { return };
         let (from, mut pushed) = (self.pending.len(), Ok(()));
         for (source, of) in self.encoders.iter_mut().enumerate() {
-            while let Some((at, values)) =
-                pictures.picture(source, of.next).filter(|&(at, _)| at <= t && pushed.is_ok())
-            {
+            while let Some((at, values)) = frames.frame(source, of.next).filter(|&(at, _)| at <= t && pushed.is_ok()) {
                 of.next += 1;
                 pushed = emit(&mut self.pending, of, |stream, out| stream.push_frame(at, &values, out));
             }

@@ -13,7 +13,7 @@ use taxel_live::{Error, Result, open_regular};
 use tokio::sync::OwnedMutexGuard;
 
 use super::indexed::Indexed;
-use super::keyframe_index::pictures::PictureIndex;
+use super::keyframe_index::frames::FrameIndex;
 use super::keyframe_index::recording::RecordingIndex;
 
 /// Maximum number of recordings in a list.
@@ -149,21 +149,21 @@ pub(super) fn size(path: &Path) -> Result<u64> {
 /// An index that others hold.
 enum WeakIndex {
     Events(Weak<RecordingIndex>),
-    Pictures(Weak<PictureIndex>),
+    Frames(Weak<FrameIndex>),
 }
 
 impl WeakIndex {
     fn of(indexed: &Indexed) -> Self {
         match indexed {
             Indexed::Events(index) => Self::Events(Arc::downgrade(index)),
-            Indexed::Pictures(index) => Self::Pictures(Arc::downgrade(index)),
+            Indexed::Frames(index) => Self::Frames(Arc::downgrade(index)),
         }
     }
 
     fn upgrade(&self) -> Option<Indexed> {
         match self {
             Self::Events(index) => index.upgrade().map(Indexed::Events),
-            Self::Pictures(index) => index.upgrade().map(Indexed::Pictures),
+            Self::Frames(index) => index.upgrade().map(Indexed::Frames),
         }
     }
 }

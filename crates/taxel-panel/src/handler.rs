@@ -11,7 +11,7 @@ use taxel_core::Array;
 use taxel_core::wire::Command;
 
 use super::keyframe_index::Activity;
-use super::keyframe_index::pictures::PictureIndex;
+use super::keyframe_index::frames::FrameIndex;
 
 /// The answer to a request, or the reason for a refusal in words for a person.
 pub type Reply<T> = Result<T, String>;
@@ -159,13 +159,13 @@ pub enum Opening {
 pub enum ReadFile {
     /// Events: a `.mcap` that holds them.
     Events(PathBuf),
-    /// Pictures.
-    Pictures(PicturesRead),
+    /// Frames.
+    Frames(FramesRead),
 }
 
-/// Pictures that were read.
+/// Frames that were read.
 #[derive(Debug)]
-pub struct PicturesRead(pub Box<PictureIndex>);
+pub struct FramesRead(pub Box<FrameIndex>);
 
 /// The stretch of a recording that is to be cut out.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -222,8 +222,8 @@ pub trait FileRequests: Send + Sync {
     /// Reads a recording that is no file of a board's events.
     fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile>;
 
-    /// Finds taxels of a recording of pictures that are dead, stuck or noisy.
-    fn health_of_pictures(&self, path: &Path, trial: Option<&str>) -> Reply<UnhealthyTaxels>;
+    /// Finds taxels of a recording of frames that are dead, stuck or noisy.
+    fn health_of_frames(&self, path: &Path, trial: Option<&str>) -> Reply<UnhealthyTaxels>;
 
     /// Writes a stretch of a recording to a new file; returns what that file cannot hold.
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>>;

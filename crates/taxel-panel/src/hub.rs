@@ -177,8 +177,8 @@ impl Hub {
             if received.zeroed {
                 self.clients.send_message(&self.zeroed_message());
             }
-            if received.picture {
-                self.clients.new_picture();
+            if received.frame {
+                self.clients.new_frame();
             }
             if counted.elapsed() < COUNT_EVERY {
                 continue;
@@ -189,7 +189,7 @@ impl Hub {
             }
             self.send_counters(&live, &counters, before.as_ref(), counted.elapsed().as_secs_f64());
             (counted, before) = (Instant::now(), Some(counters));
-            self.clients.new_picture();
+            self.clients.new_frame();
             let connected = self.board().control.is_some();
             if has_clients && connected && reading_lines.as_ref().is_none_or(tokio::task::JoinHandle::is_finished) {
                 let hub = Arc::clone(&self);
@@ -267,12 +267,12 @@ impl Hub {
             (board.registers, board.known)
         };
         let held = Registers { record: false, ..registers };
-        let own = || presets::equal_to(&held, &self.presets().presets);
+        let of_user = || presets::equal_to(&held, &self.presets().presets);
         Message::Registers {
             known,
             stated: self.options.registers_stated,
             values: registers,
-            preset: presets::built_in_equal_to(&held, live.as_ref().map(|live| live.array())).or_else(own),
+            preset: presets::built_in_equal_to(&held, live.as_ref().map(|live| live.array())).or_else(of_user),
             frame_us: registers.frame_us(),
             warnings: registers.warnings(),
         }
@@ -285,7 +285,7 @@ impl Hub {
         let UserPresets { path, presets } = self.presets().clone();
         Message::Presets {
             built_in: built_in.into_iter().map(|preset| preset.name).collect(),
-            own: presets,
+            user: presets,
             path: path.display().to_string(),
         }
     }

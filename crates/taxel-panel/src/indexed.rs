@@ -1,13 +1,13 @@
-//! A recording of the folder with its index: of events or of pictures, and the messages about it.
+//! A recording of the folder with its index: of events or of frames, and the messages about it.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::array_state::RestSource;
 use super::keyframe_index::KeyframeIndex;
-use super::keyframe_index::pictures::{PictureIndex, PicturePlace};
+use super::keyframe_index::frames::{FrameIndex, FramePlace};
 use super::keyframe_index::recording::RecordingIndex;
-use super::messages::{FoundDetection, Marker, Message, PictureSource, Pictures, RecordedNote};
+use super::messages::{FoundDetection, FrameRecording, FrameSource, Marker, Message, RecordedNote};
 use super::time_columns::{COLUMN_US, TimeColumns};
 
 /// A label may lie so long before the first event or after the last one, us.
@@ -20,7 +20,7 @@ const MOST_DETECTIONS: usize = 10_000;
 #[derive(Debug, Clone)]
 pub(super) enum Indexed {
     Events(Arc<RecordingIndex>),
-    Pictures(Arc<PictureIndex>),
+    Frames(Arc<FrameIndex>),
 }
 
 /// The recording that a client shows.
@@ -36,7 +36,7 @@ impl Indexed {
     pub(super) fn index(&self) -> Arc<dyn KeyframeIndex> {
         match self {
             Self::Events(index) => Arc::new(Arc::clone(index)),
-            Self::Pictures(index) => Arc::new(Arc::clone(index)),
+            Self::Frames(index) => Arc::new(Arc::clone(index)),
         }
     }
 
@@ -44,15 +44,15 @@ impl Indexed {
     pub(super) fn trial(&self) -> Option<&str> {
         match self {
             Self::Events(_) => None,
-            Self::Pictures(index) => index.file.trial.as_deref(),
+            Self::Frames(index) => index.file.trial.as_deref(),
         }
     }
 
-    /// Time in the index of one us of the file: above 1 where pictures are numbered, one a us.
+    /// Time in the index of one us of the file: above 1 where frames are numbered, one a us.
     pub(super) fn us(&self) -> i64 {
         match self {
             Self::Events(_) => 1,
-            Self::Pictures(index) => index.file.picture_us.unwrap_or(1),
+            Self::Frames(index) => index.file.number_us.unwrap_or(1),
         }
     }
 
@@ -61,8 +61,8 @@ impl Indexed {
         let Some((first, last)) = self.index().range() else { return Ok(()) };
         let late_us = match self {
             Self::Events(_) => LATE_LABEL_US,
-            // A picture holds until the next one.
-            Self::Pictures(index) => index.picture_us(),
+            // A frame holds until the next one.
+            Self::Frames(index) => index.frame_us(),
         };
         let (beyond, end) = match (first - t_us, t_us - last) {
             (before, _) if before > late_us => (before, "before the begin"),
@@ -72,7 +72,7 @@ impl Indexed {
         #[allow(clippy::cast_precision_loss)]
         let far = match self.us() {
             1 => format!("{:.3} s", beyond as f64 / 1e6),
-            us => format!("{} pictures", beyond / us),
+            us => format!("{} frames", beyond / us),
         };
         Err(format!("a label {far} {end} of {name}: must lie within it"))
     }
@@ -84,7 +84,7 @@ impl Indexed {
                 let (start, step, events) = &index.event_rate;
                 (*start, *step, events.len(), events.clone())
             }
-            Self::Pictures(index) => {
+            Self::Frames(index) => {
                 let (start, step, bins) = index.bins();
                 (start, step, bins, vec![])
             }
@@ -102,14 +102,14 @@ impl Indexed {
         let touch = index.time_columns().and_then(TimeColumns::first_touch);
         let touch_us =
             touch.zip(range).map(|(column, (first, last))| ((column + 1) * COLUMN_US - 1).clamp(first, last));
-        let (events, pictures) = match self {
+        let (events, frames) = match self {
             Self::Events(index) => (Some(index), None),
-            Self::Pictures(index) => (None, Some(index)),
+            Self::Frames(index) => (None, Some(index)),
         };
         let registers = events.and_then(|index| index.header().registers);
         let (remarks, note_sources) = match self {
             Self::Events(index) => (&index.remarks, &[][..]),
-            Self::Pictures(index) => (&index.file.remarks, &index.file.note_sources[..]),
+            Self::Frames(index) => (&index.file.remarks, &index.file.note_sources[..]),
         };
         let us = self.us();
         let note_sources = note_sources.iter().map(String::as_str).chain(std::iter::repeat(""));
@@ -128,14 +128,14 @@ impl Indexed {
             array: index.array().into(),
             start_us: range.map(|(first, _)| first),
             stop_us: range.map(|(_, last)| last),
-            touch_us: touch_us.map(|t| pictures.and_then(|index| index.picture_until(t)).unwrap_or(t)),
+            touch_us: touch_us.map(|t| frames.and_then(|index| index.frame_until(t)).unwrap_or(t)),
             events: events.map_or(0, |index| index.events),
             bytes,
             train,
-            pictures: pictures.map(|index| about_pictures(index)),
+            frames: frames.map(|index| about_frames(index)),
             verdict: match self {
                 Self::Events(index) => index.verdict.clone(),
-                Self::Pictures(index) => index.file.verdict.clone(),
+                Self::Frames(index) => index.file.verdict.clone(),
             },
             unfinished: events.is_some_and(|index| index.unfinished),
             preload_at: events.map_or_else(String::new, |index| index.preload_at.clone()),
@@ -151,10 +151,10 @@ impl Indexed {
     }
 }
 
-/// What `opened` says of pictures.
-fn about_pictures(index: &PictureIndex) -> Pictures {
+/// What `opened` says of frames.
+fn about_frames(index: &FrameIndex) -> FrameRecording {
     let file = &index.file;
-    let source = |(place, rest, falls, preload_at): (&PicturePlace, RestSource, bool, &str)| PictureSource {
+    let source = |(place, rest, falls, preload_at): (&FramePlace, RestSource, bool, &str)| FrameSource {
         name: place.name.clone(),
         left: place.left,
         rows: place.rows,
@@ -163,14 +163,14 @@ fn about_pictures(index: &PictureIndex) -> Pictures {
         falls,
         preload_at: preload_at.to_owned(),
     };
-    Pictures {
-        count: index.pictures,
+    FrameRecording {
+        count: index.count,
         unit: file.unit.clone(),
         step: index.step,
         zero: index.zero,
         floor: index.floor,
         newtons: index.newtons,
-        picture_us: file.picture_us,
+        number_us: file.number_us,
         sources: index.places().map(source).collect(),
         flickering: index.flickering().collect(),
         trial: file.trial.clone(),

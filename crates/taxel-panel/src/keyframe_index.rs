@@ -5,8 +5,8 @@
 
 mod activity;
 mod event_rate;
+pub mod frames;
 pub mod live;
-pub mod pictures;
 pub mod recording;
 
 use std::sync::Arc;
@@ -44,12 +44,12 @@ pub trait ChangeReader: Send {
     fn read(&mut self, out: &mut Vec<Change>) -> Result<Read>;
 }
 
-/// The pictures of several sources, one by one.
-pub trait Pictures: Send + Sync {
+/// The frames of several sources, one by one.
+pub trait FrameSources: Send + Sync {
     /// The sensor that joins those of all sources.
     fn array(&self) -> &Array;
 
-    /// Whether the pictures are numbered, as their times are not known.
+    /// Whether the frames are numbered, as their times are not known.
     fn numbered(&self) -> bool;
 
     /// Where the rest of the sources comes from; none where they differ.
@@ -67,12 +67,12 @@ pub trait Pictures: Send + Sync {
     /// The sensor of each source.
     fn sensors(&self) -> Vec<Array>;
 
-    /// Number of pictures of a source up to a time, us.
+    /// Number of frames of a source up to a time, us.
     fn until(&self, source: usize, t: i64) -> usize;
 
-    /// A picture of a source: its time (us), and its values in the unit, NaN where one is missing; whole values are those of
+    /// A frame of a source: its time (us), and its values in the unit, NaN where one is missing; whole values are those of
     /// the file, others differ by half a step at most. `None` after the last one.
-    fn picture(&self, source: usize, k: usize) -> Option<(i64, Vec<f32>)>;
+    fn frame(&self, source: usize, k: usize) -> Option<(i64, Vec<f32>)>;
 }
 
 /// Keyframes of a source and what reads on from them.
@@ -83,9 +83,9 @@ pub trait KeyframeIndex: Send + Sync {
     /// The noise floor, ticks above rest.
     fn noise_floor(&self) -> u16;
 
-    /// The pictures, if it holds such: then the rest is that of the keyframe and of [`Read::Rest`], and a change without a
+    /// The frames, if it holds such: then the rest is that of the keyframe and of [`Read::Rest`], and a change without a
     /// value is a value that is missing from then on.
-    fn pictures(&self) -> Option<Arc<dyn Pictures>> {
+    fn frames(&self) -> Option<Arc<dyn FrameSources>> {
         None
     }
 

@@ -73,7 +73,7 @@ impl LabelChange {
         }
     }
 
-    /// The same change at a whole multiple of `us`: at a picture, where pictures are numbered.
+    /// The same change at a whole multiple of `us`: at a frame, where frames are numbered.
     pub(super) fn at_whole(self, us: i64) -> Self {
         let whole = |t: i64| t.div_euclid(us) * us;
         match self {

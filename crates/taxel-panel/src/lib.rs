@@ -1,8 +1,8 @@
 //! The live panel: a server for browsers and other clients that show a board or recordings (docs/panel-protocol.md).
 //!
-//! One thread serves all clients. It works on copies of the events ([`taxel_live::pipeline::ViewerEvents`]) and sends a picture
+//! One thread serves all clients. It works on copies of the events ([`taxel_live::pipeline::ViewerEvents`]) and sends a frame
 //! only when a client has asked for one, so that a client that reads slowly, or never, delays nothing but its own
-//! pictures. What takes long or belongs to other parts of the program (the board's serial line, cutting, label tables) is
+//! frames. What takes long or belongs to other parts of the program (the board's serial line, cutting, label tables) is
 //! left to the program that started the panel, through [`RequestHandlers`].
 
 mod array_state;
@@ -12,6 +12,7 @@ mod clients;
 mod connections;
 mod encoded_spikes;
 mod folder;
+mod frame;
 mod handler;
 mod hub;
 mod indexed;
@@ -25,7 +26,6 @@ mod load;
 mod messages;
 mod opening;
 mod options;
-mod picture;
 mod player;
 mod presets;
 mod recorder;
@@ -54,11 +54,11 @@ pub fn message_schemas() -> String {
 
 pub use array_state::RestSource;
 pub use handler::{
-    BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, LabelConflict, LabelEdit, LabelRequests,
-    LabelRow, LabelTable, Opening, PicturesRead, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
+    BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FramesRead, LabelConflict, LabelEdit,
+    LabelRequests, LabelRow, LabelTable, Opening, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
     TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
-pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource};
+pub use keyframe_index::frames::{FrameFile, FrameIndex, FramePlace, FrameRest, FrameSource};
 pub use options::PanelOptions;
 pub use server::Panel;

@@ -6,5 +6,5 @@ pub(super) const MOST_BYTES: usize = 1 << 22;
 /// Maximum number of labels that a request marks.
 pub(super) const MOST_MARKS: usize = 5000;
 
-/// Maximum number of pictures on their way.
+/// Maximum number of frames on their way.
 pub(super) const MOST_CREDITS: u32 = 8;

@@ -54,8 +54,8 @@ struct Silence {
 /// What arrived since the last call of [`LiveSource::receive`].
 #[derive(Default)]
 pub(super) struct Received {
-    /// A new picture can be shown.
-    pub(super) picture: bool,
+    /// A new frame can be shown.
+    pub(super) frame: bool,
     /// The board was reset.
     pub(super) reset: bool,
     /// Taxels were zeroed.
@@ -135,7 +135,7 @@ impl LiveSource {
             reach_us: self.index.range(),
             reach_bytes: self.index.bytes(),
             viewers,
-            pictures_per_s: 0.0,
+            sent_frames_per_s: 0.0,
             ended: self.handle.is_over(),
         }
     }
@@ -175,13 +175,13 @@ impl LiveSource {
             state.apply(&stored.piece.changes);
             let mut activity = lock(&self.activity);
             stored.piece.changes.iter().for_each(|change| activity.count(change));
-            received.picture |= !stored.piece.changes.is_empty();
+            received.frame |= !stored.piece.changes.is_empty();
         }
         drop(events);
         received.detections.extend(self.detections.try_iter());
         self.apply_rest();
         received.zeroed = self.apply_zeroings();
-        received.picture |= received.zeroed;
+        received.frame |= received.zeroed;
         received
     }
 

@@ -1,4 +1,4 @@
-//! The messages to clients, but for pictures. They are described here alone: `tools/messages.py` makes of them the types of the
+//! The messages to clients, but for frames. They are described here alone: `tools/messages.py` makes of them the types of the
 //! page and of the Python client, and the tables of docs/panel-protocol.md.
 
 use std::collections::BTreeMap;
@@ -53,7 +53,7 @@ pub(super) enum Message {
         column_us: i64,
         /// The narrowest and the widest that `zoom` takes, us.
         columns_us: (i64, i64),
-        /// Columns of time in a picture, at most.
+        /// Columns of time in a frame, at most.
         time_columns: i64,
         /// Bytes of a request, at most.
         most_message_bytes: usize,
@@ -81,7 +81,7 @@ pub(super) enum Message {
     Presets {
         built_in: Vec<&'static str>,
         /// Those of the user, which hold every field.
-        own: BTreeMap<String, UserPreset>,
+        user: BTreeMap<String, UserPreset>,
         /// The file of the user's: a table a preset, which can be edited by hand.
         path: String,
     },
@@ -113,8 +113,8 @@ pub(super) enum Message {
         reach_us: Option<(i64, i64)>,
         reach_bytes: usize,
         viewers: usize,
-        /// Pictures sent to this client.
-        pictures_per_s: f64,
+        /// Frames sent to this client.
+        sent_frames_per_s: f64,
         /// Whether the source has ended, by an error or its owner.
         ended: bool,
     },
@@ -200,7 +200,7 @@ pub(super) enum Message {
         labels: Vec<String>,
         detections: Vec<FoundDetection>,
     },
-    /// The answer to `open`, before its first picture; `labels` and `transport` follow.
+    /// The answer to `open`, before its first frame; `labels` and `transport` follow.
     Opened {
         name: String,
         array: ArrayInfo,
@@ -209,16 +209,16 @@ pub(super) enum Message {
         stop_us: Option<i64>,
         /// The time of the greatest force in the first touch; null where there is no force.
         touch_us: Option<i64>,
-        /// 0 of pictures.
+        /// 0 of frames.
         events: u64,
         bytes: u64,
         /// The command that trains on its labels.
         train: String,
-        pictures: Option<Pictures>,
-        /// What was lost; empty where a file of pictures does not say.
+        frames: Option<FrameRecording>,
+        /// What was lost; empty where a file of frames does not say.
         verdict: String,
         unfinished: bool,
-        /// Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of pictures.
+        /// Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of frames.
         preload_at: String,
         /// The pace of the recorded arrivals, where the recording holds them.
         pace: Option<Pace>,
@@ -241,7 +241,7 @@ pub(super) enum Message {
         source: Option<String>,
         start_us: i64,
         step_us: i64,
-        /// Empty of pictures.
+        /// Empty of frames.
         events: Vec<u64>,
         /// Empty where the recording is too long for its curves to be stored.
         force: Vec<u32>,
@@ -432,10 +432,10 @@ pub(super) struct FoundDetection {
     pub(super) known_us: i64,
 }
 
-/// A recording of pictures.
+/// A recording of frames.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct Pictures {
+pub(super) struct FrameRecording {
     pub(super) count: u64,
     pub(super) unit: String,
     /// A value is `(ticks - zero) * step`.
@@ -446,24 +446,24 @@ pub(super) struct Pictures {
     /// The force of 1 in the sums of the curves, N, where values are in kPa and the area of each taxel is known: each counts by
     /// its area; else null, and 1 is a step.
     pub(super) newtons: Option<f64>,
-    /// A number where the pictures have no times: picture k is then at k times that many us, in all messages; show the number,
+    /// A number where the frames have no times: frame k is then at k times that many us, in all messages; show the number,
     /// no seconds. Tables of labels hold the numbers.
-    pub(super) picture_us: Option<i64>,
-    pub(super) sources: Vec<PictureSource>,
+    pub(super) number_us: Option<i64>,
+    pub(super) sources: Vec<FrameSource>,
     /// Taxels that never count as above rest.
     pub(super) flickering: Vec<(usize, usize)>,
     pub(super) trial: Option<String>,
     /// The trials of a file with several.
     pub(super) trials: Vec<String>,
-    /// These are only the pictures at the beginning of a large text table, and reading it all takes about so many seconds;
+    /// These are only the frames at the beginning of a large text table, and reading it all takes about so many seconds;
     /// `loading` follows each second, and then `opened` again, with all of it, at the same time of the view.
     pub(super) left_s: Option<f64>,
 }
 
-/// A source of pictures; sources stand side by side in `array`.
+/// A source of frames; sources stand side by side in `array`.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(super) struct PictureSource {
+pub(super) struct FrameSource {
     pub(super) name: String,
     /// Its first column.
     pub(super) left: u16,

@@ -10,7 +10,7 @@ use taxel_live::recording::Reader;
 
 use super::clients::Broadcast;
 use super::folder::size;
-use super::handler::{Opening, PicturesRead, ReadFile, Reply};
+use super::handler::{FramesRead, Opening, ReadFile, Reply};
 use super::hub::Hub;
 use super::indexed::Indexed;
 use super::keyframe_index::recording::RecordingIndex;
@@ -37,9 +37,9 @@ pub(super) async fn index(hub: &Arc<Hub>, name: &str, trial: Option<&str>) -> Re
     let file = path.clone();
     let failed = || problem!("{name}: failed within taxel; please report it");
     let asked = hub.options().open_by_handler && hub.options().open.as_deref() == Some(name);
-    let own = tokio::task::spawn_blocking(move || if asked { Ok(None) } else { of_a_board(&file) });
-    let own = own.await.map_err(|_| failed())??;
-    let indexed = match own {
+    let board = tokio::task::spawn_blocking(move || if asked { Ok(None) } else { of_a_board(&file) });
+    let board = board.await.map_err(|_| failed())??;
+    let indexed = match board {
         Some(index) => Indexed::Events(index),
         None => {
             let (indexed, left_s) = read(hub, &path, trial, Opening::Beginning).await?;
@@ -56,7 +56,7 @@ pub(super) async fn index(hub: &Arc<Hub>, name: &str, trial: Option<&str>) -> Re
 /// The index of a file of a board's events; `None` for any other file, an MCAP file of other programs among them.
 fn of_a_board(path: &Path) -> Result<Option<Arc<RecordingIndex>>> {
     let events = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("mcap") => Reader::open(path).is_ok_and(|recording| recording.header().pictures.is_none()),
+        Some("mcap") => Reader::open(path).is_ok_and(|recording| recording.header().frames.is_none()),
         Some("lsa") => true,
         _ => false,
     };
@@ -73,9 +73,9 @@ async fn read(hub: &Hub, path: &Path, trial: Option<&str>, opening: Opening) -> 
             let index = index.map_err(|_| problem!("{}: failed within taxel; please report it", path.display()))??;
             Ok((Indexed::Events(index), None))
         }
-        ReadFile::Pictures(PicturesRead(index)) => {
+        ReadFile::Frames(FramesRead(index)) => {
             let left_s = index.file.left_s;
-            Ok((Indexed::Pictures(Arc::new(*index)), left_s))
+            Ok((Indexed::Frames(Arc::new(*index)), left_s))
         }
     }
 }

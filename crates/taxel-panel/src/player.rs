@@ -50,7 +50,7 @@ pub struct Player {
     reader: Box<dyn ChangeReader>,
     state: ArrayState,
     /// First column that the state has itself; earlier ones come from the whole source.
-    first_own: i64,
+    first_of_view: i64,
     /// Changes that were read, and how many of them were applied.
     pending: Vec<Change>,
     applied: usize,
@@ -66,7 +66,7 @@ impl Player {
     /// # Errors
     ///
     /// As [`KeyframeIndex::open`] and [`ChangeReader::read`]; `Core(Problem)` where the encoder does not fit the array, or
-    /// the pictures.
+    /// the frames.
     pub fn open(index: Arc<dyn KeyframeIndex>, t: i64, options: ViewOptions) -> Result<Self> {
         let (first, last) = index.range().ok_or_else(|| problem!("nothing to show: it holds no events"))?;
         let t = t.clamp(first, last);
@@ -79,22 +79,22 @@ impl Player {
         let unit_us = options.column_us.min(COLUMN_US);
         let bytes = TimeColumns::bytes_for(index.array(), span / unit_us);
         let mut state = ArrayState::new(index.array(), index.noise_floor(), &keyframe, unit_us, bytes);
-        if let Some(pictures) = index.pictures() {
-            let (rest, floor) = (pictures.rest_source(), pictures.sum_floor());
-            state = state.of_pictures(&keyframe, rest, floor, pictures.weights(), pictures.source_of());
+        if let Some(frames) = index.frames() {
+            let (rest, floor) = (frames.rest_source(), frames.sum_floor());
+            state = state.of_frames(&keyframe, rest, floor, frames.weights(), frames.source_of());
         }
-        let first_own = keyframe.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
+        let first_of_view = keyframe.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
         let history = options.watched.map(|taxel| {
             let held = keyframe.held.get(taxel as usize).copied().unwrap_or(UNKNOWN);
             TaxelHistory::new(taxel, held, keyframe.latest, options.column_us)
         });
-        let spikes = options.encoder.as_ref().map(|encoder| match index.pictures() {
-            Some(pictures) => EncodedSpikes::of_pictures(encoder, &pictures, options.column_us, keyframe.latest),
+        let spikes = options.encoder.as_ref().map(|encoder| match index.frames() {
+            Some(frames) => EncodedSpikes::of_frames(encoder, &frames, options.column_us, keyframe.latest),
             None => EncodedSpikes::new(encoder, index.array(), options.column_us, &keyframe.held, keyframe.latest),
         });
         let spikes = spikes.transpose()?;
         let mut player =
-            Self { index, reader, state, first_own, pending: vec![], applied: 0, t, history, spikes, options };
+            Self { index, reader, state, first_of_view, pending: vec![], applied: 0, t, history, spikes, options };
         player.advance(t)?;
         Ok(player)
     }
@@ -249,6 +249,6 @@ impl Player {
     pub fn time_columns(&self) -> (&TimeColumns, i64, Option<&TimeColumns>) {
         let whole =
             if self.options.is_narrow() { None } else { self.options.whole.as_deref().or(self.index.time_columns()) };
-        (self.state.time_columns(), self.first_own, whole)
+        (self.state.time_columns(), self.first_of_view, whole)
     }
 }

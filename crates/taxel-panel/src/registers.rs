@@ -155,15 +155,15 @@ pub(super) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
     let live = hub.live().ok_or("no board is listened to")?;
     let array = live.array();
     ensure_known(hub).await?;
-    let own = hub.presets().presets.get(name).cloned();
+    let of_user = hub.presets().presets.get(name).cloned();
     let target = if PRESETS.iter().any(|preset| preset.name == name) {
         let preset = Registers::preset_on(name, array).map_err(|error| Refusal::of("name", error))?;
         hub.board().registers.with_preset(&preset, array)
-    } else if let Some(own) = own {
+    } else if let Some(of_user) = of_user {
         // A preset of the user holds every register, also the version of the wire.
-        let own =
-            presets::to_registers(&own).map_err(|error| Refusal::of("name", format!("preset {name}: {error}")))?;
-        Registers { lines: own.lines.min(array.columns), ..own }
+        let of_user =
+            presets::to_registers(&of_user).map_err(|error| Refusal::of("name", format!("preset {name}: {error}")))?;
+        Registers { lines: of_user.lines.min(array.columns), ..of_user }
     } else {
         return Err(Refusal::of("name", format!("there is no preset {name}")));
     };

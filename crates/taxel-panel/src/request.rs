@@ -20,14 +20,14 @@ pub(super) type Taxel = (u16, u16);
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(tag = "type"))]
 pub(super) enum Request {
-    /// Credits for `n` more pictures.
+    /// Credits for `n` more frames.
     Credit { n: Whole<1, { MOST_CREDITS as i64 }> },
     /// Send this taxel's history; `null` for none.
     Watch { taxel: Option<Taxel> },
     /// The held values are the rest from now on (`now`, "reset intensity"), or find it again (`lowest`): that of the next quiet
     /// half second, tracked from there. The live source changes for all clients.
     Rest { how: RestHow },
-    /// The values that these taxels hold now are their rest from now on, for the readout's encoder, the pictures of the
+    /// The values that these taxels hold now are their rest from now on, for the readout's encoder, the frames of the
     /// recording and this panel; all or none. The recording notes the time and the rests before and after. Refused for a taxel
     /// without events, while a tare is taken, and while a `.lsa` is recorded. Answered at once; `zeroed` follows.
     Zero { taxels: OneOrMore<Taxel> },
@@ -87,7 +87,7 @@ pub(super) enum Request {
     /// A label at this time of the recording shown. A live view: at this time of the recording that runs. With `source` it is of
     /// this source alone. One of the same name, time, source and trial is not made twice. With `replaces_us` it replaces the
     /// recording's own note of that time (and source), which counts no more. Refused outside the recording: of events more than a
-    /// second before the first or after the last one, of pictures more than one picture.
+    /// second before the first or after the last one, of frames more than one frame.
     Mark { label: Text<200>, t_us: BoardTime, source: Option<Text<64>>, replaces_us: Option<BoardTime> },
     /// Several labels, all or none: each entry is a label at one time or more, its keys as of `mark`; `replaces_us` has as many
     /// times as `t_us`. At most 5000 labels.
@@ -120,7 +120,7 @@ pub(super) enum Request {
     /// Receive the board's datagrams there instead. Refused while a recording runs.
     Listen { host: Text<255>, port: u16 },
     /// Whether the board sends differences from the value before, not values. Earlier events were decoded with the other
-    /// meaning, so the source begins anew: time, picture, the past that can be viewed, a readout with its tare. Refused while a
+    /// meaning, so the source begins anew: time, values, the past that can be viewed, a readout with its tare. Refused while a
     /// recording runs.
     DeltaIntensity { on: bool },
     /// Requests `places`: where a board can be.

@@ -225,9 +225,9 @@ async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Message> {
     let source = shown.map(|shown| shown.name.clone());
     let (array, activity) = match shown {
         Some(Shown { indexed: Indexed::Events(index), .. }) => (index.header().array.clone(), index.activity.clone()),
-        Some(Shown { name, trial, indexed: indexed @ Indexed::Pictures(_) }) => {
+        Some(Shown { name, trial, indexed: indexed @ Indexed::Frames(_) }) => {
             let (path, trial, taxels) = (hub.folder.file(name)?, trial.clone(), taxels(indexed.index().array()));
-            let found = hub.ask(move |handlers| handlers.files.health_of_pictures(&path, trial.as_deref())).await?;
+            let found = hub.ask(move |handlers| handlers.files.health_of_frames(&path, trial.as_deref())).await?;
             return Ok(Message::Health { source, taxels, active: taxels, found });
         }
         None => {
@@ -252,7 +252,7 @@ async fn cut(hub: &Hub, shown: Option<&Shown>, (start_us, stop_us): (i64, i64), 
     if out.exists() {
         return Err(Refusal::of("name", format!("{to} exists already; name another")));
     }
-    // The first picture from the start on, and the first after the end.
+    // The first frame from the start on, and the first after the end.
     let in_file = |t: i64| -(-t).div_euclid(us);
     let (start_us, stop_us) = (in_file(start_us), in_file(stop_us));
     let lost = hub

@@ -17,15 +17,15 @@ use serde_json::{Map, Value};
 use tokio::sync::{broadcast, mpsc, watch};
 
 use super::clients::{Broadcast, ClientSlot};
+use super::frame::RECORDS;
 use super::hub::Hub;
 use super::limits::MOST_BYTES;
 use super::messages::Message;
-use super::picture::RECORDS;
 use super::refusal::{Answer, Refusal};
 use super::registers::prepare;
 use super::request::Request;
 use connection::{Closing, Connection, GOING_AWAY, Incoming, POLICY, TOO_BIG};
-use flow::{FRAME, FlowControl};
+use flow::{FRAME_TIME, FlowControl};
 use pending::PendingRequests;
 use viewport::Viewport;
 
@@ -88,7 +88,7 @@ impl Session {
             let what = keys.get("type").and_then(Value::as_str).unwrap_or_default().to_owned();
             let Ok(request) = Request::read(&what, keys) else { continue };
             while !self.pending.has_room() {
-                tokio::time::sleep(FRAME).await;
+                tokio::time::sleep(FRAME_TIME).await;
             }
             if request.changes_labels() {
                 self.pending.begin(&self.hub, Value::Null, what, request, text.len(), self.viewport.shown());
@@ -104,7 +104,7 @@ impl Session {
         mut end: watch::Receiver<bool>,
         mut answers: mpsc::Receiver<Message>,
     ) -> Result<(), Closing> {
-        let (mut messages, mut pictures) = self.hub.clients.subscribe();
+        let (mut messages, mut frames) = self.hub.clients.subscribe();
         let hub = Arc::clone(&self.hub);
         prepare(&hub).await;
         for message in [
@@ -118,9 +118,9 @@ impl Session {
             self.connection.send_message(&message).await?;
         }
         loop {
-            // A picture that became due less than a frame after the last one is sent with the next frame.
+            // A frame that became due less than `FRAME_TIME` after the last one is sent when that time has passed.
             let due = self.viewport.is_playing() || self.viewport.is_dirty() && self.flow.has_credit();
-            let tick = tokio::time::sleep(if due { FRAME } else { IDLE });
+            let tick = tokio::time::sleep(if due { FRAME_TIME } else { IDLE });
             tokio::select! {
                 biased;
                 () = async { drop(end.wait_for(|ended| *ended).await) } => {
@@ -142,11 +142,11 @@ impl Session {
                     }
                 },
                 Some(answer) = answers.recv() => self.connection.send_message(&answer).await?,
-                _ = pictures.changed() => self.viewport.mark_dirty(),
+                _ = frames.changed() => self.viewport.mark_dirty(),
                 () = tick => {}
             }
             self.connection.keep_alive().await?;
-            self.send_picture().await?;
+            self.send_frame().await?;
             self.send_spikes().await?;
             for text in self.viewport.take_warnings() {
                 self.connection.send_message(&Message::warning(text)).await?;
@@ -159,8 +159,8 @@ impl Session {
         match message {
             Broadcast::Text(text) => self.connection.send_text(&text).await,
             Broadcast::Counters(mut counters) => {
-                if let Message::Counters { pictures_per_s, .. } = &mut *counters {
-                    *pictures_per_s = self.flow.pictures_per_s();
+                if let Message::Counters { sent_frames_per_s, .. } = &mut *counters {
+                    *sent_frames_per_s = self.flow.frames_per_s();
                 }
                 self.connection.send_message(&counters).await
             }
@@ -188,8 +188,8 @@ impl Session {
         }
     }
 
-    /// Sends a picture where there is a credit, something new, and a frame has passed since the last one.
-    async fn send_picture(&mut self) -> Result<(), Closing> {
+    /// Sends a frame where there is a credit, something new, and [`FRAME_TIME`] has passed since the last one.
+    async fn send_frame(&mut self) -> Result<(), Closing> {
         if !self.flow.is_due() {
             return Ok(());
         }
@@ -202,13 +202,13 @@ impl Session {
         self.viewport.update_narrow().await;
         let records = self.hub.recorder.file().is_some() || self.hub.board().registers.record;
         let flags = if records { RECORDS } else { 0 };
-        let Some(picture) = self.viewport.picture(flags, self.flow.number()) else { return Ok(()) };
-        self.flow.count_picture();
-        self.connection.send_bytes(picture).await
+        let Some(frame) = self.viewport.frame(flags, self.flow.number()) else { return Ok(()) };
+        self.flow.count_frame();
+        self.connection.send_bytes(frame).await
     }
 
     async fn send_spikes(&mut self) -> Result<(), Closing> {
-        if self.spikes_sent.elapsed() < FRAME {
+        if self.spikes_sent.elapsed() < FRAME_TIME {
             return Ok(());
         }
         self.spikes_sent = Instant::now();

@@ -11,7 +11,7 @@ pub const COLUMN_US: i64 = 4000;
 /// The narrowest and the widest column of time, us; allowed widths double from one to the next.
 pub const COLUMNS_US: (i64, i64) = (125, 125 << 20);
 
-/// Columns of time in a picture: 5 s at the default width, 0.16 s at the narrowest, 45 hours at the widest.
+/// Columns of time in a frame: 5 s at the default width, 0.16 s at the narrowest, 45 hours at the widest.
 pub const SPAN: i64 = 1250;
 
 /// A change that arrives at most this late still enters the raster and the curves, us.
@@ -410,5 +410,5 @@ pub const NOTHING: Curve = Curve { sum: 0, area: 0, x: f32::NAN, y: f32::NAN };
 /// The sum of a source of which no taxel has a value.
 pub const MISSING_SUM: u32 = u32::MAX;
 
-/// The curve of a picture in which no taxel has a value.
+/// The curve of a frame in which no taxel has a value.
 pub const MISSING: Curve = Curve { area: u32::MAX, ..NOTHING };

@@ -301,13 +301,13 @@ export class Board {
 
   showPresets() {
     if (!this.presets) return;
-    const { built_in, own, path } = this.presets;
+    const { built_in, user, path } = this.presets;
     const group = (/** @type {string} */ label, /** @type {string[]} */ names) =>
       names.length ? [make("optgroup", { label }, ...names.map((name) => make("option", { value: name }, name)))] : [];
     const none = make("option", { value: "" }, "as set below");
-    this.select.replaceChildren(none, ...group("Built in", built_in), ...group("Your own", Object.keys(own)));
+    this.select.replaceChildren(none, ...group("Built in", built_in), ...group("Your own", Object.keys(user)));
     this.select.value = this.preset ?? "";
-    part("preset-delete", HTMLButtonElement).disabled = !(this.select.value in own);
+    part("preset-delete", HTMLButtonElement).disabled = !(this.select.value in user);
     entitle(part("preset-path", HTMLElement), "title", path);
   }
 

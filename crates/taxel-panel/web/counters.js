@@ -20,7 +20,7 @@ const LOSSES = {
 /**
  * Writes the counters.
  * @param {CountersMessage | null} counters of the live source
- * @param {number} drawn pictures a second
+ * @param {number} drawn frames a second
  */
 export function writeCounters(counters, drawn) {
   const number = (/** @type {number | null | undefined} */ value, /** @type {(value: number) => string} */ how) => (value === null || value === undefined ? "–" : how(value));

@@ -103,7 +103,7 @@ export class Cursor {
     event.preventDefault();
   }
 
-  /** Draws the lines at the cursor and at the time of the picture. */
+  /** Draws the lines at the cursor and at the time shown. */
   draw() {
     const timeline = this.timeline();
     const place = (/** @type {HTMLElement} */ line, /** @type {number | null} */ t_us) => {
@@ -116,7 +116,7 @@ export class Cursor {
     place(part("time-line", HTMLElement), timeline?.following ? null : t_us);
   }
 
-  /** Writes the values at the cursor, or at the time of the picture. */
+  /** Writes the values at the cursor, or at the time shown. */
   write() {
     const timeline = this.timeline();
     const place = timeline?.pointed ?? -1;
@@ -136,7 +136,7 @@ export class Cursor {
     const written = timeline.sums(place).map((sum) => (Number.isNaN(sum) ? "missing" : `${sums.step === 1 ? whole(sum) : rounded(sum * sums.step)} ${sums.unit}`));
     outputs.forEach((output, k) => write(output, written[k] ?? ""));
     if (Number.isNaN(timeline.sum[place])) {
-      write(part("picture-info", HTMLElement), "missing");
+      write(part("shown-info", HTMLElement), "missing");
       for (const id of ["force-area", "centre-now"]) write(part(id, HTMLElement), "");
       return;
     }
@@ -146,7 +146,7 @@ export class Cursor {
     write(part("centre-now", HTMLElement), centre);
     const channels = this.sensor?.kind === "channels";
     const sum = written.length > 1 ? written.map((one, k) => `${this.sensor?.sources[k].name ?? ""} ${one}`).join(", ") : written[0];
-    write(part("picture-info", HTMLElement), `${sum}${channels ? "" : ` over ${area}, centre (${this.sensor?.axes.join(", ") ?? ""}): ${centre}`}`);
+    write(part("shown-info", HTMLElement), `${sum}${channels ? "" : ` over ${area}, centre (${this.sensor?.axes.join(", ") ?? ""}): ${centre}`}`);
   }
 
   /** @param {Timeline} timeline @param {number} place @returns {string} the centre of pressure, of several sources of each that is pressed */

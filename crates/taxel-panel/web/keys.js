@@ -20,7 +20,7 @@ export const KEYS = [
   { keys: ["x"], shown: "X", text: "lanes: twice the stretch of time", action: "zoomOut" },
   { keys: ["a"], shown: "A", text: "lanes: all of the time", action: "showAll" },
   { keys: ["l"], shown: "L", text: "follow the board live", action: "live" },
-  { keys: ["m"], shown: "M", text: "mark a label at the cursor, else at the picture's time", action: "mark" },
+  { keys: ["m"], shown: "M", text: "mark a label at the cursor, else at the time shown", action: "mark" },
   { keys: ["n"], shown: "N", text: "to the next label", action: "nextLabel" },
   { keys: ["p"], shown: "P", text: "to the label before", action: "labelBefore" },
   { keys: ["Delete"], shown: "Delete", text: "delete the chosen label", action: "deleteLabel" },

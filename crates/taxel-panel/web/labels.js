@@ -139,7 +139,7 @@ export class Labels {
     this.clicked = name;
   }
 
-  /** Marks at the cursor, or at the picture. */
+  /** Marks at the cursor, or at the time shown. */
   markHere() {
     this.player.meant(this.timeline()?.cursor_us).then((t_us) => this.mark(t_us));
   }
@@ -190,7 +190,7 @@ export class Labels {
     this.save({ type: "delete", label_id }).then(() => notify(`deleted ${label} at ${seconds(t_us)}`, false, { text: "Undo", action: undo }), this.failed);
   }
 
-  /** @param {number} by 1: the next label after the picture's time, -1: the one before */
+  /** @param {number} by 1: the next label after the time shown, -1: the one before */
   go(by) {
     const now = this.player.goal ?? 0;
     const others = this.labels.filter(({ t_us }) => (by > 0 ? t_us > now : t_us < now));

@@ -15,7 +15,7 @@ import { Maps } from "./maps.js";
 import { Notes } from "./notes.js";
 import { failed, notify, silence } from "./notice.js";
 import { Player } from "./player.js";
-import { readPicture } from "./protocol.js";
+import { readFrame } from "./protocol.js";
 import { Raster } from "./raster.js";
 import { Recorder } from "./recorder.js";
 import { Server } from "./server.js";
@@ -50,7 +50,7 @@ const NAMED_CHANNELS = 8;
 
 const settings = new Settings();
 const fragment = new URLSearchParams(location.hash.slice(1));
-const server = new Server(fragment.get("token") ?? "", receive, receivePicture, showConnection);
+const server = new Server(fragment.get("token") ?? "", receive, receiveFrame, showConnection);
 const player = new Player(server, failed);
 const detections = new Detections((t_us) => player.seek(t_us));
 const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.columns_us ?? null, () => {
@@ -97,9 +97,9 @@ let recordings = null;
 let mapsDue = false;
 let lanesDue = true;
 let marksDue = true;
-/** Only the line at the picture's time is to be drawn again. */
+/** Only the line at the time shown is to be drawn again. */
 let timeDue = true;
-/** Pictures drawn in the last second. */
+/** Frames drawn in the last second. */
 let drawn = 0;
 
 // ------------------------------------------------------------------------------------------------ connection
@@ -122,26 +122,26 @@ function writeState() {
   writePace(opened ? opened.pace : (counters?.pace ?? null));
 }
 
-/** Whether there are two maps to choose from: of pictures there are no events, and of channels no map, only their values. */
-const hasMaps = () => !opened?.pictures && maps.geometry.kind !== "channels";
+/** Whether there are two maps to choose from: of frames there are no events, and of channels no map, only their values. */
+const hasMaps = () => !opened?.frames && maps.geometry.kind !== "channels";
 
 /** The maps that are shown. */
 const mapsShown = () => (hasMaps() ? settings.values.maps : "pressure");
 
-/** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of pictures. */
+/** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of frames. */
 function showUnits() {
-  const pictures = opened?.pictures;
-  const { unit, step, zero } = pictures ?? { unit: "ticks", step: 1, zero: 0 };
-  maps.values = { unit, step, zero, pictures: pictures !== null && pictures !== undefined };
+  const frames = opened?.frames;
+  const { unit, step, zero } = frames ?? { unit: "ticks", step: 1, zero: 0 };
+  maps.values = { unit, step, zero, frames: frames !== null && frames !== undefined };
   lanes.values = { step, zero };
   cursor.values = { unit, step, zero };
-  numbering.picture_us = pictures?.picture_us ?? null;
+  numbering.number_us = frames?.number_us ?? null;
   numbering.begin_us = beginning(opened?.start_us ?? null);
   write(part("begun", HTMLElement), begun() && `0 s: ${begun()}`);
   const trials = part("trials", HTMLSelectElement);
-  trials.hidden = !pictures?.trials.length;
-  trials.replaceChildren(...(pictures?.trials ?? []).map((name) => make("option", { value: name }, name)));
-  trials.value = pictures?.trial ?? "";
+  trials.hidden = !frames?.trials.length;
+  trials.replaceChildren(...(frames?.trials ?? []).map((name) => make("option", { value: name }, name)));
+  trials.value = frames?.trial ?? "";
   showSums();
   showLanes();
 }
@@ -149,7 +149,7 @@ function showUnits() {
 /** Shows the sum of the values: as force where it is in N, or known of a pressure. */
 function showSums() {
   const { unit, step } = maps.values;
-  const newtons = opened?.pictures?.newtons ?? null;
+  const newtons = opened?.frames?.newtons ?? null;
   const sums = newtons === null ? { unit, step } : { unit: "N", step: newtons };
   lanes.sum_step = sums.step;
   cursor.sums = sums;
@@ -163,8 +163,8 @@ function arrangement() {
   const of = geometry.kind === "channels" ? geometry.count : 0;
   /** @type {[typeof LANES[number], boolean][]} */
   const all = [
-    // Of pictures and channels the values say more than their changes.
-    ["raster", values.showRaster && (values.raster === "spikes" || (!opened?.pictures && !of))],
+    // Of frames and channels the values say more than their changes.
+    ["raster", values.showRaster && (values.raster === "spikes" || (!opened?.frames && !of))],
     ["channels", values.showRaster && of > 0 && of <= MOST_CHANNELS],
     ["taxel", values.showTaxel && maps.taxel !== null],
     ["force", values.showForce],
@@ -191,7 +191,7 @@ function resize(array) {
     timeline = new Timeline(array.rows, hello?.column_us ?? 4000);
     timeWindow.forget();
   }
-  maps.size(array, opened?.pictures?.sources ?? []);
+  maps.size(array, opened?.frames?.sources ?? []);
   lanes.size(maps.geometry);
   cursor.sensor = maps.geometry;
   showSums();
@@ -202,7 +202,7 @@ function resize(array) {
 
 /**
  * Names the sources that stand one above the other; else the channels, or only the first and the last without names or of many.
- * @param {{ array: import("./messages.js").ArrayInfo, there: number[], sources: import("./messages.js").PictureSource[] }} sensor
+ * @param {{ array: import("./messages.js").ArrayInfo, there: number[], sources: import("./messages.js").FrameSource[] }} sensor
  */
 function showChannels({ array, there, sources }) {
   part("channels-block", HTMLElement).style.setProperty("--count", String(there.length));
@@ -215,23 +215,23 @@ function showChannels({ array, there, sources }) {
 }
 
 /** @param {ArrayBuffer} buffer */
-function receivePicture(buffer) {
-  const picture = readPicture(buffer);
-  if (!timeline || picture.rows !== timeline.rows || picture.columns !== maps.columns) {
-    resize({ rows: picture.rows, columns: picture.columns, pitch_mm: null, name: "", exists: null });
+function receiveFrame(buffer) {
+  const frame = readFrame(buffer);
+  if (!timeline || frame.rows !== timeline.rows || frame.columns !== maps.columns) {
+    resize({ rows: frame.rows, columns: frame.columns, pitch_mm: null, name: "", exists: null });
   }
   if (!timeline) return;
   const followed = timeline.following;
-  timeline.put(picture);
-  timeWindow.follow(picture);
-  if (followed !== picture.following) timeWindow.ask();
-  maps.take(picture);
-  player.t_us = picture.t_us;
-  if (picture.following && player.transport.state !== "following" && player.transport.source === null) move({ ...player.transport, source: null, state: "following" });
+  timeline.put(frame);
+  timeWindow.follow(frame);
+  if (followed !== frame.following) timeWindow.ask();
+  maps.take(frame);
+  player.t_us = frame.t_us;
+  if (frame.following && player.transport.state !== "following" && player.transport.source === null) move({ ...player.transport, source: null, state: "following" });
   mapsDue = timeDue = true;
   // Of a window that does not follow the newest, the columns change only where the server sends all of them, or where it moves.
-  if (picture.following || picture.restart) lanesDue = true;
-  if (picture.following) marksDue = true;
+  if (frame.following || frame.restart) lanesDue = true;
+  if (frame.following) marksDue = true;
 }
 
 // ------------------------------------------------------------------------------------------------ messages
@@ -350,7 +350,7 @@ function greet(message) {
  * @param {Opened | null} shown
  */
 function turnTo(shown) {
-  const kept = { open: shown?.name, trial: shown?.pictures?.trial };
+  const kept = { open: shown?.name, trial: shown?.frames?.trial };
   for (const [key, value] of Object.entries(kept)) {
     if (value) fragment.set(key, value);
     else fragment.delete(key);
@@ -388,7 +388,7 @@ function showAssumed() {
 /** Shows the registers of the board, or of the recording that is shown. */
 function showRegisters() {
   const values = opened ? opened.registers : (registers?.values ?? null);
-  maps.floor = Number(opened?.pictures?.floor ?? values?.noise_floor ?? 0);
+  maps.floor = Number(opened?.frames?.floor ?? values?.noise_floor ?? 0);
   if (opened) {
     if (!hello?.live) board.showRecorded(opened.registers, opened.frame_us);
   } else if (registers && hello?.live) board.take(registers);
@@ -396,7 +396,7 @@ function showRegisters() {
 
 /** @param {Opened} message */
 function open(message) {
-  const again = opened?.name === message.name && opened.pictures?.trial === message.pictures?.trial;
+  const again = opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
   opened = message;
   player.transport = { ...player.transport, source: message.name, state: "paused" };
   player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
@@ -414,12 +414,12 @@ function open(message) {
   }
   training.choose(message.name, message.train);
   board.array = message.array;
-  const noisy = message.pictures?.flickering ?? [];
+  const noisy = message.frames?.flickering ?? [];
   maps.flickering = noisy.length;
   maps.health = noisy.length ? { dead: [], stuck: [], noisy } : null;
   showZeroed();
   part("files", HTMLSelectElement).value = message.name;
-  labels.choose(message.name, message.pictures?.trial);
+  labels.choose(message.name, message.frames?.trial);
   view.choose(message.name);
   showDetections(recorded(message.detections), [...new Set(message.detections.map(({ label }) => label))].sort());
   notes.choose(message.notes);
@@ -475,19 +475,19 @@ let lanesAt = 0;
 let textAt = 0;
 let overviewAt = 0;
 let drawnAt = 0;
-let frames = 0;
+let framesDrawn = 0;
 
 /** @param {number} now_ms */
-function frame(now_ms) {
-  requestAnimationFrame(frame);
+function drawFrame(now_ms) {
+  requestAnimationFrame(drawFrame);
   if (mapsDue) {
     mapsDue = false;
-    frames++;
+    framesDrawn++;
     maps.draw(now_ms);
   }
   if (now_ms - drawnAt >= 1000) {
-    drawn = Math.round((frames * 1000) / (now_ms - drawnAt));
-    [drawnAt, frames] = [now_ms, 0];
+    drawn = Math.round((framesDrawn * 1000) / (now_ms - drawnAt));
+    [drawnAt, framesDrawn] = [now_ms, 0];
   }
   const moving = player.transport.state !== "paused";
   if (timeline && (lanesDue || timeDue) && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
@@ -609,7 +609,7 @@ labels.show();
 view.showCut();
 showLanes();
 applyTheme();
-requestAnimationFrame(frame);
+requestAnimationFrame(drawFrame);
 addEventListener("beforeunload", (event) => {
   if (server.saves) event.preventDefault();
 });

@@ -6,10 +6,10 @@ import { geometry } from "./geometry.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { counted, rounded } from "./words.js";
 
-/** @typedef {import("./protocol.js").Picture} Picture */
+/** @typedef {import("./protocol.js").Frame} Frame */
 /** @typedef {import("./geometry.js").Geometry} Geometry */
 /** @typedef {import("./messages.js").Health} Health */
-/** @typedef {import("./messages.js").PictureSource} PictureSource */
+/** @typedef {import("./messages.js").FrameSource} FrameSource */
 /** @typedef {import("./messages.js").Zeroing} Zeroing */
 /** @typedef {import("./settings.js").Settings} Settings */
 
@@ -46,7 +46,7 @@ class Map2D {
   /** @param {string} name of its parts in the page */
   constructor(name) {
     this.canvas = part(`${name}-map`, HTMLCanvasElement);
-    this.frame = part(`${name}-frame`, HTMLElement);
+    this.element = part(`${name}-frame`, HTMLElement);
     this.bar = part(`${name}-bar`, HTMLCanvasElement);
     this.lines = part(`${name}-cross`, HTMLElement);
     this.marks = part(`${name}-marks`, HTMLElement);
@@ -58,8 +58,8 @@ class Map2D {
 
   /** @param {Geometry} sensor */
   size(sensor) {
-    this.frame.style.aspectRatio = String(sensor.aspect);
-    this.frame.dataset.kind = sensor.kind;
+    this.element.style.aspectRatio = String(sensor.aspect);
+    this.element.dataset.kind = sensor.kind;
     part("maps", HTMLElement).style.setProperty("--aspect", String(sensor.aspect));
     this.words = new Uint32Array(sensor.rows * sensor.columns);
   }
@@ -73,13 +73,13 @@ class Map2D {
   }
 }
 
-/** What the page says of the rest: of events, and of pictures, which are in a unit of force or pressure where it is given. */
+/** What the page says of the rest: of events, and of frames, which are in a unit of force or pressure where it is given. */
 const REST_FROM = {
   given: "above the given rest",
   quiet: "above the rest of a quiet stretch",
   none: "rest not known yet: above the first values",
 };
-const REST_OF_PICTURES = {
+const REST_OF_FRAMES = {
   given: "above 0",
   quiet: "above the rest of a quiet stretch",
   none: "rest not known: values as they are",
@@ -105,34 +105,34 @@ export class Maps {
     this.taxel = null;
     /** @type {Pick<Health, "dead" | "stuck" | "noisy"> | null} */
     this.health = null;
-    /** Unit of the values, size of a tick in it, and ticks of the value 0; `pictures` have no events. */
-    this.values = { unit: "ticks", step: 1, zero: 0, pictures: false };
-    /** The sources that stand side by side, of pictures. @type {PictureSource[]} */
+    /** Unit of the values, size of a tick in it, and ticks of the value 0; `frames` have no events. */
+    this.values = { unit: "ticks", step: 1, zero: 0, frames: false };
+    /** The sources that stand side by side, of frames. @type {FrameSource[]} */
     this.sources = [];
-    /** How many taxels of pictures flicker, and never count as above rest. */
+    /** How many taxels of frames flicker, and never count as above rest. */
     this.flickering = 0;
     /** Taxels whose rest a person set. @type {Zeroing[]} */
     this.zeroed = [];
-    /** @type {Picture | null} */
-    this.picture = null;
+    /** @type {Frame | null} */
+    this.frame = null;
     /** @type {Uint16Array} */
     this.rest = new Uint16Array(0);
     this.pressureScale = new Scale(20);
     this.changeScale = new Scale(10);
     /** @type {{ pressure: Uint32Array, change: Uint32Array }} */
     this.words = { pressure: new Uint32Array(256), change: new Uint32Array(256) };
-    /** Of the last picture drawn. */
+    /** Of the last frame drawn. */
     this.info = { unknown: 0, value: /** @type {number | null} */ (null), rest: /** @type {number | null} */ (null) };
     /** Colours of a sensor's ground and edge. */
     this.theme = { ground: "", edge: "" };
     this.colour();
     for (const map of [this.pressure, this.change]) {
-      map.frame.addEventListener("pointerdown", (event) => this.point(this.at(map, event)));
-      map.frame.addEventListener("pointermove", (event) => {
+      map.element.addEventListener("pointerdown", (event) => this.point(this.at(map, event)));
+      map.element.addEventListener("pointermove", (event) => {
         if (event.buttons & 1) this.point(this.at(map, event));
       });
-      map.frame.addEventListener("dblclick", () => this.point(null));
-      map.frame.addEventListener("keydown", (event) => this.key(event));
+      map.element.addEventListener("dblclick", () => this.point(null));
+      map.element.addEventListener("keydown", (event) => this.key(event));
     }
   }
 
@@ -143,7 +143,7 @@ export class Maps {
     this.point(null);
   }
 
-  /** @param {import("./messages.js").ArrayInfo} array @param {PictureSource[]} sources that stand side by side in it */
+  /** @param {import("./messages.js").ArrayInfo} array @param {FrameSource[]} sources that stand side by side in it */
   size(array, sources) {
     const known = JSON.stringify([array, sources]);
     if (known === this.known) return;
@@ -157,7 +157,7 @@ export class Maps {
     if (rows !== this.rows || columns !== this.columns) {
       this.levels = new Float32Array(this.rows * this.columns);
       this.rest = new Uint16Array(this.rows * this.columns).fill(UNKNOWN_VALUE);
-      this.picture = null;
+      this.frame = null;
     }
     this.health = null;
     if (!this.taxel || !this.geometry.has(...this.taxel)) this.point(null);
@@ -188,22 +188,22 @@ export class Maps {
     this.mark();
   }
 
-  /** @param {Picture} picture */
-  take(picture) {
-    this.picture = picture;
-    if (picture.rest) this.rest = picture.rest;
+  /** @param {Frame} frame */
+  take(frame) {
+    this.frame = frame;
+    if (frame.rest) this.rest = frame.rest;
   }
 
   /**
-   * Draws the last picture.
+   * Draws the last frame.
    * @param {number} now_ms
    */
   draw(now_ms) {
-    const { picture, rows, columns, rest, floor } = this;
+    const { frame, rows, columns, rest, floor } = this;
     const { exists } = this.geometry;
     const { contrast } = this.settings.values;
-    if (!picture?.pressure || picture.rows !== rows || picture.columns !== columns) return;
-    const { pressure, change } = picture;
+    if (!frame?.pressure || frame.rows !== rows || frame.columns !== columns) return;
+    const { pressure, change } = frame;
     let most = 0;
     let moved = 0;
     for (let i = 0; i < pressure.length; i++) {
@@ -250,29 +250,29 @@ export class Maps {
   write() {
     const { contrast } = this.settings.values;
     const [scale, changes] = [this.pressureScale.top / contrast, this.changeScale.top / contrast];
-    const { unit, step, zero, pictures } = this.values;
+    const { unit, step, zero, frames } = this.values;
     write(part("pressure-half", HTMLElement), rounded((scale * step) / 2));
     write(part("pressure-top", HTMLElement), `${rounded(scale * step)} ${unit}`);
     write(part("change-least", HTMLElement), `−${Math.round(changes)}`);
     write(part("change-top", HTMLElement), `+${Math.round(changes)} ticks`);
     write(part("rest-from", HTMLElement), this.restFrom());
-    write(part("pressure-above", HTMLElement), !pictures || this.sources.some(({ rest }) => rest === "quiet") ? "above rest" : "");
+    write(part("pressure-above", HTMLElement), !frames || this.sources.some(({ rest }) => rest === "quiet") ? "above rest" : "");
     const { unknown } = this.info;
     part("unknown", HTMLElement).hidden = unknown === 0;
-    write(part("unknown-count", HTMLElement), pictures ? counted(unknown, "missing value") : counted(unknown, "taxel without events", "taxels without events"));
+    write(part("unknown-count", HTMLElement), frames ? counted(unknown, "missing value") : counted(unknown, "taxel without events", "taxels without events"));
     write(part("taxel-name", HTMLElement), this.named());
     const { value, rest } = this.info;
     const above = value === null || rest === null || rest === zero ? "" : `, ${rounded(Math.max(0, value - rest) * step)} above rest`;
     const zeroed = this.zeroed.some(({ taxel: [x, y] }) => x === this.taxel?.[0] && y === this.taxel?.[1]) ? ", zeroed" : "";
-    write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? (pictures ? "missing" : "no event yet") : `${rounded((value - zero) * step)} ${unit}${above}${zeroed}`);
+    write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? (frames ? "missing" : "no event yet") : `${rounded((value - zero) * step)} ${unit}${above}${zeroed}`);
   }
 
   /** @returns {string} what the shown values are above, of each source where that differs */
   restFrom() {
-    if (!this.picture) return "";
-    if (!this.values.pictures) return REST_FROM[this.picture.restFrom];
-    const all = new Set(this.sources.map(({ rest }) => REST_OF_PICTURES[rest]));
-    const from = all.size === 1 ? [...all] : this.sources.map(({ name, rest }) => `${name}: ${REST_OF_PICTURES[rest]}`);
+    if (!this.frame) return "";
+    if (!this.values.frames) return REST_FROM[this.frame.restFrom];
+    const all = new Set(this.sources.map(({ rest }) => REST_OF_FRAMES[rest]));
+    const from = all.size === 1 ? [...all] : this.sources.map(({ name, rest }) => `${name}: ${REST_OF_FRAMES[rest]}`);
     return [...from, ...(this.flickering ? [`${counted(this.flickering, "flickering taxel")} left out`] : [])].join("; ");
   }
 
@@ -280,7 +280,7 @@ export class Maps {
   named() {
     if (!this.taxel) return "none: click a map, or use its arrow keys";
     const [x, y] = this.taxel;
-    return this.geometry.named(this.taxel) + (this.values.pictures ? "" : ` · sense line ${y}, driven line ${x}`);
+    return this.geometry.named(this.taxel) + (this.values.frames ? "" : ` · sense line ${y}, driven line ${x}`);
   }
 
   /**
@@ -324,7 +324,7 @@ export class Maps {
     write(part("taxel-info", HTMLElement), taxel ? this.named() : "no taxel watched");
   }
 
-  /** The name of a source, over its taxels. @param {PictureSource} source @returns {HTMLElement} */
+  /** The name of a source, over its taxels. @param {FrameSource} source @returns {HTMLElement} */
   nameOf({ name, left, columns }) {
     const ends = [left, left + columns - 1].map((x) => this.geometry.place([x, 0], this.flips)[0]);
     const label = make("span", {}, name);

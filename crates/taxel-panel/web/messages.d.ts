@@ -68,6 +68,44 @@ export interface FoundDetection {
   known_us: number;
 }
 
+/** A recording of frames. */
+export interface FrameRecording {
+  count: number;
+  unit: string;
+  /** A value is `(ticks - zero) * step`. */
+  step: number;
+  zero: number;
+  /** Steps above rest up to which a taxel is not loaded. */
+  floor: number;
+  /** The force of 1 in the sums of the curves, N, where values are in kPa and the area of each taxel is known: each counts by its area; else null, and 1 is a step. */
+  newtons: number | null;
+  /** A number where the frames have no times: frame k is then at k times that many us, in all messages; show the number, no seconds. Tables of labels hold the numbers. */
+  number_us: number | null;
+  sources: FrameSource[];
+  /** Taxels that never count as above rest. */
+  flickering: [number, number][];
+  trial: string | null;
+  /** The trials of a file with several. */
+  trials: string[];
+  /** These are only the frames at the beginning of a large text table, and reading it all takes about so many seconds; `loading` follows each second, and then `opened` again, with all of it, at the same time of the view. */
+  left_s: number | null;
+}
+
+/** A source of frames; sources stand side by side in `array`. */
+export interface FrameSource {
+  name: string;
+  /** Its first column. */
+  left: number;
+  rows: number;
+  columns: number;
+  /** `given`: 0, as the unit is one of force or pressure; `quiet`: that of a quiet stretch, tracked from there; `none`: nothing was quiet, the values are above 0. */
+  rest: "given" | "quiet" | "none";
+  /** Whether values fall from that of a quiet stretch, so that less may mean more pressure. */
+  falls: boolean;
+  /** Where something lay in that stretch and was taken away later, as text (`rows 2 to 4, columns 5 to 7 (up to 41 above rest)`); empty where nothing did. */
+  preload_at: string;
+}
+
 /** A label of a recording. */
 export interface Label {
   /** Valid as long as the server runs. */
@@ -142,44 +180,6 @@ export interface Pace {
   delay: Quantiles;
   /** Why they cannot be, with the likely cause; `None` if they can. */
   doubt: string | null;
-}
-
-/** A source of pictures; sources stand side by side in `array`. */
-export interface PictureSource {
-  name: string;
-  /** Its first column. */
-  left: number;
-  rows: number;
-  columns: number;
-  /** `given`: 0, as the unit is one of force or pressure; `quiet`: that of a quiet stretch, tracked from there; `none`: nothing was quiet, the values are above 0. */
-  rest: "given" | "quiet" | "none";
-  /** Whether values fall from that of a quiet stretch, so that less may mean more pressure. */
-  falls: boolean;
-  /** Where something lay in that stretch and was taken away later, as text (`rows 2 to 4, columns 5 to 7 (up to 41 above rest)`); empty where nothing did. */
-  preload_at: string;
-}
-
-/** A recording of pictures. */
-export interface Pictures {
-  count: number;
-  unit: string;
-  /** A value is `(ticks - zero) * step`. */
-  step: number;
-  zero: number;
-  /** Steps above rest up to which a taxel is not loaded. */
-  floor: number;
-  /** The force of 1 in the sums of the curves, N, where values are in kPa and the area of each taxel is known: each counts by its area; else null, and 1 is a step. */
-  newtons: number | null;
-  /** A number where the pictures have no times: picture k is then at k times that many us, in all messages; show the number, no seconds. Tables of labels hold the numbers. */
-  picture_us: number | null;
-  sources: PictureSource[];
-  /** Taxels that never count as above rest. */
-  flickering: [number, number][];
-  trial: string | null;
-  /** The trials of a file with several. */
-  trials: string[];
-  /** These are only the pictures at the beginning of a large text table, and reading it all takes about so many seconds; `loading` follows each second, and then `opened` again, with all of it, at the same time of the view. */
-  left_s: number | null;
 }
 
 /** A serial port. */
@@ -269,7 +269,7 @@ export interface Hello {
   column_us: number;
   /** The narrowest and the widest that `zoom` takes, us. */
   columns_us: [number, number];
-  /** Columns of time in a picture, at most. */
+  /** Columns of time in a frame, at most. */
   time_columns: number;
   /** Bytes of a request, at most. */
   most_message_bytes: number;
@@ -298,7 +298,7 @@ export interface Presets {
   type: "presets";
   built_in: string[];
   /** Those of the user, which hold every field. */
-  own: Record<string, Record<string, boolean | number>>;
+  user: Record<string, Record<string, boolean | number>>;
   /** The file of the user's: a table a preset, which can be edited by hand. */
   path: string;
 }
@@ -332,8 +332,8 @@ export interface Counters {
   reach_us: [number, number] | null;
   reach_bytes: number;
   viewers: number;
-  /** Pictures sent to this client. */
-  pictures_per_s: number;
+  /** Frames sent to this client. */
+  sent_frames_per_s: number;
   /** Whether the source has ended, by an error or its owner. */
   ended: boolean;
 }
@@ -446,7 +446,7 @@ export interface Detections {
   detections: FoundDetection[];
 }
 
-/** The answer to `open`, before its first picture; `labels` and `transport` follow. */
+/** The answer to `open`, before its first frame; `labels` and `transport` follow. */
 export interface Opened {
   type: "opened";
   name: string;
@@ -456,16 +456,16 @@ export interface Opened {
   stop_us: number | null;
   /** The time of the greatest force in the first touch; null where there is no force. */
   touch_us: number | null;
-  /** 0 of pictures. */
+  /** 0 of frames. */
   events: number;
   bytes: number;
   /** The command that trains on its labels. */
   train: string;
-  pictures: Pictures | null;
-  /** What was lost; empty where a file of pictures does not say. */
+  frames: FrameRecording | null;
+  /** What was lost; empty where a file of frames does not say. */
   verdict: string;
   unfinished: boolean;
-  /** Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of pictures. */
+  /** Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of frames. */
   preload_at: string;
   /** The pace of the recorded arrivals, where the recording holds them. */
   pace: Pace | null;
@@ -494,7 +494,7 @@ export interface Overview {
   source: string | null;
   start_us: number;
   step_us: number;
-  /** Empty of pictures. */
+  /** Empty of frames. */
   events: number[];
   /** Empty where the recording is too long for its curves to be stored. */
   force: number[];
@@ -568,7 +568,7 @@ export interface Warning {
   text: string;
 }
 
-/** Credits for `n` more pictures. */
+/** Credits for `n` more frames. */
 export interface CreditRequest {
   type: "credit";
   id?: number;
@@ -590,7 +590,7 @@ export interface RestRequest {
   how: "now" | "lowest";
 }
 
-/** The values that these taxels hold now are their rest from now on, for the readout's encoder, the pictures of the recording and this panel; all or none. The recording notes the time and the rests before and after. Refused for a taxel without events, while a tare is taken, and while a `.lsa` is recorded. Answered at once; `zeroed` follows. */
+/** The values that these taxels hold now are their rest from now on, for the readout's encoder, the frames of the recording and this panel; all or none. The recording notes the time and the rests before and after. Refused for a taxel without events, while a tare is taken, and while a `.lsa` is recorded. Answered at once; `zeroed` follows. */
 export interface ZeroRequest {
   type: "zero";
   id?: number;
@@ -731,7 +731,7 @@ export interface NoteRequest {
   text: string;
 }
 
-/** A label at this time of the recording shown. A live view: at this time of the recording that runs. With `source` it is of this source alone. One of the same name, time, source and trial is not made twice. With `replaces_us` it replaces the recording's own note of that time (and source), which counts no more. Refused outside the recording: of events more than a second before the first or after the last one, of pictures more than one picture. */
+/** A label at this time of the recording shown. A live view: at this time of the recording that runs. With `source` it is of this source alone. One of the same name, time, source and trial is not made twice. With `replaces_us` it replaces the recording's own note of that time (and source), which counts no more. Refused outside the recording: of events more than a second before the first or after the last one, of frames more than one frame. */
 export interface MarkRequest {
   type: "mark";
   id?: number;
@@ -828,7 +828,7 @@ export interface ListenRequest {
   port: number;
 }
 
-/** Whether the board sends differences from the value before, not values. Earlier events were decoded with the other meaning, so the source begins anew: time, picture, the past that can be viewed, a readout with its tare. Refused while a recording runs. */
+/** Whether the board sends differences from the value before, not values. Earlier events were decoded with the other meaning, so the source begins anew: time, values, the past that can be viewed, a readout with its tare. Refused while a recording runs. */
 export interface DeltaIntensityRequest {
   type: "delta_intensity";
   id?: number;

@@ -134,7 +134,7 @@ export class Player {
   }
 
   /**
-   * The time that a person means: that of the pointer, else of the picture, after all moves that were asked for before.
+   * The time that a person means: that of the pointer, else the time shown, after all moves that were asked for before.
    * @param {number | null} [pointed_us]
    * @returns {Promise<number | null>} us
    */

@@ -1,15 +1,15 @@
-// Pictures, the binary messages of the server: docs/panel-protocol.md, version 1. Those that are text are in messages.d.ts.
+// Frames, the binary messages of the server: docs/panel-protocol.md, version 1. Those that are text are in messages.d.ts.
 
 export const VERSION = 1;
 
 /** The value of a taxel without any event so far. */
 export const UNKNOWN_VALUE = 65535;
-/** The area of a picture in which no taxel has a value, and the sum of a source of which none has one. */
+/** The area of a frame in which no taxel has a value, and the sum of a source of which none has one. */
 export const MISSING = 0xffffffff;
 
 /**
- * A picture, its sections as views of its bytes (little-endian, as every machine that runs browsers); null: not there.
- * @typedef {object} Picture
+ * A frame, its sections as views of its bytes (little-endian, as every machine that runs browsers); null: not there.
+ * @typedef {object} Frame
  * @property {boolean} live
  * @property {boolean} moves
  * @property {boolean} restart
@@ -38,13 +38,13 @@ export const MISSING = 0xffffffff;
  */
 
 /**
- * Reads a picture.
+ * Reads a frame.
  * @param {ArrayBuffer} buffer
- * @returns {Picture}
+ * @returns {Frame}
  */
-export function readPicture(buffer) {
+export function readFrame(buffer) {
   const view = new DataView(buffer);
-  if (view.getUint32(0) !== 0x54585031) throw new Error("a picture that does not begin with TXP1");
+  if (view.getUint32(0) !== 0x54584631) throw new Error("a frame that does not begin with TXF1");
   const flags = view.getUint16(6, true);
   const t = view.getBigInt64(16, true);
   const watched = view.getUint32(40, true);

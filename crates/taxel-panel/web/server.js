@@ -1,4 +1,4 @@
-// The connection to the server: requests with their answers, credits for pictures, and reconnecting after a break.
+// The connection to the server: requests with their answers, credits for frames, and reconnecting after a break.
 
 import { VERSION } from "./protocol.js";
 import { size } from "./words.js";
@@ -27,13 +27,13 @@ export class Server {
   /**
    * @param {string} token
    * @param {(message: Message) => void} onMessage
-   * @param {(picture: ArrayBuffer) => void} onPicture
+   * @param {(frame: ArrayBuffer) => void} onFrame
    * @param {(state: "open" | "lost", why: string) => void} onState
    */
-  constructor(token, onMessage, onPicture, onState) {
+  constructor(token, onMessage, onFrame, onState) {
     this.token = token;
     this.onMessage = onMessage;
-    this.onPicture = onPicture;
+    this.onFrame = onFrame;
     this.onState = onState;
     /** @type {WebSocket | null} */
     this.socket = null;
@@ -55,9 +55,9 @@ export class Server {
     };
     socket.onmessage = ({ data }) => {
       if (data instanceof ArrayBuffer) {
-        // A credit for each picture received, not drawn: two may arrive between two frames of the screen.
+        // A credit for each frame received, not drawn: two may arrive between two refreshes of the screen.
         this.send({ type: "credit", n: 1 });
-        this.onPicture(data);
+        this.onFrame(data);
       } else {
         this.receive(JSON.parse(data));
       }

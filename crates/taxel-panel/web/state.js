@@ -32,7 +32,7 @@ function silence(counters, place) {
 
 /** Values that fall from their rest show nothing. @param {Opened | null} opened @returns {string} what to do about it */
 function fall(opened) {
-  const sources = opened?.pictures?.sources ?? [];
+  const sources = opened?.frames?.sources ?? [];
   const falling = sources.filter(({ falls }) => falls).map(({ name }) => name);
   if (!opened || !falling.length) return "";
   const which = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
@@ -41,17 +41,17 @@ function fall(opened) {
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
 function preload(opened) {
-  const sources = opened?.pictures?.sources ?? [{ name: "", preload_at: opened?.preload_at ?? "" }];
+  const sources = opened?.frames?.sources ?? [{ name: "", preload_at: opened?.preload_at ?? "" }];
   const places = sources.filter((source) => source.preload_at).map(({ name, preload_at }) => (sources.length > 1 ? `${name}, ${preload_at}` : preload_at));
   return places.length ? `In the quiet stretch that the rest is taken from, something lay on ${places.join("; ")}.` : "";
 }
 
-/** @param {Opened | null} opened @param {Hello | null} hello @returns {string} how many pictures there are, and rows and columns of each sensor */
+/** @param {Opened | null} opened @param {Hello | null} hello @returns {string} how many frames there are, and rows and columns of each sensor */
 function shape(opened, hello) {
   const array = opened?.array ?? hello?.array;
-  const { count, sources } = opened?.pictures ?? { count: 0, sources: [] };
+  const { count, sources } = opened?.frames ?? { count: 0, sources: [] };
   const sensors = sources.length > 1 ? sources.map(({ name, rows, columns }) => `${name} ${rows} × ${columns}`).join(", ") : array ? `${array.rows} × ${array.columns}` : "";
-  return [opened?.pictures && counted(count, "picture"), sensors].filter(Boolean).join(", ");
+  return [opened?.frames && counted(count, "frame"), sensors].filter(Boolean).join(", ");
 }
 
 /**

@@ -3,7 +3,7 @@
 import { MISSING, UNKNOWN_VALUE } from "./protocol.js";
 import { numbering, seconds, short } from "./words.js";
 
-/** @typedef {import("./protocol.js").Picture} Picture */
+/** @typedef {import("./protocol.js").Frame} Frame */
 /** @typedef {{ share: number, text: string }} Tick */
 
 /** Columns that are stored; the window shows one less at most, as it need not begin where a column does. */
@@ -35,13 +35,13 @@ export class Timeline {
     this.sources = new Uint32Array(0);
     this.sourceCentres = new Float32Array(0);
     this.number = new Float64Array(SPAN);
-    /** The window, us from its left edge to its right one; null before the first picture. @type {[number, number] | null} */
+    /** The window, us from its left edge to its right one; null before the first frame. @type {[number, number] | null} */
     this.window = null;
     /** Length of the window, us. */
     this.span_us = (SPAN - 1) * column_us;
     /** Whether the window ends at the newest. */
     this.following = false;
-    /** Time of the picture. @type {number | null} */
+    /** The time shown. @type {number | null} */
     this.t_us = null;
     /** Where a person points. @type {number | null} */
     this.cursor_us = null;
@@ -66,20 +66,20 @@ export class Timeline {
   }
 
   /**
-   * Stores the columns of a picture. The window moves only while it follows the newest.
-   * @param {Picture} picture
+   * Stores the columns of a frame. The window moves only while it follows the newest.
+   * @param {Frame} frame
    */
-  put(picture) {
-    if (picture.restart || picture.column_us !== this.column_us) this.number.fill(NaN);
-    this.column_us = picture.column_us;
-    this.t_us = picture.t_us;
-    this.following = picture.following;
-    if (picture.t_us === null) return;
-    if (picture.following || !this.window) {
-      const end = (Math.floor(picture.t_us / this.column_us) + 1) * this.column_us;
+  put(frame) {
+    if (frame.restart || frame.column_us !== this.column_us) this.number.fill(NaN);
+    this.column_us = frame.column_us;
+    this.t_us = frame.t_us;
+    this.following = frame.following;
+    if (frame.t_us === null) return;
+    if (frame.following || !this.window) {
+      const end = (Math.floor(frame.t_us / this.column_us) + 1) * this.column_us;
       this.window = [end - this.span_us, end];
     }
-    const { first, count, raster, spikes, sums, centres, history, channels, sources, sourceCentres } = picture;
+    const { first, count, raster, spikes, sums, centres, history, channels, sources, sourceCentres } = frame;
     const each = channels && count ? channels.length / count : this.channel_count;
     if (each !== this.channel_count) [this.channel_count, this.channels] = [each, new Uint16Array(SPAN * each)];
     const several = count ? (sources?.length ?? 0) / count : this.source_count;
@@ -144,7 +144,7 @@ export class Timeline {
     return this.window && Math.round(this.window[0] + share * this.span_us);
   }
 
-  /** @returns {number} the place of the column that the cursor points at, or of the picture; -1: not known */
+  /** @returns {number} the place of the column that the cursor points at, or of the time shown; -1: not known */
   get pointed() {
     const t = this.cursor_us ?? this.t_us;
     return t === null ? -1 : this.known(Math.floor(t / this.column_us));

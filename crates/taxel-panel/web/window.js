@@ -6,7 +6,7 @@ import { SPAN } from "./timeline.js";
 import { short } from "./words.js";
 
 /** @typedef {import("./player.js").Player} Player */
-/** @typedef {import("./protocol.js").Picture} Picture */
+/** @typedef {import("./protocol.js").Frame} Frame */
 /** @typedef {import("./server.js").Server} Server */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
@@ -36,7 +36,7 @@ export class TimeWindow {
     /** The columns that were asked for: their width, and where they end. @type {{ column_us: number, end_us: number | null } | null} */
     this.asked = null;
     this.asking = false;
-    /** The picture's time when the window last moved to it. @type {number | null} */
+    /** The time shown when the window last moved to it. @type {number | null} */
     this.t_us = null;
     this.axis = part("axis", HTMLElement);
     part("zoom-all", HTMLButtonElement).onclick = () => this.showAll();
@@ -56,7 +56,7 @@ export class TimeWindow {
   }
 
   /**
-   * Shows half or twice the stretch of time, around the cursor, or around the picture's time.
+   * Shows half or twice the stretch of time, around the cursor, or around the time shown.
    * @param {1 | -1} by 1: half, -1: twice
    */
   by(by) {
@@ -113,7 +113,7 @@ export class TimeWindow {
     this.moved();
   }
 
-  /** Moves the window so that the picture lies within it, where its time has changed. @param {Picture} picture */
+  /** Moves the window so that the time shown lies within it, where it has changed. @param {Frame} frame */
   follow({ t_us, following, moves }) {
     const timeline = this.timeline();
     if (!timeline?.window || t_us === null || following || t_us === this.t_us) return;

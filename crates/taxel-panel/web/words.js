@@ -4,9 +4,9 @@
 const SINCE_1970_US = 1e15;
 
 /**
- * How times are written: in seconds, from `begin_us` on; of pictures without times, by their numbers, which are so many us apart.
+ * How times are written: in seconds, from `begin_us` on; of frames without times, by their numbers, which are so many us apart.
  */
-export const numbering = { picture_us: /** @type {number | null} */ (null), begin_us: 0 };
+export const numbering = { number_us: /** @type {number | null} */ (null), begin_us: 0 };
 
 /** @param {number | null} start_us of a recording @returns {number} where its times are counted from, us: at its begin, if they count from 1970 */
 export const beginning = (start_us) => (start_us !== null && start_us >= SINCE_1970_US ? start_us : 0);
@@ -14,9 +14,9 @@ export const beginning = (start_us) => (start_us !== null && start_us >= SINCE_1
 /** @returns {string} date and time at 0 s; "" where times do not count from 1970 */
 export const begun = () => (numbering.begin_us ? `${new Date(numbering.begin_us / 1000).toISOString().replace("T", " ").replace("Z", "")} UTC` : "");
 
-/** @param {number} us @param {number} [places] @returns {string} the number that is written: seconds, or that of a picture */
+/** @param {number} us @param {number} [places] @returns {string} the number that is written: seconds, or that of a frame */
 export const writtenTime = (us, places = 3) =>
-  numbering.picture_us ? String(Math.floor(us / numbering.picture_us)) : ((us - numbering.begin_us) / 1e6).toFixed(places);
+  numbering.number_us ? String(Math.floor(us / numbering.number_us)) : ((us - numbering.begin_us) / 1e6).toFixed(places);
 
 /** @param {number} t_us @returns {string} to the microsecond, without zeros behind the millisecond */
 export const listedTime = (t_us) => writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0{1,3}$/, "$1");
@@ -24,15 +24,15 @@ export const listedTime = (t_us) => writtenTime(t_us, 6).replace(/(\.\d{3}\d*?)0
 /** @param {string} written @returns {number} us; not a number for other text */
 export const readTime = (written) => {
   const number = written.trim() ? Number(written.replace(",", ".")) : NaN;
-  return numbering.picture_us ? Math.round(number) * numbering.picture_us : Math.round(number * 1e6) + numbering.begin_us;
+  return numbering.number_us ? Math.round(number) * numbering.number_us : Math.round(number * 1e6) + numbering.begin_us;
 };
 
-/** @returns {"pictures" | "seconds"} what a time is a number of */
-export const timeUnit = () => (numbering.picture_us ? "pictures" : "seconds");
+/** @returns {"frames" | "seconds"} what a time is a number of */
+export const timeUnit = () => (numbering.number_us ? "frames" : "seconds");
 
-/** @param {number | null} us @param {number} [places] @returns {string} seconds, or the number of a picture */
+/** @param {number | null} us @param {number} [places] @returns {string} seconds, or the number of a frame */
 export const seconds = (us, places = 3) =>
-  us === null ? "–" : numbering.picture_us ? `picture ${whole(Math.floor(us / numbering.picture_us))}` : `${writtenTime(us, places)} s`;
+  us === null ? "–" : numbering.number_us ? `frame ${whole(Math.floor(us / numbering.number_us))}` : `${writtenTime(us, places)} s`;
 
 /** @param {number} value @returns {string} in three digits, as many as a curve or a map shows */
 export const rounded = (value) => (Math.abs(value) >= 100 ? whole(value) : String(Number(value.toPrecision(3))));
@@ -50,7 +50,7 @@ export const counted = (count, one, many = `${one}s`) => `${whole(count)} ${coun
 
 /** @param {number} us @returns {string} a short time in the unit that suits */
 export function short(us) {
-  if (numbering.picture_us) return counted(us / numbering.picture_us, "picture");
+  if (numbering.number_us) return counted(us / numbering.number_us, "frame");
   if (us < 1000) return `${us.toFixed(us < 10 ? 1 : 0)} µs`;
   if (us < 1e6) return `${(us / 1000).toFixed(us < 1e5 ? 1 : 0)} ms`;
   return `${(us / 1e6).toFixed(1)} s`;

@@ -76,14 +76,14 @@ impl Copies {
 
 #[pymethods]
 impl Copies {
-    /// The next: "parcel", "picture" or "detection", and its bytes; None after `timeout` s without one.
+    /// The next: "parcel", "frame" or "detection", and its bytes; None after `timeout` s without one.
     fn next<'py>(&self, py: Python<'py>, timeout: f64) -> PyResult<Option<(&'static str, Bound<'py, PyBytes>)>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
         let copied = enter(py, |_| Ok::<_, taxel_live::Error>(self.0.lock().next(timeout)))?;
         Ok(copied.map(|copied| match copied {
             Copied::Parcel(bytes) => ("parcel", PyBytes::new(py, &bytes)),
-            Copied::Picture(bytes) => ("picture", PyBytes::new(py, &bytes)),
+            Copied::Frame(bytes) => ("frame", PyBytes::new(py, &bytes)),
             Copied::Detection(bytes) => ("detection", PyBytes::new(py, &bytes)),
         }))
     }

@@ -42,10 +42,10 @@ pub fn law_of<'py>(
     let (given, rest) = (slice("given", &given)?, slice("rest", &rest)?);
     let out = enter(py, |_| -> Result<Vec<f64>> {
         let sensor = law(json)?;
-        let one = |(&value, &rest): (&f64, &f64)| {
+        let convert = |(&value, &rest): (&f64, &f64)| {
             if back { sensor.reading(value, rest, ramp) } else { sensor.force(value, rest, ramp) }
         };
-        Ok(given.iter().zip(rest).map(one).collect())
+        Ok(given.iter().zip(rest).map(convert).collect())
     })?;
     Ok(array(py, out))
 }

@@ -30,8 +30,8 @@ pub fn fabric<'py>(
     back: bool,
 ) -> PyResult<Values<'py>> {
     let (fabric, given): (Fabric, _) = (parsed("Fabric", json)?, slice("given", &given)?);
-    let one = |&value: &f64| if back { fabric.force_n(value) } else { fabric.conductance_us(value) };
-    Ok(array(py, given.iter().map(one).collect()))
+    let convert = |&value: &f64| if back { fabric.force_n(value) } else { fabric.conductance_us(value) };
+    Ok(array(py, given.iter().map(convert).collect()))
 }
 
 enum Lines {
@@ -136,8 +136,8 @@ pub fn converter_ramp<'py>(
     back: bool,
 ) -> PyResult<Values<'py>> {
     let (ramp, given) = (parsed::<Converter>("Converter", json)?.ramp(), slice("given", &given)?);
-    let one = |&value: &f64| if back { ramp.ticks(value) } else { ramp.volts(value) };
-    Ok(array(py, given.iter().map(one).collect()))
+    let convert = |&value: &f64| if back { ramp.ticks(value) } else { ramp.volts(value) };
+    Ok(array(py, given.iter().map(convert).collect()))
 }
 
 /// Gives the signals of one comparator, as an oscilloscope would show them.

@@ -173,7 +173,7 @@ pub(crate) fn to_room<'a>((t, x, y, ticks, p, present): &'a mut ColumnsIn<'_>) -
     Room::new(open(t)?, [open(x)?, open(y)?, open(ticks)?], [open(p)?, open(present)?]).map_err(core)
 }
 
-/// Pictures whose values stay where Python has them, as (array, t, values one picture after the other).
+/// Frames whose values stay where Python has them, as (array, t, values one frame after the other).
 pub(crate) struct FramesIn<'py> {
     array: Array,
     t: PyReadonlyArray1<'py, i64>,

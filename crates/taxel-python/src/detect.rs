@@ -187,7 +187,7 @@ pub fn readout_run_events<'py>(
     Ok((from_detections(py, found), outside))
 }
 
-/// The detections of a readout or a plain rule in a whole recording of pictures, and how many of them have an input
+/// The detections of a readout or a plain rule in a whole recording of frames, and how many of them have an input
 /// outside its range in training.
 #[pyfunction]
 pub fn readout_run_frames<'py>(

@@ -73,7 +73,7 @@ pub fn local_load_of_events<'py>(
     Ok(PyArray1::from_vec(py, enter(py, |stop| load.values_of_events(events, stop))?))
 }
 
-/// The quantities of a local load of a whole recording of pictures, picture by picture.
+/// The quantities of a local load of a whole recording of frames, frame by frame.
 #[pyfunction]
 pub fn local_load_of_frames<'py>(
     py: Python<'py>,
@@ -94,7 +94,7 @@ pub fn encode_events<'py>(py: Python<'py>, encoder: &str, events: EventsIn<'py>)
     Ok(from_spikes(py, trains))
 }
 
-/// Encodes a whole recording of pictures.
+/// Encodes a whole recording of frames.
 #[pyfunction]
 pub fn encode_frames<'py>(py: Python<'py>, encoder: &str, frames: FramesIn<'py>) -> PyResult<SpikesOut<'py>> {
     let encoder = Encoder::from_json(encoder).map_err(core)?;
@@ -153,7 +153,7 @@ pub fn tare_of_events(
     Ok(enter(py, |_| Tare::of_events(events, start, stop, note))?.to_json())
 }
 
-/// Takes a tare from pictures, as JSON; times in us.
+/// Takes a tare from frames, as JSON; times in us.
 #[pyfunction]
 pub fn tare_of_frames(
     py: Python<'_>,

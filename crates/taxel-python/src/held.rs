@@ -46,7 +46,7 @@ impl HeldValues {
         let n = self.0.with(py, |held| held.taxels());
         let all = times.len().saturating_mul(n);
         if Vec::<f32>::new().try_reserve_exact(all).is_err() {
-            return Err(core(problem!("{} pictures of {n} taxels do not fit the memory", times.len())));
+            return Err(core(problem!("{} frames of {n} taxels do not fit the memory", times.len())));
         }
         // Memory of NumPy, which asks for large pages.
         let values = PyArray1::zeros(py, all, false);
@@ -75,7 +75,7 @@ pub fn held_as_events<'py>(
     Ok(from_events(py, as_events(slice("held", &held)?, t, &to_array(of)?)))
 }
 
-/// What pictures, one after the other in `values`, read above the rest of each taxel, infinite where that is unknown.
+/// What frames, one after the other in `values`, read above the rest of each taxel, infinite where that is unknown.
 #[pyfunction]
 pub fn above_rest<'py>(
     py: Python<'py>,
@@ -85,20 +85,20 @@ pub fn above_rest<'py>(
     let (values, rest) = (slice("values", &values)?, slice("rest", &rest)?);
     let found = enter(py, |_| {
         if rest.is_empty() || !values.len().is_multiple_of(rest.len()) {
-            return Err(problem!("{} values for {} taxels: must be whole pictures", values.len(), rest.len()));
+            return Err(problem!("{} values for {} taxels: must be whole frames", values.len(), rest.len()));
         }
         let (rest, mut above) = (Rest::measured(rest.to_vec()), vec![]);
         above.reserve(values.len());
-        for picture in values.chunks_exact(rest.values().len()) {
+        for frame in values.chunks_exact(rest.values().len()) {
             let above_rest = |(taxel, &value): (usize, &f32)| rest.above(taxel, value.into()) as f32;
-            above.extend(picture.iter().enumerate().map(above_rest));
+            above.extend(frame.iter().enumerate().map(above_rest));
         }
         Ok(above)
     })?;
     Ok(array(py, found))
 }
 
-/// The rest of pictures without a tare: `columns` of the array, its noise floor, the rest of each taxel to begin
+/// The rest of frames without a tare: `columns` of the array, its noise floor, the rest of each taxel to begin
 /// with (NaN where unknown), and whether values fall from it with pressure.
 #[pyclass(frozen, name = "TrackedRest", module = "taxel._core")]
 pub struct PyTrackedRest(Shared<TrackedRest>);
@@ -113,7 +113,7 @@ impl PyTrackedRest {
         Ok(Self(Shared::new(if falls { rest.falling() } else { rest })))
     }
 
-    /// Reads pictures at `t` us, one after the other in `values` (NaN where a taxel has none); returns them above the
+    /// Reads frames at `t` us, one after the other in `values` (NaN where a taxel has none); returns them above the
     /// rest, 0 below it.
     fn above<'py>(
         &self,
@@ -125,13 +125,13 @@ impl PyTrackedRest {
         let above = self.0.enter(py, |rest, stop| {
             let taxels = rest.begins().len();
             if taxels == 0 || values.len() != t.len() * taxels {
-                let (n, pictures) = (values.len(), t.len());
-                return Err(problem!("{n} values for {pictures} pictures of {taxels} taxels"));
+                let (n, frames) = (values.len(), t.len());
+                return Err(problem!("{n} values for {frames} frames of {taxels} taxels"));
             }
             let mut above = Vec::with_capacity(values.len());
-            for (&t, picture) in t.iter().zip(values.chunks_exact(taxels)) {
+            for (&t, frame) in t.iter().zip(values.chunks_exact(taxels)) {
                 stop.check()?;
-                above.extend(rest.take(t, picture.iter().copied()).iter().map(|above| above.max(0.0)));
+                above.extend(rest.take(t, frame.iter().copied()).iter().map(|above| above.max(0.0)));
             }
             Ok(above)
         })?;
@@ -173,8 +173,8 @@ pub fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResul
                 stop.check()?;
             }
             let ticks = events.intensity.map_or(UNKNOWN, |of| if of.present[k] { of.ticks[k] } else { UNKNOWN });
-            let own = events.repaired.is_none_or(|repaired| !repaired[k]);
-            counts.event(events.t[k], events.array.index(events.x[k], events.y[k]), ticks, events.p[k], own);
+            let is_change = events.repaired.is_none_or(|repaired| !repaired[k]);
+            counts.event(events.t[k], events.array.index(events.x[k], events.y[k]), ticks, events.p[k], is_change);
         }
         if let Some(&last) = events.t.last() {
             counts.advance(last.saturating_add(2 * BIN_US));
@@ -184,10 +184,10 @@ pub fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResul
     Ok(from_touches(py, &counts))
 }
 
-/// The change of a picture's value that counts, ticks: above the noise floor of the board's fast presets.
+/// The change of a value between frames that counts, ticks: above the noise floor of the board's fast presets.
 const NOISE_FLOOR: f32 = 3.0;
 
-/// The counts of touches of pictures in ticks; `rest` of all of them, NaN where it is to be tracked.
+/// The counts of touches of frames in ticks; `rest` of all of them, NaN where it is to be tracked.
 #[pyfunction]
 pub fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> PyResult<TouchesOut<'py>> {
     let frames = frames.view()?;
@@ -195,9 +195,9 @@ pub fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64)
         let taxels = frames.array.len();
         let mut counts = TouchCounts::new(frames.array, if rest.is_nan() { f64::NO_REST } else { rest });
         let mut before = vec![f32::NAN; taxels];
-        for (&t, picture) in frames.t.iter().zip(frames.values.chunks_exact(taxels)) {
+        for (&t, frame) in frames.t.iter().zip(frames.values.chunks_exact(taxels)) {
             stop.check()?;
-            for (taxel, (&value, before)) in picture.iter().zip(&mut before).enumerate() {
+            for (taxel, (&value, before)) in frame.iter().zip(&mut before).enumerate() {
                 // As a board reads it; the first value is no change.
                 if before.is_nan() && !value.is_nan() || (value - *before).abs() > NOISE_FLOOR {
                     counts.value(t, taxel, value, !before.is_nan());
@@ -214,7 +214,7 @@ pub fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64)
     Ok(from_touches(py, &counts))
 }
 
-/// Number of changes of each taxel of pictures, and of those in the direction of the one before.
+/// Number of changes of each taxel of frames, and of those in the direction of the one before.
 type ChangesOut<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
 
 #[pyfunction]

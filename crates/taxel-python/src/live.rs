@@ -189,8 +189,8 @@ impl Live {
     }
 
     /// The values that the taxels hold, ticks, by taxel index.
-    fn picture<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u16>>> {
-        Ok(array(py, self.with(py, |pipeline| Ok(pipeline.picture()))?))
+    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u16>>> {
+        Ok(array(py, self.with(py, |pipeline| Ok(pipeline.frame()))?))
     }
 
     /// The fresh tare, as JSON, once it is complete.

@@ -85,8 +85,8 @@ struct Datagrams<'py> {
     payload: Bound<'py, PyArray1<u8>>,
 }
 
-/// Time us of each picture, all values, messages that are no picture.
-type PicturesOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f32>>, u64);
+/// Time us of each frame, all values, messages that are no frame.
+type FramesOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f32>>, u64);
 
 /// A recording of the live format, opened.
 #[pyclass(frozen)]
@@ -128,9 +128,9 @@ impl RecordingReader {
         })
     }
 
-    /// All pictures of a source: time us of each, all values, messages that are no picture of its array.
-    fn pictures<'py>(&self, py: Python<'py>) -> PyResult<PicturesOut<'py>> {
-        let all = enter(py, |stop| self.reader.pictures(stop))?;
+    /// All frames of a source: time us of each, all values, messages that are no frame of its array.
+    fn frames<'py>(&self, py: Python<'py>) -> PyResult<FramesOut<'py>> {
+        let all = enter(py, |stop| self.reader.frames(stop))?;
         Ok((array(py, all.t), array(py, all.values), all.bad))
     }
 
@@ -216,8 +216,8 @@ impl RecordingWriter {
         Self { writer: Arc::clone(&self.writer), source: Some(name.to_owned()) }
     }
 
-    /// Writes pictures: number of the first, time in the file (ns) and board time (us) of each, all values.
-    fn pictures(
+    /// Writes frames: number of the first, time in the file (ns) and board time (us) of each, all values.
+    fn frames(
         &self,
         py: Python<'_>,
         first: u64,
@@ -228,7 +228,7 @@ impl RecordingWriter {
     ) -> PyResult<()> {
         let (at_ns, t_us, values) = (slice("at_ns", &at_ns)?, slice("t_us", &t_us)?, slice("values", &values)?);
         let encoding = if whole { Encoding::Whole } else { Encoding::Float };
-        self.with(py, |track| track.pictures(first, at_ns, t_us, values, encoding))
+        self.with(py, |track| track.frames(first, at_ns, t_us, values, encoding))
     }
 
     /// Ends a source that is not the first, with the counts of what was received and lost, given as JSON.
@@ -467,7 +467,7 @@ pub fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
 
 /// Whether all values are whole and from 0 to 65 535, so that 16 bits hold them.
 #[pyfunction]
-pub fn whole_pictures(py: Python<'_>, values: PyReadonlyArray1<'_, f32>) -> PyResult<bool> {
+pub fn whole_frames(py: Python<'_>, values: PyReadonlyArray1<'_, f32>) -> PyResult<bool> {
     let values = slice("values", &values)?;
     enter(py, |_| Ok::<_, taxel_core::Error>(Encoding::of(values) == Encoding::Whole))
 }

@@ -12,7 +12,7 @@ use taxel_core::board::{
     self, Board, BoardCounts, Crossed, Faults, Flaws, IntensityWord, Play, Previous, Version2, opening,
 };
 use taxel_core::circuit::Chain;
-use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Narrow, Pictures, Scene, Sensor, Taxels, Track};
+use taxel_core::contact::{Act, Bonded, Contact, Foam, FrameSequence, Motion, Narrow, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, Error, Result, Stop, reading};
 use taxel_live::address::of_text;
@@ -24,12 +24,12 @@ use crate::enter::{Shared, enter, enter_with_progress};
 use crate::errors::core;
 use crate::parameters::{Plain, parsed};
 
-/// An act as Python passes it: silence in ms, a scene as JSON, or pictures with their period in us.
+/// An act as Python passes it: silence in ms, a scene as JSON, or a sequence of frames with its period in us.
 #[derive(FromPyObject)]
 pub(crate) enum ActIn<'py> {
     Silence(f64),
     Scene(String),
-    Pictures(PyReadonlyArray1<'py, f32>, f64),
+    Frames(PyReadonlyArray1<'py, f32>, f64),
 }
 
 fn scene(json: &str) -> Result<Scene> {
@@ -40,8 +40,8 @@ fn to_act(act: ActIn<'_>) -> PyResult<Act> {
     Ok(match act {
         ActIn::Silence(ms) => Act::Silence { ms },
         ActIn::Scene(json) => Act::Scene(scene(&json).map_err(core)?),
-        ActIn::Pictures(values, period_us) => {
-            Act::Pictures(Pictures { values: slice("values", &values)?.to_vec(), period_us })
+        ActIn::Frames(values, period_us) => {
+            Act::Frames(FrameSequence { values: slice("values", &values)?.to_vec(), period_us })
         }
     })
 }
@@ -175,7 +175,7 @@ pub(crate) enum TouchIn<'py> {
     /// Events and the speed at which they are played.
     Events(EventsIn<'py>, f64),
     /// us, ticks, speed.
-    Pictures(PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, u16>, f64),
+    Frames(PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, u16>, f64),
     /// A descriptor to read from, bytes that were read from it already, shift, most.
     Pipe(i32, Vec<u8>, u32, u16),
     /// An iterator of acts.
@@ -289,9 +289,9 @@ pub fn emulate(
             let events = events.view()?;
             Felt::Other(Box::new(enter(py, |_| Replay::events(events, (frame_us, speed), step, registers.ramp))?))
         }
-        TouchIn::Pictures(t, values, speed) => {
+        TouchIn::Frames(t, values, speed) => {
             let (t, values) = (slice("t", &t)?.to_vec(), slice("values", &values)?.to_vec());
-            Felt::Other(Box::new(enter(py, |_| Replay::pictures(&array, t, values, frame_us, speed))?))
+            Felt::Other(Box::new(enter(py, |_| Replay::frames(&array, t, values, frame_us, speed))?))
         }
         TouchIn::Pipe(descriptor, ahead, shift, most) => {
             // SAFETY: Python has the descriptor open as long as this call lasts; the copy is ours.

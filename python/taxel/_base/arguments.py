@@ -268,7 +268,7 @@ def text(name: str, value: object, among: Collection[str] = ()) -> str:
     return value
 
 
-def path(name: str, value: object) -> str:
+def checked_path(name: str, value: object) -> str:
     """Return a path; refuse any other value (Python would read a number as the descriptor of an open file)."""
     plain = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     try:

@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from taxel._base.arguments import flag
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, flag
 from taxel._core import open_regular
 
 

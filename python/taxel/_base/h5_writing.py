@@ -62,14 +62,14 @@ def write_h5(
                     send(cast(BinaryIO, pipe))
             except BrokenPipeError:
                 pass
-            said = child.stdout.read()
+            reply = child.stdout.read()
         except BaseException:
             child.kill()
             raise
         finally:
             child.stdout.close()
             code = child.wait()
-        answer: dict[str, Any] = json.loads(said or "{}")
+        answer: dict[str, Any] = json.loads(reply or "{}")
         if "errno" in answer:
             raise OSError(answer["errno"], os.strerror(answer["errno"]))
         if answer.get("kind") == "MemoryError":

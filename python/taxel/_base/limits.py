@@ -39,7 +39,7 @@ ABOUT = 192 << 20
 UNIT = 256
 #: Markers of a recording, each of which is a tuple.
 MARKERS = 1 << 18
-#: The largest value of a picture, which has 32 bits.
+#: The largest value of a frame, which has 32 bits.
 VALUE = float(np.finfo(np.float32).max)
 #: The largest absolute time, us: 142 years, so that it also fits in 64 bits as ns.
 TIME_US = 1 << 52

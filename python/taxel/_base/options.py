@@ -21,7 +21,7 @@ def option(default: Any, about: str, *, least: float | None = None, most: float 
 
 def about(options: Any, name: str) -> dict[str, Any]:
     """Return the description and the range of an option, for the command line: help, min, max."""
-    metadata = {one.name: one.metadata for one in fields(options)}[name]
+    metadata = {entry.name: entry.metadata for entry in fields(options)}[name]
     return {key: value for key, value in metadata.items() if value is not None and key != "typed"}
 
 
@@ -51,9 +51,9 @@ def with_fields_of(
             begin(self, options(*arguments, **keywords))
 
         functools.update_wrapper(init, begin)
-        own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+        itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
         parameters = inspect.signature(options).parameters.values()
-        init.__signature__ = inspect.Signature([own, *parameters])  # type: ignore[attr-defined]
+        init.__signature__ = inspect.Signature([itself, *parameters])  # type: ignore[attr-defined]
         return init
 
     return decorate

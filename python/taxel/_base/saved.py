@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar, Self, TypeVar
 
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path
 from taxel._base.documents import text_of_json
 from taxel._base.files import write_whole
 from taxel._core import Error, FormatError

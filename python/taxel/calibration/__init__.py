@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.columns import frozen
 from taxel._base.documents import object_of_json
@@ -44,7 +43,7 @@ class Calibration(Saved):
     Attributes
     ----------
     array : Array
-        The sensor; pictures of one with other rows, columns or taxels are refused.
+        The sensor; frames of one with other rows, columns or taxels are refused.
     unit : {"N", "kPa"}
     of : str
         What readings are in: "ticks" of a board, "counts" of a file.
@@ -59,7 +58,7 @@ class Calibration(Saved):
         Of a fit: root mean square of what the known loads are missed by, as a share of each; None where there were no
         more loads than unknowns, so that they fit themselves.
     loads : tuple of (float, str, float)
-        Of a fit: each load, its unit, and what the calibration makes of the pictures under it.
+        Of a fit: each load, its unit, and what the calibration makes of the frames under it.
     note : str
 
     Examples
@@ -305,7 +304,7 @@ class Calibration(Saved):
         return whole_fit
 
     def apply(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
-        """Return pictures in N or kPa; taxels that do not read more than the floor above rest give 0.
+        """Return frames in N or kPa; taxels that do not read more than the floor above rest give 0.
 
         Parameters
         ----------
@@ -320,18 +319,18 @@ class Calibration(Saved):
 
         Raises
         ------
-        ProblemError : pictures of another array, or in another unit; a rest that is not finite
+        ProblemError : frames of another array, or in another unit; a rest that is not finite
         """
-        same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.of)
+        same(self.array, instance("frames", frames, Frames).array, "the frames", frames.unit, self.of)
         return Frames(self._values(frames.values, self._rest(rest)), frames.t, unit=self.unit, array=frames.array)
 
     def readings(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
-        """Return what the sensor would read under pictures in N or kPa: the inverse of `apply`.
+        """Return what the sensor would read under frames in N or kPa: the inverse of `apply`.
 
         Parameters
         ----------
         frames : Frames
-            Pictures in the calibration's unit.
+            Frames in the calibration's unit.
         rest : Tare or float64, shape (rows, columns), in the unit of the readings, optional
             Today's rest; the calibration's own where it is left out.
 
@@ -342,9 +341,9 @@ class Calibration(Saved):
 
         Raises
         ------
-        ProblemError : pictures of another array, or in another unit
+        ProblemError : frames of another array, or in another unit
         """
-        same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.unit)
+        same(self.array, instance("frames", frames, Frames).array, "the frames", frames.unit, self.unit)
         held = np.nan_to_num(self._rest(rest))
         values = self._curve.readings(np.maximum(frames.values, 0.0) / self.gain, held)
         return Frames(_32_bits(values), frames.t, unit=self.of, array=frames.array)
@@ -480,7 +479,7 @@ class Calibration(Saved):
 
 
 def _32_bits(values: Values) -> NDArray[np.float32]:
-    """Return values as float32, as pictures hold them; larger ones become the largest float32."""
+    """Return values as float32, as frames hold them; larger ones become the largest float32."""
     return np.minimum(values, np.finfo(np.float32).max).astype(np.float32)
 
 

@@ -74,10 +74,10 @@ class Laid(NamedTuple):
     @classmethod
     def of(cls, load: Load, number_of: int, sensor: Sensor) -> Laid:
         frames, place = instance("frames", load.frames, Frames), f"load {number_of}"
-        same(sensor.array, frames.array, f"the pictures of {place}", frames.unit, sensor.of)
+        same(sensor.array, frames.array, f"the frames of {place}", frames.unit, sensor.of)
         value, unit = above_0(place, load.load), checked_text("unit", load.unit, UNITS)
         if not len(frames):
-            raise ProblemError(f"{place}: no picture while it lies")
+            raise ProblemError(f"{place}: no frame while it lies")
         rest = sensor.rest
         readings = frames.values.mean(axis=0, dtype=np.float64)
         chosen = sensor.array._there() & ~np.isnan(rest)

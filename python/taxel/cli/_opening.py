@@ -21,7 +21,7 @@ class FileOptions:
         typer.Option(
             metavar="ROWSxCOLUMNS[xMM]",
             help="Rows, columns and pitch (mm) of the sensor, as 24x20x5, for files without them (.csv, .lsa, ROS "
-            "bags), and for pictures of a row of as many channels. Default: 64x64x2.67, or a larger array if events "
+            "bags), and for frames of a row of as many channels. Default: 64x64x2.67, or a larger array if events "
             "lie outside it; of a bag as its messages say. "
             "Without mm the pitch is 2.67 for events of the board, else unknown.",
         ),
@@ -38,7 +38,7 @@ class FileOptions:
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Open this topic of a ROS bag as pictures; taxel info lists them. Repeated, with --field and --array "
+            help="Open this topic of a ROS bag as frames; taxel info lists them. Repeated, with --field and --array "
             "once or as often: each is a source.",
         ),
     ] = None
@@ -56,9 +56,7 @@ class FileOptions:
     ] = None
     rate_hz: Annotated[
         float | None,
-        typer.Option(
-            metavar="HZ", help="Pictures a second, for recordings without times, whose pictures are numbered."
-        ),
+        typer.Option(metavar="HZ", help="Frames a second, for recordings without times, whose frames are numbered."),
     ] = None
     limit: Annotated[
         int | None,

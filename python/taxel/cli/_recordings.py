@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from itertools import chain, repeat
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -29,6 +29,10 @@ _REPORT_S = (2.0, 8.0, 20.0, 30.0)
 #: What every command that works on recordings reads.
 READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of another maker"
 SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
+
+ReportOption = Annotated[
+    Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
+]
 
 
 def tare_option(default: str = "") -> Any:

@@ -55,19 +55,19 @@ CongestionOption = Annotated[
 _TYPES = {"int": int, "float": float, "bool": bool, "str": str}
 
 
-def _parameter(one: Field[Any]) -> inspect.Parameter:
+def _parameter(field: Field[Any]) -> inspect.Parameter:
     """Return the option of the command line that sets an option of `Live`."""
-    words, kind, described = one.metadata["typed"], str(one.type), about(StatedOptions, one.name)
-    flag = words.get("flag", "--" + one.name.replace("_", "-"))
+    words, kind, described = field.metadata["typed"], str(field.type), about(StatedOptions, field.name)
+    flag = words.get("flag", "--" + field.name.replace("_", "-"))
     help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
-    read, default = _TYPES.get(kind, str | None), one.default if kind in _TYPES else None
+    read, default = _TYPES.get(kind, str | None), field.default if kind in _TYPES else None
     if "PathLike" in kind:
         read = Path | None
     elif "Sequence" in kind or "Mapping" in kind:
         read = list[str] | None
     option = typer.Option(flag, metavar=words.get("metavar"), help=help_, **described)
     return inspect.Parameter(
-        one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[read, option]
+        field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[read, option]
     )
 
 
@@ -81,15 +81,12 @@ def with_live_options(command: str, *names: str) -> Callable[[Callable[..., None
     *names : str
         Those of its options that are taken. Default: all.
     """
-    chosen = [
-        one
-        for one in fields(StatedOptions)
-        if command in one.metadata["typed"].get("commands", "live").split() and one.name in (names or (one.name,))
-    ]
+    every = {field: field.metadata["typed"].get("commands", "live").split() for field in fields(StatedOptions)}
+    chosen = [field for field, commands in every.items() if command in commands and (not names or field.name in names)]
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
         def call(**typed: Any) -> None:
-            options = {one.name: typed.pop(one.name) for one in chosen}
+            options = {field.name: typed.pop(field.name) for field in chosen}
             work(options=options, **typed)
 
         given = inspect.signature(work, eval_str=True).parameters.items()
@@ -120,8 +117,8 @@ def _registers(
     if rate_hz is None or bits is None:
         raise ProblemError("--rate-hz and --bits belong together: both are those of the taxel.live.Source that sends")
     if preset is not None or address is not None:
-        other = "--preset" if preset is not None else "--from"
-        raise ProblemError(f"--rate-hz and {other}: both state the board's registers; give one of them")
+        option = "--preset" if preset is not None else "--from"
+        raise ProblemError(f"--rate-hz and {option}: both state the board's registers; give one of them")
     return Registers._of_source(Array._of(array), rate_hz, bits)[0]
 
 
@@ -170,15 +167,15 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
 def doubted(counters: dict[str, Any]) -> Iterator[str]:
     """Yield why the drift or the delays of a board and of each other source cannot be, where they cannot."""
     every = {"": counters, **counters["sources"]}
-    for name, one in every.items():
-        if (one.get("pace") or {}).get("doubt"):
-            yield f"{name}: {one['pace']['doubt']}" if name else one["pace"]["doubt"]
+    for name, counts in every.items():
+        if (counts.get("pace") or {}).get("doubt"):
+            yield f"{name}: {counts['pace']['doubt']}" if name else counts["pace"]["doubt"]
 
 
 def exit_code(summary: Summary, array: Array) -> int:
     """Return the exit code for what was received and lost."""
-    unsent = any(one["lost"] for one in summary.counters["sent"])
-    left_out = any(one.get("bytes_in_no_line") for one in summary.counters["sources"].values())
+    unsent = any(counts["lost"] for counts in summary.counters["sent"])
+    left_out = any(counts.get("bytes_in_no_line") for counts in summary.counters["sources"].values())
     if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent or left_out:
         return OUTSIDE
     return WRONG_INPUT if outside(summary.counters, array) else 0
@@ -212,12 +209,13 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
 
     capture, wire, earlier = now["capture"], now["wire"], before["capture"]
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
-    damage, lost = f"{damaged:,} bytes and words, {wire['back']:,} events out of order", ""
+    damage = f"{damaged:,} bytes and words, {wire['back']:,} events out of order"
+    lost = f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue"
     if now["wire_version"] == 2:
         second = now["wire_v2"]
         damaged = second["checksum"] + second["short"] + second["foreign"] + second["malformed"]
         damage = f"{damaged:,} datagrams, {second['outside']:,} words, {now['wire_refused']:,} bytes of version 1"
-        lost = f", {second['missing']:,} on the way"
+        lost += f", {second['missing']:,} on the way"
     board = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
     drift = ""
     pace = now["pace"]
@@ -229,11 +227,7 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),
         ("bytes", f"{capture['bytes']:,}", rate(capture["bytes"], earlier["bytes"])),
         ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
-        (
-            "lost",
-            f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue{lost}",
-            "",
-        ),
+        ("lost", lost, ""),
         *_bridged(now["bridged"]),
         ("damaged", damage, ""),
         ("arrival to decoded", delays(now["decode_latency"]), ""),

@@ -58,7 +58,7 @@ def convert(
         try_whole(target, overwrite=overwrite)
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {source}", 0, 0)
-        opened = [of_source(one, part) for one in files.opener.joined(source)]
+        opened = [of_source(recording, part) for recording in files.opener.joined(source)]
         if target.suffix and len(opened) > 1:
             raise ProblemError(
                 f"{source}: holds {len(opened)} recordings; {target} must be a folder, without an ending"
@@ -83,7 +83,7 @@ def convert(
 def _places(opened: list[Recording], folder: Path) -> list[Path]:
     """Return the new files of recordings in a folder, which is created."""
     folder.mkdir(parents=True, exist_ok=True)
-    stems = [Path(one.name).stem if one.path.name == one.name else one.name for one in opened]
+    stems = [Path(each.name).stem if each.path.name == each.name else each.name for each in opened]
     places = [folder / f"{re.sub(r'[^A-Za-z0-9._-]+', '_', stem)}.mcap" for stem in stems]
     twice = next((place for place in places if places.count(place) > 1), None)
     if twice is not None:

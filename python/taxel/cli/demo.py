@@ -29,9 +29,6 @@ def demo(
     noise: Annotated[
         float | None, typer.Option(help="Duration of the noise test, s. Default: 60, with --no-clock 120.")
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="A folder of recordings: the footfalls in DATA/plate are played too.")
-    ] = None,
     readout: Annotated[
         Path | None, typer.Option(help="A readout to use instead of the one that comes with taxel.")
     ] = None,
@@ -64,7 +61,6 @@ def demo(
         seed=seed,
         live=not no_clock,
         noise_s=noise,
-        data=data,
         readout=readout,
         folder=folder,
     )

@@ -15,7 +15,7 @@ from taxel._base.files import try_whole, write_whole
 from taxel._base.times import begun
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import READ_HELP, progress, say_warnings, tare_option, try_report
+from taxel.cli._recordings import READ_HELP, ReportOption, progress, say_warnings, tare_option, try_report
 from taxel.cli._say import say
 from taxel.detections import Detections
 from taxel.spikes import to_ms
@@ -50,9 +50,7 @@ def detect(
     ] = None,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     csv: Annotated[Path | None, typer.Option(help="Write the detections to this .csv.")] = None,
-    report: Annotated[
-        Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
-    ] = None,
+    report: ReportOption = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -109,11 +107,11 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     # All recordings share one header.
-    repaired = any(one.found.repaired.any() for one in outcomes)
-    for one in outcomes:
+    repaired = any(outcome.found.repaired.any() for outcome in outcomes)
+    for outcome in outcomes:
         # A label may hold line breaks.
-        head, *rows = csv.reader(io.StringIO(one.found._csv(repaired=repaired), newline=""))
-        name = '"' + Path(one.name).name.replace('"', '""') + '"'
+        head, *rows = csv.reader(io.StringIO(outcome.found._csv(repaired=repaired), newline=""))
+        name = '"' + Path(outcome.name).name.replace('"', '""') + '"'
         if not text.tell():
             table.writerow(["recording", *head])
         for row in rows:
@@ -137,7 +135,7 @@ def _print(each: Detected, *, given: bool) -> None:
         say(f"times are from {begun(begin_us)} on")
     width = max(5, *(len(label) for label in detections.labels))
     first = detections[:_ROWS]
-    # A plain rule has no slope; levels of pictures come in steps, and may give one for all.
+    # A plain rule has no slope; levels of frames come in steps, and may give one for all.
     sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1
     say(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped)
     for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):

@@ -121,20 +121,6 @@ class _Typed:
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False
 
 
-@dataclass(frozen=True)
-class _Played:
-    """Hold what the board plays: its array, sensor and preset (`board`), the touch and its description (`text`)."""
-
-    seed: int
-    tare_ms: float
-    board: SceneFile
-    flaws: Flaws | None
-    faults: Faults | None
-    circuit: Circuit | None
-    touch: Any
-    text: str
-
-
 @app.command()
 def emulate(typed: _Typed) -> None:
     """Emulate a board that sends its events by UDP, in real time, until Ctrl-C.
@@ -153,13 +139,14 @@ def emulate(typed: _Typed) -> None:
     _together(typed)
     if typed.labels is not None:
         try_whole(typed.labels, overwrite=typed.overwrite)
-    played = _played(typed)
+    touch, text, board = _played(typed)
     console = Console(stderr=True, quiet=typed.as_json)
-    report = _emulated(typed, played, console)
+    console.print(f"{text}, to {typed.host}:{typed.port}", soft_wrap=True)
+    report = _emulated(typed, touch, board, console)
     if typed.labels is not None:
         console.print(f"truth: {typed.labels}", soft_wrap=True)
     if typed.as_json:
-        summary: dict[str, Any] = {"seed": played.seed, "scenes": typed.scenes, "preset": played.board.preset}
+        summary: dict[str, Any] = {"seed": board["seed"], "scenes": typed.scenes, "preset": board["preset"]}
         summary |= {"held": report.held, "verdict": report.verdict}
         summary |= {"wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
         say(json.dumps({**summary, **asdict(report)}))
@@ -176,18 +163,21 @@ def _together(typed: _Typed) -> None:
         raise ProblemError("--scene: leave out --replay, --pipe and --rest")
     if others and (typed.scenes is not None or typed.labels is not None or typed.rest):
         raise ProblemError("--scenes, --truth and --rest belong to scenes: leave them out with --replay or --pipe")
-    for name, value, other, there in (
+    for name, value, needed, there in (
         ("--speed", typed.speed, "--replay", typed.replay is not None),
         ("--limit", typed.limit, "--replay", typed.replay is not None),
         ("--noise-floor", typed.noise_floor, "--pipe", typed.pipe),
         ("--baud", typed.baud, "--line", typed.line is not None),
     ):
         if value is not None and not there:
-            raise ProblemError(f"{name} without {other}")
+            raise ProblemError(f"{name} without {needed}")
 
 
-def _played(typed: _Typed) -> _Played:
-    """Return what the board plays; if the array is known, a wrong preset is refused first."""
+def _played(typed: _Typed) -> tuple[Any, str, dict[str, Any]]:
+    """Return the touch that the board plays, its description, and the board as `taxel.simulate.emulate` takes it.
+
+    If the array is known, a wrong preset is refused first.
+    """
     with progress(quiet=True):
         scene_file = None if typed.scene is None else SceneFile.open(typed.scene)
     board = scene_file or SceneFile(Scene({}))
@@ -198,39 +188,51 @@ def _played(typed: _Typed) -> _Played:
     tare_ms = board.tare_ms if typed.tare is None else 1e3 * typed.tare
     drawn_seed = secrets.randbelow(TRAINING_SEED) if scene_file is None else scene_file.seed
     seed = drawn_seed if typed.seed is None else typed.seed
-    flaws, faults = _flaws(typed.flaw or [], seed), _faults(typed.fault or [], seed)
-    circuit = _circuit(typed.circuit or [], seed)
-    if typed.replay is not None:
-        touch: Any = Replay(open_one(typed.replay, limit=typed.limit), 1.0 if typed.speed is None else typed.speed)
-        text = f"replay of {typed.replay}"
-    elif typed.pipe:
-        touch, text = _piped(3 if typed.noise_floor is None else typed.noise_floor)
-    elif scene_file is not None:
-        touch, text = _from_file(scene_file, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}"
-    else:
-        touch, text = _scenes(seed, typed.scenes, tare_ms, typed.rest)
-    return _Played(seed, tare_ms, board, flaws, faults, circuit, touch, text)
-
-
-def _emulated(typed: _Typed, played: _Played, console: Console) -> EmulatorReport:
-    """Run the board until its end or Ctrl-C, and show the progress."""
-    host, port, line, wire = typed.host, typed.port, typed.line, typed.wire
     session = secrets.randbelow(65_536) if typed.session is None else typed.session
-    version_2 = Version2(typed.board, session, *(round(1e3 * ms) for ms in (typed.hold, typed.heartbeat, typed.states)))
-    console.print(f"{played.text}, to {host}:{port}", soft_wrap=True)
+    times_us = (round(1e3 * ms) for ms in (typed.hold, typed.heartbeat, typed.states))
+    options: dict[str, Any] = {
+        "seed": seed,
+        "preset": board.preset,
+        "tare_ms": tare_ms,
+        "array": board.array,
+        "sensor": board.sensor,
+        "wire": (2 if typed.asynchronous else None) if typed.wire is None else 2 if typed.wire == 2 else 1,
+        "version_2": Version2(typed.board, session, *times_us),
+        "flaws": _flaws(typed.flaw or [], seed),
+        "faults": _faults(typed.fault or [], seed),
+        "circuit": _circuit(typed.circuit or [], seed),
+        "reset_every_s": typed.reset_every,
+        "drift_ppm": typed.drift,
+        "control": None if typed.control is None else f"127.0.0.1:{typed.control}",
+        "baud": EmulateOptions.baud if typed.baud is None else typed.baud,
+    }
+    options |= {name: getattr(typed, name) for name in ("asynchronous", "line", "sync", "overwrite", "source_port")}
+    if typed.replay is not None:
+        speed = 1.0 if typed.speed is None else typed.speed
+        return Replay(open_one(typed.replay, limit=typed.limit), speed), f"replay of {typed.replay}", options
+    if typed.pipe:
+        return *_piped(3 if typed.noise_floor is None else typed.noise_floor), options
+    if scene_file is not None:
+        return _from_file(scene_file, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}", options
+    return *_scenes(seed, typed.scenes, tare_ms, typed.rest), options
+
+
+def _emulated(typed: _Typed, touch: Any, board: dict[str, Any], console: Console) -> EmulatorReport:
+    """Run the board until its end or Ctrl-C, and show the progress."""
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(pulse_style="bar.complete"), TextColumn("{task.fields[status]}"),
         TimeElapsedColumn(), console=console, transient=True, disable=typed.as_json,
     )  # fmt: skip
     last: list[EmulatorReport] = []
+    address = f"[{typed.host}]:{typed.port}" if ":" in typed.host else f"{typed.host}:{typed.port}"
     with bar, _TruthTable(typed.labels, typed.overwrite) as truth:
         task = bar.add_task("playing", total=None, status="")
 
         def begun(address: str | None) -> None:
             if address is not None:
                 console.print(f"commands are accepted at {address}")
-            if line is not None:
-                console.print(f"the serial line is {line}", soft_wrap=True)
+            if typed.line is not None:
+                console.print(f"the serial line is {typed.line}", soft_wrap=True)
 
         def watch(report: EmulatorReport) -> None:
             last[:] = [report]
@@ -239,34 +241,7 @@ def _emulated(typed: _Typed, played: _Played, console: Console) -> EmulatorRepor
             bar.update(task, status=f"{played_s}, {counted(report.changes, 'event')}, {late}")
 
         try:
-            last[:] = [
-                run(
-                    f"[{host}]:{port}" if ":" in host else f"{host}:{port}",
-                    played.touch,
-                    seed=played.seed,
-                    preset=played.board.preset,
-                    tare_ms=played.tare_ms,
-                    array=played.board.array,
-                    sensor=played.board.sensor,
-                    wire=(2 if typed.asynchronous else None) if wire is None else 2 if wire == 2 else 1,
-                    version_2=version_2,
-                    circuit=played.circuit,
-                    asynchronous=typed.asynchronous,
-                    flaws=played.flaws,
-                    faults=played.faults,
-                    reset_every_s=typed.reset_every,
-                    drift_ppm=typed.drift,
-                    control=None if typed.control is None else f"127.0.0.1:{typed.control}",
-                    line=line,
-                    baud=EmulateOptions.baud if typed.baud is None else typed.baud,
-                    sync=typed.sync,
-                    overwrite=typed.overwrite,
-                    source_port=typed.source_port,
-                    begun=begun,
-                    watch=watch,
-                    touched=truth.add,
-                )
-            ]
+            last[:] = [run(address, touch, **board, begun=begun, watch=watch, touched=truth.add)]
         except KeyboardInterrupt:
             # If scenes repeat without end, Ctrl-C is the regular end; else it interrupts the command.
             if not last or typed.scenes is not None or typed.replay is not None:

@@ -92,11 +92,11 @@ def info(
         if len(every) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:
                 raise ProblemError(_several(file, every))
-            infos = [taxel.tasks.info(one, tare) for one in every]
-            of_each = [one.facts for one in infos]
+            infos = [taxel.tasks.info(each, tare) for each in every]
+            of_each = [found.facts for found in infos]
             result = [json.dumps(of_each if len(every) > 1 else of_each[0])]
             say(*(result if as_json else chain.from_iterable(map(_pages, of_each))))
-            say_warnings(dict.fromkeys(text for one in infos for text in one.warnings))
+            say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
             return
         found = taxel.tasks.info(recording, tare)
         facts, pressed = found.facts, found.pressed
@@ -211,7 +211,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         words = f"{facts['intensities']} with intensity, {counted(len(facts['markers']), 'marker')}"
         yield "events", f"{facts['events']}, {words}"
     else:
-        yield ("samples" if "columns" in facts else "pictures"), f"{facts['pictures']} ({facts['unit']})"
+        yield ("samples" if "columns" in facts else "frames"), f"{facts['frames']} ({facts['unit']})"
         yield from _flaws(facts)
     if "columns" in facts:
         yield "columns", ", ".join(facts["columns"])
@@ -236,7 +236,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what pictures lack: values, times, and loads beyond the sensor's range."""
+    """Yield what frames lack: values, times, and loads beyond the sensor's range."""
     if facts["missing"]["values"]:
         yield "missing values", f"{facts['missing']['values']} of {facts['missing']['of']}"
     if (full := facts["full_scale"]) is not None:
@@ -247,7 +247,7 @@ def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "full scale", f"{readings}, the greatest value: larger loads may be cut off"
     if (gaps := facts["gaps"]) is not None:
         longest = f"the longest {to_ms(gaps['longest_us']):g} ms, from {gaps['t_us'] - _begin_us(facts)} us"
-        yield "gaps", f"{gaps['count']} of more than 2.5 intervals between pictures, {longest}"
+        yield "gaps", f"{gaps['count']} of more than 2.5 intervals between frames, {longest}"
 
 
 def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -266,7 +266,7 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if not facts["timed"]:
-        yield "time", "none: pictures are numbered; --rate-hz where a command needs times"
+        yield "time", "none: frames are numbered; --rate-hz where a command needs times"
     elif facts["from_us"] is not None:
         begin = _begin_us(facts)
         yield "board time", f"{facts['from_us'] - begin} to {facts['to_us'] - begin} us ({facts['seconds']:.3f} s)"
@@ -290,7 +290,7 @@ def _pressure(pressed: dict[str, Any], begin_us: int, *, timed: bool) -> Iterato
             most = pressed[name]["most"]
             size = counted(int(most), "taxel") if unit == "taxels" else f"{most:g} {unit}"
             at = pressed[name]["t_us"] - begin_us
-            yield words, f"at most {size}, at {f'{at} us' if timed else f'picture {at}'}"
+            yield words, f"at most {size}, at {f'{at} us' if timed else f'frame {at}'}"
     for unit, more in (("mm", " mm"), ("taxels", ""), ("places", " in units of the places")):
         across, down = ("column", "row") if unit == "taxels" else ("x", "y")
         if pressed.get(f"centre_{unit}") is not None:
@@ -303,8 +303,8 @@ def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         peak = f"{facts['peak_events_per_s_board']:.0f} events/s in the busiest 10 ms"
         before = ", before the start marker, where a board sends the rest of every taxel" * facts["peak_before_start"]
         yield "rate, board", f"{facts['events_per_s_board']:.0f} events/s; {peak}{before}"
-    if facts.get("pictures_per_s") is not None:
-        yield "rate", f"{facts['pictures_per_s']:.1f} pictures/s"
+    if facts.get("frames_per_s") is not None:
+        yield "rate", f"{facts['frames_per_s']:.1f} frames/s"
     if facts.get("events_per_s_host") is not None:
         host = f"{facts['events_per_s_host']:.0f} events/s, {facts['datagrams_per_s_host']:.0f} datagrams/s"
         yield "rate, host", f"{host} in {facts['seconds_host']:.3f} s"
@@ -322,7 +322,7 @@ def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         if counts.get(name) is not None:
             yield name.replace("_", " "), str(counts[name])
     no_loss = {"bytes", "words", "changes", "intensities", "markers", "datagrams", "intact", "events", "states"}
-    no_loss |= {"messages", "pictures", "samples"}
+    no_loss |= {"messages", "frames", "samples"}
     others = {name: n for name, n in counts.items() if isinstance(n, int) and name not in {*always, *facts["rebuilt"]}}
     for found in (others, counts.get("decoder", {}), counts.get("decoder_version_2", {}), facts["rebuilt"]):
         for name, n in found.items():

@@ -159,7 +159,7 @@ def lines(answer: Answer) -> list[str]:
         f"full: {full.period_ms:g} ms, {counted(full.taxels, 'taxel')}, to {full.window_ms:g} ms "
         f"{_interval(full.found)}, "
         f"{100 * full.found.right:.0f} % right"
-        + "".join(f"; pictures {e.bits:.2f}" for p, e in answer.frames.items() if p == full.period_ms)
+        + "".join(f"; frames {e.bits:.2f}" for p, e in answer.frames.items() if p == full.period_ms)
         + "".join(f"; {name} {e.bits:.2f}" for name, e in answer.classifiers.items()),
         "in brackets: where the bits lie when these trials, or whole groups, are drawn again (95 % of draws); of few "
         "trials the truth is outside more often than that",

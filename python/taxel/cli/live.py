@@ -39,7 +39,6 @@ from taxel.cli.board import (
 )
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout
-from taxel.detections import Detection
 from taxel.device import Cable
 from taxel.live import Live, Panel, Summary, delays
 from taxel.spikes import to_ms
@@ -91,7 +90,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
     JSON, written by the thread that made it: label; t_us, known_us, reported_us by the board's clock; slope_mv_per_ms;
     reported_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
-    which are counted. --panel shows the board in a browser; a slow viewer loses pictures, never data. Exit code 3:
+    which are counted. --panel shows the board in a browser; a slow viewer loses frames, never data. Exit code 3:
     nothing was received, or something was lost after it had arrived; 2: the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
@@ -206,10 +205,10 @@ def _print_summary(summary: Summary, guard_frames: float) -> None:
 
 def _unsent(summary: Summary) -> None:
     """Report lines that did not reach their destination."""
-    for one in summary.counters["sent"]:
-        if one["lost"]:
-            why = one["trouble"] or "read too slowly"
-            say(f"taxel: lines not sent to {one['to']}: {one['lost']} of {one['sent'] + one['lost']}: {why}", err=True)
+    for line in summary.counters["sent"]:
+        if lost := line["lost"]:
+            why = line["trouble"] or "read too slowly"
+            say(f"taxel: lines not sent to {line['to']}: {lost} of {line['sent'] + lost}: {why}", err=True)
 
 
 def _together(options: dict[str, Any], typed: _Typed) -> None:
@@ -274,10 +273,7 @@ def _watch(
                     pipeline, before = panel.live, None
                 if before is None:
                     before = pipeline.counters
-                detection = pipeline.next(REDRAW_S)
-                if detection is not None:
-                    _print(detection, console, echo)
-                _drain(pipeline, console, echo)
+                _drain(pipeline, console, echo, REDRAW_S)
                 now = pipeline.counters
             except ProblemError:
                 if panel is None or panel.live is pipeline:
@@ -304,17 +300,16 @@ def _watch(
                 before = now
 
 
-def _print(detection: Detection, console: Console, echo: Callable[[str], None]) -> None:
-    """Print a detection, with its delay after `known`; with --json the readout's thread has written it."""
-    if not console.quiet:
-        delay = to_ms(detection.latency or 0)
-        echo(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} output {delay:.2f} ms after it was known")
+def _drain(pipeline: Live, console: Console, echo: Callable[[str], None], wait_s: float = 0.0) -> None:
+    """Wait for a detection; print it and all that wait, each with its delay after `known`.
 
-
-def _drain(pipeline: Live, console: Console, echo: Callable[[str], None]) -> None:
-    """Print all detections that wait."""
-    while (detection := pipeline.next(0.0)) is not None:
-        _print(detection, console, echo)
+    With --json the readout's thread has written them.
+    """
+    while (detection := pipeline.next(wait_s)) is not None:
+        wait_s = 0.0
+        if not console.quiet:
+            delay = to_ms(detection.latency or 0)
+            echo(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} output {delay:.2f} ms after it was known")
 
 
 def _silence(now: dict[str, Any], place: str) -> str:
@@ -340,6 +335,8 @@ def _state(now: dict[str, Any], place: str) -> Text:
         return Text(silence)
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
-    sent = "".join(f"\n{counted(one['lost'], 'line')} lost to {one['to']}" for one in now["sent"] if one["lost"])
+    sent = "".join(
+        f"\n{counted(counts['lost'], 'line')} lost to {counts['to']}" for counts in now["sent"] if counts["lost"]
+    )
     dropped = f"\n{counted(now['events_dropped'], 'event')} dropped before the readout" if now["events_dropped"] else ""
     return Text((dropped + sent).lstrip())

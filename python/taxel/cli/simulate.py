@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import Progress
 
 import taxel
 from taxel._base.files import try_whole, write_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import App
+from taxel.cli._bar import bar
 from taxel.cli._recordings import progress
 from taxel.cli._say import say
-from taxel.cli.console import Console
 
 app = App()
 
@@ -65,24 +64,20 @@ def simulate(
     about: dict[str, Any] = {"scene": str(scene), "seed": seed, "contacts": [contact._asdict() for contact in contacts]}
     about["peak_n"] = float(force.max())
     lines = [f"{scene}: {counted(len(contacts), 'touch', 'touches')}, at most {force.max():.3g} N"]
-    bar = Progress(console=Console(stderr=True, quiet=as_json), transient=True)
-    with bar:
+    with bar(as_json) as show:
         if out is not None or movie is not None:
-            task = bar.add_task("playing", total=1.0)
             played = taxel.simulate.play(
                 scene_file.acts(),
                 seed=seed,
-                watch=lambda share: bar.update(task, completed=share),
+                watch=lambda share: show("playing", round(100 * share), 100),
                 **scene_file.options,
             )
-            bar.update(task, completed=1.0)
             about["events"] = len(played.events)
         if out is not None:
             lost = taxel.convert(played.events, out, overwrite=overwrite)
             lines.append(f"{counted(len(played.events), 'event')} written to {out}")
             lines += [f"  lost: {what}" for what in lost]
         if movie is not None:
-            task = bar.add_task("drawing", total=1.0)
             film(
                 played.events,
                 movie,
@@ -90,7 +85,7 @@ def simulate(
                 frame_us=scene_file.registers.frame_us,
                 slower=slower,
                 overwrite=overwrite,
-                watch=lambda share: bar.update(task, completed=share),
+                watch=lambda share: show("drawing", round(100 * share), 100),
             )
             lines.append(f"movie written to {movie}")
     if labels is not None:

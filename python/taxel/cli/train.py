@@ -17,7 +17,16 @@ from taxel._base.messages import collected
 from taxel._core import ProblemError
 from taxel.cli._app import App
 from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import READ_HELP, SET_HELP, assignments, progress, say_warnings, tare_option, try_report
+from taxel.cli._recordings import (
+    READ_HELP,
+    SET_HELP,
+    ReportOption,
+    assignments,
+    progress,
+    say_warnings,
+    tare_option,
+    try_report,
+)
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
@@ -81,9 +90,7 @@ def train(
             "--search", help="Choose each neuron's parameters among those that the recipe lists, on held-out data."
         ),
     ] = False,
-    report: Annotated[
-        Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
-    ] = None,
+    report: ReportOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Train neurons to detect labelled events, and save them as a readout.
@@ -131,7 +138,7 @@ def train(
     lines = [*training.lines(), "", f"written to {out}; next: {_next(training, out, tare)}"]
     lines += [f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()]
     lines += [] if report is None else [f"report: {report / 'report.html'}"]
-    say(*lines, *(f"warning: {one}" for one in training.unreliable()))
+    say(*lines, *(f"warning: {warning}" for warning in training.unreliable()))
 
 
 def _try_rules(place: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:
@@ -142,8 +149,8 @@ def _try_rules(place: Path | None, labels: str, recordings: Sequence[Recording],
         return
     with collected():  # the training warns of the same
         names = {label for events in references(labels, recordings) for label in events}
-    for one in (place, *(_of_label(place, label) for label in sorted(names))):
-        try_whole(one, overwrite=overwrite)
+    for path in (place, *(_of_label(place, label) for label in sorted(names))):
+        try_whole(path, overwrite=overwrite)
 
 
 def _write_rules(plain: PlainScore | None, place: Path | None, *, overwrite: bool) -> dict[Path, list[str]]:
@@ -176,6 +183,6 @@ def _are_quiet(recordings: Sequence[Recording]) -> bool:
     """Return whether a detection finds the rest of each recording by itself."""
     try:
         with collected():
-            return all(taxel.tasks.rest(one) for one in recordings)
+            return all(taxel.tasks.rest(recording) for recording in recordings)
     except ProblemError:
         return False

@@ -41,7 +41,7 @@ def view(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Show pictures in N or kPa by this calibration (taxel calibrate). Default: that beside the recording.",
+            help="Show frames in N or kPa by this calibration (taxel calibrate). Default: that beside the recording.",
         ),
     ] = None,
     panel_host: PanelHostOption = "127.0.0.1",
@@ -87,7 +87,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         opened = files.opener.joined(file)
         if calibration is None:
             return opened
-        return [Recording(calibrated_by(one._contents, calibration)) for one in opened]
+        return [Recording(calibrated_by(sensor._contents, calibration)) for sensor in opened]
 
     # What was opened now, so that the errors are those of the command, is what the panel asks for first.
     opened = {first.absolute(): opens(first)}

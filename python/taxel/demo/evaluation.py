@@ -32,7 +32,6 @@ class Evaluation:
     area: SpikeTrains
     """Contact area of these events."""
     detections: Detections
-    plain: Detections
     contacts: list[Contact]
     force_n: NDArray[np.float32]
     """By frame, from the board's first."""
@@ -45,28 +44,15 @@ class Evaluation:
         return int(to_us(self.area.start))
 
     @property
-    def stop_us(self) -> float:
-        """When the last frame ended."""
-        return len(self.force_n) * FRAME_US
-
-    def crossings(self, label: str) -> NDArray[np.float64]:
-        """Return when a neuron's potential crossed its threshold, ms."""
-        return to_ms(self.detections[label].t) + self.readout.neurons[label].delay_ms
+    def seconds(self) -> float:
+        """How long the board played from the start marker on."""
+        return (len(self.force_n) * FRAME_US - self.start_us) * 1e-6
 
     def potential(self, label: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a neuron's potential at `times` (ms), mV."""
         cell = self.readout.neurons[label]
-        return cell.neuron.potential(cell.weights, self.area, times, spikes=self.crossings(label))
-
-    def first_input(self, contact: Contact, label: str) -> float | None:
-        """Return the time (us) of the first input spike of a touch, or of the last one at its end; None without any."""
-        begin, end = contact.start_us - FRAME_US, contact.stop_us + 5_000.0
-        rises, falls = to_us(self.area[0]), to_us(self.area[5])
-        if label == "contact":
-            inputs = rises[(rises >= begin) & (rises < contact.stop_us)]
-            return float(inputs[0]) if len(inputs) else None
-        inputs = falls[(falls >= contact.start_us) & (falls < end)]
-        return float(inputs[-1]) if len(inputs) else None
+        crossings = to_ms(self.detections[label].t) + cell.delay_ms
+        return cell.neuron.potential(cell.weights, self.area, times, spikes=crossings)
 
 
 def evaluate_acts(
@@ -90,19 +76,16 @@ def evaluate_events(
     # Before the start marker the board sends the rest of every taxel, which is no touch.
     detections = detections[detections.t >= start]
     area = ContactArea(tare=tare).encode(events)
-    area = area.between(to_ms(start), area.stop)
     contacts, force = truth(acts)
     plain = run(PlainRule("area", 2), events, frame_us=FRAME_US, tare=tare)
-    plain = plain[plain.t >= start]
     return Evaluation(
         readout=readout,
         tare=tare,
         events=events.between(start, np.inf),
-        area=area,
+        area=area.between(to_ms(start), area.stop),
         detections=detections,
-        plain=plain,
         contacts=contacts,
         force_n=force,
         judged=judge(detections, contacts),
-        judged_plain=judge(plain, contacts),
+        judged_plain=judge(plain[plain.t >= start], contacts),
     )

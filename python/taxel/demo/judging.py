@@ -30,7 +30,6 @@ CLASSES: tuple[tuple[str, Callable[[Contact], bool]], ...] = (
     ("pressed by hand, 0.4 to 1 N", lambda c: c.kind == "hand" and 0.4 <= c.peak_n < 1.0),
     ("pressed by hand, below 0.4 N", lambda c: c.kind == "hand" and c.peak_n < 0.4),
     ("come to rest, then lifted", lambda c: c.kind == "rest"),
-    ("footfall", lambda c: c.kind == "pictures"),
 )
 
 #: Within how many ms of a first impact and of its lift-off `known` should lie, in 95 of 100.
@@ -47,8 +46,6 @@ class Row(NamedTuple):
     """Time of the detection minus true time, of those that were found."""
     delays_ms: NDArray[np.float64]
     """`known` minus true, likewise."""
-    places: NDArray[np.int64]
-    """Which touches were found, and by which detections: shape (found, 2)."""
 
     @property
     def found(self) -> int:
@@ -81,6 +78,11 @@ class Judged(NamedTuple):
         """Return one row; its name may be cut short."""
         return next(row for row in self.rows if row.label == label and row.name.startswith(name))
 
+    @property
+    def false_counts(self) -> dict[str, int]:
+        """How many detections of each label belong to no touch."""
+        return {label: len(times) for label, times in self.false.items()}
+
     def within_goal(self, label: str) -> float:
         """Return the share of all first impacts of which `known` lay within the goal."""
         row = self.row("first", label)
@@ -95,24 +97,19 @@ class Judged(NamedTuple):
         goals = _plain({label: self.within_goal(label) for label in LABELS})
         return {
             "classes": table,
-            "first_within_goal": {label: {"goal_ms": GOALS[label], "share": goals[label]} for label in LABELS},
-            "false": {label: len(times) for label, times in self.false.items()},
+            "first_within_goal": {
+                label: {"touches": self.row("first", label).touches, "goal_ms": GOALS[label], "share": goals[label]}
+                for label in LABELS
+            },
+            "false": self.false_counts,
             "false_within_a_touch": self.false_within,
         }
 
 
 def judge(detections: Detections, contacts: Sequence[Contact]) -> Judged:
-    """Match detections with touches in order: impacts within 10 ms, presses and all others within 50.
+    """Match detections of "contact" (force leaves zero) and "lift" (force returns there) with touches in order.
 
-    Parameters
-    ----------
-    found : Detections
-        With the labels "contact" (force leaves zero) and "lift" (returns there).
-    contacts : sequence of Contact
-
-    Returns
-    -------
-    Judged
+    Impacts are matched within 10 ms, presses and all others within 50.
     """
     windows = [_IMPACT_MS if c.kind in ("first", "bounce") else _PRESS_MS for c in contacts]
     rows: list[Row] = []
@@ -128,8 +125,7 @@ def judge(detections: Detections, contacts: Sequence[Contact]) -> Judged:
         for name, belongs in CLASSES:
             of_class = np.array([belongs(c) for c in contacts], bool)
             chosen = of_class[touch] if len(touch) else np.zeros(0, bool)
-            places = np.column_stack([touch[chosen], mine_at[chosen]])
-            rows.append(Row(name, label, int(of_class.sum()), errors[chosen], delays[chosen], places))
+            rows.append(Row(name, label, int(of_class.sum()), errors[chosen], delays[chosen]))
         false[label] = mine.t[result.false_detections]
         within[label] = sum(any(c.start_us <= t <= c.stop_us for c in contacts) for t in false[label])
     return Judged(rows, false, within)

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from taxel._base.messages import counted
 from taxel.demo.evaluation import Evaluation
-from taxel.demo.judging import LABELS, Judged
+from taxel.demo.judging import LABELS
 from taxel.events import Events
 from taxel.report.svg import INK
 from taxel.simulate import Contact
 from taxel.spikes import to_ms, to_us
 from taxel.wire import FRAME_US
 
-__all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates", "scene_picture"]
+__all__ = ["close_up", "maps", "scene_picture"]
 
 #: How many taxels of a side a map shows.
 _CROP = 28
@@ -111,9 +108,9 @@ def maps(evaluation: Evaluation, contact: Contact) -> Figure:
     seen = [h[top : top + _CROP, left : left + _CROP] for h in held]
     most = max(1.0, *(float(s.max()) for s in seen))
     image = None
-    for axis, picture, after in zip(axes[0], seen, moments, strict=True):
+    for axis, frame, after in zip(axes[0], seen, moments, strict=True):
         edges = (left - 0.5, left + _CROP - 0.5, top + _CROP - 0.5, top - 0.5)
-        image = axis.imshow(picture, cmap="magma", vmin=0.0, vmax=most, interpolation="nearest", extent=edges)
+        image = axis.imshow(frame, cmap="magma", vmin=0.0, vmax=most, interpolation="nearest", extent=edges)
         axis.set(title=f"{after:+.1f} ms", xlabel="column", ylabel="row")
     if image is not None:
         figure.colorbar(image, ax=list(axes[0]), label="ticks above rest", shrink=0.9)
@@ -128,97 +125,3 @@ def _held(events: Events, until_us: float, rest: NDArray[np.float64]) -> NDArray
         # The last of equal places stays.
         held[events.y[before], events.x[before]] = events.intensity[before]
     return held - rest
-
-
-def rates(evaluation: Evaluation, bits: int = 9) -> Figure:
-    """Draw the data rate of impacts as events beside that of frames, as figure 5.14."""
-    impacts = [c for c in evaluation.contacts if c.kind == "first"]
-    spans = [evaluation.events.between(c.start_us - 500.0, c.stop_us + 1_000.0) for c in impacts]
-    each = np.array([len(s) / max(1, int(s.t[-1] - s.t[0])) * 1e6 for s in spans if len(s) > 1])
-    figure, axes = _figure(1, 1, (9.5, 2.6))
-    axis = axes[0, 0]
-    bins = np.geomspace(1e3, 1e9, 121)
-    if len(each):
-        axis.hist(
-            each * bits, bins, color=_COLOURS["contact"], label=f"events in a first impact, {bits} bits each (as 5.14)"
-        )
-        axis.hist(each * 80, bins, color=_COLOURS["lift"], label="the same on the wire, 80 bits with intensity")
-    whole = len(evaluation.events) / max(1.0, evaluation.stop_us - evaluation.start_us) * 1e6
-    taxels, hz = evaluation.events.array.rows * evaluation.events.array.columns, 1e6 / FRAME_US
-    for value, colour, name in (
-        (whole * 80, "#4b8f4b", "the whole play on the wire"),
-        (taxels * hz * 2, _QUIET, "frames, 2 bits a taxel"),
-        (taxels * hz * 10, INK, "frames, 10 bits a taxel"),
-    ):
-        axis.axvline(value, color=colour, linewidth=2.0, label=f"{name}: {_bits(value)}")
-    axis.set(xscale="log", xlabel="bits a second (log scale)", ylabel="impacts", xlim=(1e4, 1e9))
-    axis.legend()
-    return figure
-
-
-def _bits(value: float) -> str:
-    return f"{value / 1e6:.3g} Mbit/s" if value >= 1e6 else f"{value / 1e3:.3g} kbit/s"
-
-
-def delays_by_class(judged: Judged, plain: Judged) -> Figure:
-    """Draw the delay of each touch's detection by class; neuron above, plain rule below."""
-    figure, axes = _figure(1, 2, (9.5, 3.6), sharey=True)
-    names = [row.name for row in judged.rows if row.label == "contact" and row.touches]
-    jitter = np.random.default_rng(1)
-    for axis, label in zip(axes[0], LABELS, strict=True):
-        for place, name in enumerate(names):
-            for who, shift, colour in ((judged, 0.17, _COLOURS[label]), (plain, -0.17, _QUIET)):
-                delays = who.row(name, label).delays_ms
-                height = place + shift + jitter.uniform(-0.08, 0.08, len(delays))
-                kind = ("neuron" if who is judged else "plain rule") * (place == 0)
-                axis.plot(delays, height, ".", color=colour, markersize=3.5, label=kind)
-        axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0, label="true moment")
-        axis.set(xscale="symlog", xlabel="known minus true (ms)", title=label)
-        axis.legend()
-        axis.set_xticks([-30, -10, -3, -1, 0, 1, 3, 10, 30], ["-30", "-10", "-3", "-1", "0", "1", "3", "10", "30"])
-        axis.minorticks_off()
-    axes[0, 0].set_yticks(range(len(names)), names)
-    # Half a class of room at either end, from the first class at the top.
-    axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
-    return figure
-
-
-def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
-    """Draw the medians of what a delay is made of, one bar a class and label."""
-    figure, axes = _figure(1, 1, (9.5, 0.9 + 0.34 * max(1, len(parts))))
-    axis = axes[0, 0]
-    colours = {"physics": _TRUE, "kernel": "#b5423c", "frame": "#2f6690", "host": "#4b8f4b"}
-    labelled: set[str] = set()
-    for place, split in enumerate(parts.values()):
-        left = 0.0
-        for name, value in split.items():
-            # A bar of no width would have the axis end where it stands, and clip the others.
-            if value == 0.0:
-                continue
-            # A part below 0 (the base loses the ball before it leaves) is drawn thin, over the part that starts there.
-            shape = {"height": 0.7} if value >= 0 else {"height": 0.25, "zorder": 3}
-            axis.barh(place, value, left=left, color=colours[name], label=None if name in labelled else name, **shape)
-            labelled.add(name)
-            left += value
-    axis.set_yticks(range(len(parts)), list(parts))
-    axis.invert_yaxis()
-    axis.set(xlabel="part of the delay (ms, medians)")
-    axis.legend()
-    return figure
-
-
-def noise(evaluation: Evaluation) -> Figure:
-    """Draw a stretch in which nothing touches: events a second, and detections."""
-    figure, axes = _figure(1, 1, (9.5, 1.8))
-    axis: Axes = axes[0, 0]
-    seconds = np.arange(0.0, (evaluation.stop_us - evaluation.start_us) * 1e-6, 1.0)
-    each = np.histogram((evaluation.events.t - evaluation.start_us) * 1e-6, np.append(seconds, seconds[-1] + 1.0))[0]
-    axis.bar(seconds + 0.5, each, width=0.9, color=_QUIET, label="events")
-    for label in LABELS:
-        for k, at in enumerate(evaluation.detections[label].t):
-            axis.axvline((at - evaluation.start_us) * 1e-6, color=_COLOURS[label], label=f"{label} detected" * (k == 0))
-    axis.legend()
-    counts: Sequence[str] = [f"{counted(len(evaluation.detections[label]), 'time')} {label}" for label in LABELS]
-    axis.set_xlim(0.0, seconds[-1] + 1.0)
-    axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: detected {' and '.join(counts)}")
-    return figure

@@ -8,13 +8,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import taxel
 from taxel._base.child_process import ChildProcess
 from taxel._base.messages import counted
 from taxel._core import DeviceError
 from taxel.demo.evaluation import Evaluation, evaluate_events
+from taxel.demo.screen import Screen
 from taxel.demo.script import script
 from taxel.detect import Readout, run
 from taxel.detections import Detection, Detections
@@ -22,20 +23,13 @@ from taxel.live import Live
 from taxel.simulate import Contact, truth
 from taxel.wire import FRAME_US
 
-__all__ = ["Playing", "Screen", "play_live"]
+__all__ = ["Playing", "play_live"]
 
 #: How often the screen is drawn anew, s.
 _DRAW_EVERY_S = 0.1
 
 #: How long the host goes on receiving after the board's process has ended, s.
 _LISTEN_ON_S = 0.3
-
-
-class Screen(Protocol):
-    """The display while the demo runs."""
-
-    def draw(self, counters: dict[str, Any], picture: Any, detections: list[Detection]) -> None:
-        """Draw counters, picture and detections so far."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +88,7 @@ def play_live(
                     ended = time.monotonic()
                 if time.monotonic() > drawn + _DRAW_EVERY_S:
                     drawn = time.monotonic()
-                    shown.draw(live.counters, live.picture, detections)
+                    shown.draw(live.counters, live.frame, detections)
             printed, complaint = board.communicate()
         finally:
             board.end()

@@ -41,8 +41,8 @@ class Screen:
         self._before: tuple[float, int] = (0.0, 0)
         self._rate = 0.0
 
-    def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], detections: list[Detection]) -> None:
-        """Draw counters, picture and detections so far."""
+    def draw(self, counters: dict[str, Any], frame: NDArray[np.uint16], detections: list[Detection]) -> None:
+        """Draw counters, frame and detections so far."""
         now = (counters["board_us"] or 0) * 1e-6
         then, events = self._before
         if now > then:
@@ -68,7 +68,7 @@ class Screen:
             # No room for the picture: counters and detections alone.
             pictured, panel_height = [], len(rows.rows) + 2
         else:
-            pictured, panel_height = [Panel(_blocks(picture), title="pressure", width=_PICTURE_WIDTH)], _PICTURE_HEIGHT
+            pictured, panel_height = [Panel(_blocks(frame), title="pressure", width=_PICTURE_WIDTH)], _PICTURE_HEIGHT
         above = Table.grid()
         above.add_row(*pictured, Panel(rows, title=state, height=panel_height))
         self._drawing.update(
@@ -101,10 +101,10 @@ class Screen:
         return line
 
 
-def _blocks(picture: NDArray[np.uint16]) -> Text:
-    """Return a picture of ticks as half blocks: two rows a line; each cell is the largest of 2 x 2 taxels."""
-    above = np.clip((picture.astype(float) - np.median(picture) - 6.0) / 80.0, 0.0, 1.0)
-    rows, columns = (n // 2 for n in picture.shape)
+def _blocks(frame: NDArray[np.uint16]) -> Text:
+    """Return a frame of ticks as half blocks: two rows a line; each cell is the largest of 2 x 2 taxels."""
+    above = np.clip((frame.astype(float) - np.median(frame) - 6.0) / 80.0, 0.0, 1.0)
+    rows, columns = (n // 2 for n in frame.shape)
     cells = np.sqrt(above[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2).max(axis=(1, 3)))
     lines = []
     for upper, lower in zip(cells[::2], cells[1::2], strict=True):

@@ -53,9 +53,7 @@ def left_to_rest(seed: int, index: int) -> Scene:
     return Scene.draw(seed, index, left_to_rest=True)
 
 
-def script(
-    seed: int, scenes: int, *, tare_ms: float = 50.0, dashpot_ms: float | None = None, draw: Draw = drawn
-) -> list[Act]:
+def script(seed: int, scenes: int, *, tare_ms: float = 50.0, draw: Draw = drawn) -> list[Act]:
     """Return silence for the tare, `scenes` scenes of `seed`, and a little silence.
 
     Parameters
@@ -64,15 +62,10 @@ def script(
     scenes : int, 0 or more
     tare_ms : float
         How long the board is tared before.
-    dashpot_ms : float, optional
-        Another dashpot than the foam's usual one.
     draw : function of seed and index
         Gives each scene.
     """
-    drawn_scenes = [draw(seed, index) for index in range(scenes)]
-    if dashpot_ms is not None:
-        drawn_scenes = [scene.replace(foam={"dashpot_ms": dashpot_ms}) for scene in drawn_scenes]
-    return [Silence(tare_ms + _LEAD_MS), *drawn_scenes, Silence(100.0)]
+    return [Silence(tare_ms + _LEAD_MS), *(draw(seed, index) for index in range(scenes)), Silence(100.0)]
 
 
 def endless(seed: int, *, tare_ms: float = 50.0, draw: Draw = drawn) -> Iterator[Act]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import comb
 from typing import NamedTuple
 
@@ -22,7 +23,7 @@ from taxel.encode import ContactArea, Encoder, Moments
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
-from taxel.recording.rest import of_pictures
+from taxel.recording.rest import of_frames
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 
@@ -34,7 +35,7 @@ _BEFORE_US = 20_000
 _LABELS = 4
 #: Of fewer labels no five folds can be made.
 _FIVE_FOLDS = 10
-#: Into so many parts a recording is divided to see a drift, at so many pictures of each.
+#: Into so many parts a recording is divided to see a drift, at so many frames of each.
 _PARTS, _LOOKS = 8, 40
 #: A touched taxel reads so many times its drift.
 _TIMES = 4
@@ -94,80 +95,131 @@ def advised(
     ]
     if not many:
         return {}
-    sound, floor = checked(examples), floor_of(made.recipe.encoder)
-    times = _OfTimes(
-        off_by(sound, many, floor), held_by_tare(sound, floor), loaded_at_rest(examples, made.recipe.encoder)
-    )
-    better = (
-        {}
-        if plain is None or plain.together is None
-        else {label: plain.together[label] for label in plain.better(scored)}
-    )
-    channels, recipe, fall = lacks_neighbours(examples), _other_recipe(made, examples), fallen(examples)
-    if fall:
+    if fall := fallen(examples):
         return dict.fromkeys(many, Advice("falls = true in a layout file", fall))
+    sound, encoder = checked(examples), made.recipe.encoder
+    off, held = off_by(sound, many, floor_of(encoder)), held_by_tare(sound, floor_of(encoder))
+    known = _Known(made, sound, scored, learnt, search_s, plain, off, held, loaded_at_rest(examples, encoder))
+    recipe = _other_recipe(made, examples)
     return {
-        label: _of_labels(label, scored[label], times, recipe)
-        or _of_time(label, scored[label], sound)
-        or _of_name(made, label, scored[label])
-        or _of_tare(made, label, scored[label], times)
-        or _advice(
-            made,
-            label,
-            scored,
-            learnt[label],
-            search_s,
-            better.get(label),
-            _chance(label, scored, plain),
-            channels=channels,
-        )
+        label: known.of_labels(label, recipe)
+        or known.of_time(label)
+        or known.of_name(label)
+        or known.of_tare(label)
+        or known.of_mistakes(label)
         for label in many
     }
 
 
-class _OfTimes(NamedTuple):
-    """What is known of the times of labels, and of the tares: taxels that hold a touch, or are loaded at rest."""
+@dataclass(frozen=True)
+class _Known:
+    """Hold what is known of a training: as in `advised`, and of labels and tares what is off, held or loaded."""
 
+    made: Trained
+    examples: Sequence[Example]
+    scored: Score
+    learnt: Score
+    search_s: float | None
+    plain: PlainScore | None
     off: Mapping[str, Off]
     held: int
     loaded: int
 
+    def of_labels(self, label: str, recipe: Advice | None) -> Advice | None:
+        """Return what is wrong with labels, if anything is: their times, their number, or the recipe that they have."""
+        if label in self.off:
+            because = f"{self.off[label]}, and are aligned within {WINDOW_MS:.0f} ms only"
+            return Advice("other times of the labels", because)
+        scored = self.scored[label]
+        if scored.events < TWO_FOLDS:
+            there = f"there {'is' if scored.events == 1 else 'are'} {scored.events}"
+            return Advice(
+                "more labels", f"{there}; {TWO_FOLDS} are the least to score it held out, {_FIVE_FOLDS} for five folds"
+            )
+        return recipe
 
-def _of_labels(label: str, scored: Score, times: _OfTimes, recipe: Advice | None) -> Advice | None:
-    """Return what is wrong with labels, if anything is: their times, their number, or the recipe that they have."""
-    if label in times.off:
-        because = f"{times.off[label]}, and are aligned within {WINDOW_MS:.0f} ms only"
-        return Advice("other times of the labels", because)
-    if scored.events < TWO_FOLDS:
-        there = f"there {'is' if scored.events == 1 else 'are'} {scored.events}"
+    def of_time(self, label: str) -> Advice | None:
+        """Return that events may lack labels before the first and behind the last, where much time lies there."""
+        (outside, whole), scored = unlabelled(self.examples, label), self.scored[label]
+        found = scored.false <= scored.missed and 2 * scored.found >= scored.events
+        if found or outside < _UNLABELLED * whole:
+            return None
         return Advice(
-            "more labels", f"{there}; {TWO_FOLDS} are the least to score it held out, {_FIVE_FOLDS} for five folds"
+            "labels of all events",
+            f"{outside / 1e6:.1f} of {whole / 1e6:.1f} s lie before the first or behind the last one, and an event "
+            "without its label counts as false: label those too, or cut the recording (taxel cut) to what is labelled",
         )
-    return recipe
 
+    def of_name(self, label: str) -> Advice | None:
+        """Return that a label without its name may be the end of a touch, where it was learnt as a kind of touch."""
+        alignment = self.made.alignments.get(label)
+        kinds = self.made.recipe.about == recipes.read("touch")["about"] and not recipes.knows("touch", label)
+        if not kinds or self.scored[label].found or alignment is None or alignment.train is not None:
+            return None
+        ends = ", ".join(("lift", *(name for name, of in recipes.read("touch")["also"].items() if of == "lift")))
+        because = (
+            f"by this one it is learnt as a kind of touch, told as one begins; names of the end of a touch are {ends}"
+        )
+        return Advice("another name of the label", because)
 
-def _of_time(label: str, scored: Score, examples: Sequence[Example]) -> Advice | None:
-    """Return that events may lack labels before the first and behind the last, where much time lies there."""
-    outside, whole = unlabelled(examples, label)
-    found = scored.false <= scored.missed and 2 * scored.found >= scored.events
-    if found or outside < _UNLABELLED * whole:
+    def of_tare(self, label: str) -> Advice | None:
+        """Return what is wrong with a tare, if anything is."""
+        alignment, scored = self.made.alignments.get(label), self.scored[label]
+        if self.held >= TOUCH:
+            late_ms = 0.0 if alignment is None or alignment.train is None else -alignment.median_ms
+            why = f", as labels lie {late_ms:.0f} ms after what was felt (median)" * (late_ms > to_ms(_BEFORE_US))
+            return Advice(
+                "another tare", f"it holds a touch of {self.held} taxels{why}; give one of seconds, or a file", "--tare"
+            )
+        if self.loaded >= TOUCH:
+            return Advice(
+                "another tare", f"{self.loaded} taxels read above theirs while nothing touches them", "--tare"
+            )
+        if alignment is None:
+            return None
+        # Where no input follows the labels none was moved.
+        labels = len(alignment.given)
+        unfelt = labels if alignment.train is None else int(alignment.unpaired.sum())
+        if 2 * unfelt > labels and 2 * scored.found < scored.events:
+            return Advice(
+                "other labels, or another tare",
+                f"nothing was felt of {unfelt} of {counted(labels, 'label')}: they are of another recording, or their "
+                "times are off by more than 50 ms, each by another time, or they name what the sensor does not feel",
+            )
+        if alignment.train is not None and 2 * unfelt > scored.missed + scored.false:
+            return Advice(
+                "another tare",
+                f"nothing was felt of {counted(unfelt, 'label')}, unless their times are off by more than 50 ms, each "
+                "by another time, or they are of another recording",
+            )
         return None
-    return Advice(
-        "labels of all events",
-        f"{outside / 1e6:.1f} of {whole / 1e6:.1f} s lie before the first or behind the last one, and an event without "
-        "its label counts as false: label those too, or cut the recording (taxel cut) to what is labelled",
-    )
 
-
-def _of_name(made: Trained, label: str, scored: Score) -> Advice | None:
-    """Return that a label without its name may be the end of a touch, where it was learnt as a kind of touch."""
-    alignment = made.alignments.get(label)
-    kinds = made.recipe.about == recipes.read("touch")["about"] and not recipes.knows("touch", label)
-    if not kinds or scored.found or alignment is None or alignment.train is not None:
-        return None
-    ends = ", ".join(("lift", *(name for name, of in recipes.read("touch")["also"].items() if of == "lift")))
-    because = f"by this one it is learnt as a kind of touch, told as one begins; names of the end of a touch are {ends}"
-    return Advice("another name of the label", because)
+    def of_mistakes(self, label: str) -> Advice:
+        """Return what helps against the mistakes of a readout whose labels and tares are right."""
+        alone, chance = self.learnt[label], _chance(label, self.scored, self.plain)
+        points = len(self.made.recipe.points_of(label))
+        wrong, learnt = self.scored[label].rank[0], alone.rank[0]
+        rules = None if self.plain is None or label not in self.plain.better(self.scored) else self.plain.together
+        if rules is not None and 2 * rules[label].rank[0] <= wrong:
+            return _by_rule(self.made, rules[label].rank[0], wrong)
+        if lacks_neighbours(self.examples) and (_for_touch(self.made) or chance):
+            array = self.made.readout.array
+            size = "ROWSxCOLUMNSxMM" if array is None else f"{array.rows}x{array.columns}xMM"
+            because = "channels in a row at a known distance, MM mm, have neighbours; then the recipe touch fits"
+            return Advice(f"--array {size}", because, "--array")
+        if chance and any(isinstance(encoder, Moments) for encoder in self.made.recipe.encoder._each()):
+            return Advice(
+                "other kinds",
+                f"{chance}: the inputs of this recipe are moments of the frame, as area and load, and its centre, "
+                "which is tried where these tell too few; where kinds differ otherwise, --recipe gait_plate, whose "
+                "inputs are the taxels, may tell them, and taxel information says whether they differ; or labels are "
+                "few or mixed up",
+                "--recipe",
+            )
+        if self.search_s is not None and 2 * learnt > wrong and points > 1:
+            because = f"it tries {points} sets of parameters, in about {points * self.search_s:.0f} s"
+            return Advice("--search", because, "--search")
+        return Advice("more labels", f"of those that it learnt {alone.missed} are missed, and {alone.false} are false")
 
 
 def _other_recipe(made: Trained, examples: Sequence[Example]) -> Advice | None:
@@ -177,83 +229,16 @@ def _other_recipe(made: Trained, examples: Sequence[Example]) -> Advice | None:
     if used is None or isinstance(source, SpikeTrains):
         return None
     fits, why = recipes.chosen(source, made.readout.labels)
-    return (
-        None
-        if fits == used
-        else Advice(f"--recipe {fits}", f"it is made for {why}; this training took {used}", "--recipe")
-    )
-
-
-def _of_tare(made: Trained, label: str, scored: Score, times: _OfTimes) -> Advice | None:
-    """Return what is wrong with a tare, if anything is."""
-    alignment = made.alignments.get(label)
-    if times.held >= TOUCH:
-        late_ms = 0.0 if alignment is None or alignment.train is None else -alignment.median_ms
-        why = f", as labels lie {late_ms:.0f} ms after what was felt (median)" * (late_ms > to_ms(_BEFORE_US))
-        return Advice(
-            "another tare", f"it holds a touch of {times.held} taxels{why}; give one of seconds, or a file", "--tare"
-        )
-    if times.loaded >= TOUCH:
-        return Advice("another tare", f"{times.loaded} taxels read above theirs while nothing touches them", "--tare")
-    if alignment is None:
+    if fits == used:
         return None
-    # Where no input follows the labels none was moved.
-    labels = len(alignment.given)
-    unfelt = labels if alignment.train is None else int(alignment.unpaired.sum())
-    if 2 * unfelt > labels and 2 * scored.found < scored.events:
-        return Advice(
-            "other labels, or another tare",
-            f"nothing was felt of {unfelt} of {counted(labels, 'label')}: they are of another recording, or their "
-            "times are off by more than 50 ms, each by another time, or they name what the sensor does not feel",
-        )
-    if alignment.train is not None and 2 * unfelt > scored.missed + scored.false:
-        return Advice(
-            "another tare",
-            f"nothing was felt of {counted(unfelt, 'label')}, unless their times are off by more than 50 ms, each by "
-            "another time, or they are of another recording",
-        )
-    return None
-
-
-def _advice(
-    made: Trained,
-    label: str,
-    together: Score,
-    alone: Score,
-    search_s: float | None,
-    rule: Score | None,
-    chance: str,
-    *,
-    channels: bool,
-) -> Advice:
-    points = len(made.recipe.points_of(label))
-    wrong, learnt = together[label].missed + together[label].false, alone.missed + alone.false
-    if rule is not None and 2 * rule.rank[0] <= wrong:
-        return _by_rule(made, rule.rank[0], wrong)
-    if channels and (_for_touch(made) or chance):
-        array = made.readout.array
-        size = "ROWSxCOLUMNSxMM" if array is None else f"{array.rows}x{array.columns}xMM"
-        because = "channels in a row at a known distance, MM mm, have neighbours; then the recipe touch fits"
-        return Advice(f"--array {size}", because, "--array")
-    if chance and any(isinstance(encoder, Moments) for encoder in made.recipe.encoder._each()):
-        return Advice(
-            "other kinds",
-            f"{chance}: the inputs of this recipe are moments of the picture, as area and load, and its centre, which "
-            "is tried where these tell too few; where kinds differ otherwise, --recipe gait_plate, whose inputs are "
-            "the taxels, may tell them, and taxel information says whether they differ; or labels are few or mixed up",
-            "--recipe",
-        )
-    if search_s is not None and 2 * learnt > wrong and points > 1:
-        because = f"it tries {points} sets of parameters, in about {points * search_s:.0f} s"
-        return Advice("--search", because, "--search")
-    return Advice("more labels", f"of those that it learnt {alone.missed} are missed, and {alone.false} are false")
+    return Advice(f"--recipe {fits}", f"it is made for {why}; this training took {used}", "--recipe")
 
 
 def _chance(label: str, scored: Score, plain: PlainScore | None) -> str:
     """Return how many of a kind of touch are told, where neuron and rule tell no more than chance would; else ""."""
     by = {"the neuron": scored} | ({} if plain is None or plain.together is None else {"the rule": plain.together})
-    said = [_by_chance(label, who, score) for who, score in by.items()]
-    return ", ".join(said) + ", as by chance" if all(said) else ""
+    shares = [_by_chance(label, who, score) for who, score in by.items()]
+    return ", ".join(shares) + ", as by chance" if all(shares) else ""
 
 
 def _by_chance(label: str, who: str, together: Score) -> str:
@@ -266,13 +251,15 @@ def _by_chance(label: str, who: str, together: Score) -> str:
     others = sum(kind.events for kind in kinds) - kind.events
     if kind not in kinds or not others:
         return ""
-    told, taken = kind.found, min(kind.false, others)
+    right, taken = kind.found, min(kind.false, others)
     ways = sum(
-        comb(kind.events, k) * comb(others, told + taken - k) for k in range(told, kind.events + 1) if k <= told + taken
+        comb(kind.events, k) * comb(others, right + taken - k)
+        for k in range(right, kind.events + 1)
+        if k <= right + taken
     )
-    if ways <= _CHANCE * comb(kind.events + others, told + taken):
+    if ways <= _CHANCE * comb(kind.events + others, right + taken):
         return ""
-    return f"{who} tells {told} of {kind.events} and takes {taken} of {others} others for {label}"
+    return f"{who} tells {right} of {kind.events} and takes {taken} of {others} others for {label}"
 
 
 def _for_touch(made: Trained) -> bool:
@@ -294,7 +281,7 @@ def fallen(examples: Sequence[Example]) -> str:
     """Return that the values of an example fall from their rest, and what turns them; "" where none do."""
     for example in examples:
         source = recorded(example.source, hold=False)
-        if isinstance(source, Frames) and (rest := of_pictures(source)).falls:
+        if isinstance(source, Frames) and (rest := of_frames(source)).falls:
             return f"{example.name}: " * bool(example.name) + rest.fall(getattr(example.source, "path", None))
     return ""
 
@@ -324,7 +311,7 @@ def _loaded(example: Example, encoder: Encoder) -> int:
 
 
 def _at(source: Events | Frames, t_us: int) -> Frames:
-    """Return the picture at a time."""
+    """Return the frame at a time."""
     if isinstance(source, Events):
         return Frames.from_events(source, 1, t_us, t_us + 1)
     place = max(0, int(np.searchsorted(source.t, t_us, side="right")) - 1)
@@ -335,7 +322,7 @@ def drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
     """Return how many taxels drifted above a tare by more than the noise floor; 0 where it may be a load.
 
     A taxel counts that reads no more in the first eighth of the recording and more in the last, in nine of ten
-    pictures, came there little by little, and reads four times as much while it is touched: a load that stays comes at
+    frames, came there little by little, and reads four times as much while it is touched: a load that stays comes at
     once, or is all that a taxel reads. A quarter of the taxels that were touched must do so, and two at least.
 
     Parameters
@@ -349,12 +336,12 @@ def drifted(source: Events | Frames, tare: Tare, noise_floor: float) -> int:
         return 0
     if isinstance(source, Events):
         source = Frames.from_events(source, max(1, int(after[-1] - after[0]) // (_PARTS * _LOOKS)), int(after[0]))
-    pictures = source.between(tare.stop_us, np.inf)
-    pictures = pictures[:: max(1, len(pictures) // (_PARTS * _LOOKS))]
-    looks = len(pictures) // _PARTS
+    frames = source.between(tare.stop_us, np.inf)
+    frames = frames[:: max(1, len(frames) // (_PARTS * _LOOKS))]
+    looks = len(frames) // _PARTS
     if looks < _LOOKS // 4:
         return 0
-    values = tare.off(pictures).values[: _PARTS * looks]
+    values = tare.off(frames).values[: _PARTS * looks]
     above, most = _core.touched_above(noise_floor), values.max(axis=0)
     least = np.quantile(values.reshape(_PARTS, looks, *most.shape), 0.1, axis=1)
     slowly = np.diff(least, axis=0).max(axis=0) <= least[-1] / 2

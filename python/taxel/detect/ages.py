@@ -1,4 +1,4 @@
-"""The age of a touch: in whole pictures where a recording has pictures, and when a touch reaches it."""
+"""The age of a touch: in whole frames where a recording has frames, and when a touch reaches it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from taxel.array import Array
 from taxel.detect.examples import Example
-from taxel.detect.loads import Clock, picture_ms
+from taxel.detect.loads import Clock, frame_ms
 from taxel.detect.recipe import LISTS, Recipe
 from taxel.encode import Composite, Encoder
 from taxel.neuron import Neuron
@@ -23,15 +23,15 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 ACTS_AFTER_MS = to_ms(1.0)
 #: Times that are nearer are the same, ms: stamps are whole us, and since 1970 resolved to a quarter of one.
 _SAME_MS = 5e-4
-#: A neuron that has fired is silent for that share of a picture at least: of stamps that are not regular two pictures
+#: A neuron that has fired is silent for that share of a frame at least: of stamps that are not regular two frames
 #: may lie in the time of one.
 _SILENT_SHARE = 0.9
-#: A kernel shorter than a picture, which stamps beside the grid would change, and which is silent between pictures only
+#: A kernel shorter than a frame, which stamps beside the grid would change, and which is silent between frames only
 #: where its grid has points, becomes an exponential one as long as this share, ...
 _TAU_SHARE = 0.25
 #: ... with such a step of the grid: from a stamp to the next point of it the potential falls by less than a tenth.
 _STEP_SHARE = 0.02
-#: By which share of a picture an age of pictures begins early.
+#: By which share of a frame an age of frames begins early.
 _EARLY = 0.5
 
 
@@ -109,14 +109,14 @@ def silent_windows(
     return np.column_stack([clock, clock + neuron.step_ms]) + _SAME_MS
 
 
-def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Clock]) -> Recipe:
-    """Return the recipe with the ages of a touch, and the delays at one, that the pictures of (checked) examples show.
+def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Clock]) -> Recipe:
+    """Return the recipe with the ages of a touch, and the delays at one, that the frames of (checked) examples show.
 
-    A picture shows a touch at a whole number of pictures after its onset, so each age and delay is rounded up to whole
-    pictures, and points to try whose delays are then those of a point before are left out. As stamps are not regular,
-    each age begins half a picture early, and the age of a delay ends a picture later. Of events, whose state is known
+    A frame shows a touch at a whole number of frames after its onset, so each age and delay is rounded up to whole
+    frames, and points to try whose delays are then those of a point before are left out. As stamps are not regular,
+    each age begins half a frame early, and the age of a delay ends a frame later. Of events, whose state is known
     at any time, all that holds only where a frame lasts longer than a delay, and ages begin in time. Of several
-    examples the longest picture counts. A recipe that names no neurons is trained as it is, and its delays are ages.
+    examples the longest frame counts. A recipe that names no neurons is trained as it is, and its delays are ages.
 
     Parameters
     ----------
@@ -129,30 +129,30 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         return recipe
     parameters = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()]
     delays = [_delay_ms(point) for point in parameters if _aged(recipe, point)]
-    pictures_ms = max(picture_ms(example) for example in examples)
-    period_ms = pictures_ms or max(to_ms(frame_us or 0.0) for frame_us, _ in clocks)
-    if not delays or not period_ms or (not pictures_ms and period_ms <= min(delays)):
+    frames_ms = max(frame_ms(example) for example in examples)
+    period_ms = frames_ms or max(to_ms(frame_us or 0.0) for frame_us, _ in clocks)
+    if not delays or not period_ms or (not frames_ms and period_ms <= min(delays)):
         return recipe
-    early = _EARLY if pictures_ms else 0.0
+    early = _EARLY if frames_ms else 0.0
     used: set[int] = set()
 
     def count(ms: float) -> int:
         return ceil(ms / period_ms - 1e-6)
 
-    def begin_ms(pictures: int) -> float:
-        return max(0.0, to_ms(round(to_us((pictures - early) * period_ms))))
+    def begin_ms(frames: int) -> float:
+        return max(0.0, to_ms(round(to_us((frames - early) * period_ms))))
 
     def point(values: Mapping[str, Any], under: Mapping[str, Any], seen: dict[int, float]) -> dict[str, Any] | None:
         every = {**under, **values}
         if not _aged(recipe, every):
             return dict(values)
-        pictures = count(_delay_ms(every))
-        if seen.setdefault(pictures, _delay_ms(every)) != _delay_ms(every):
+        frames = count(_delay_ms(every))
+        if seen.setdefault(frames, _delay_ms(every)) != _delay_ms(every):
             return None
-        used.add(pictures)
+        used.add(frames)
         refractory = max(float(every.get("refractory", Neuron().refractory)), _SILENT_SHARE * period_ms)
-        made = {**values, "delay_ms": begin_ms(pictures), "refractory": refractory}
-        if pictures_ms and float(every.get("tau", Neuron().tau)) < period_ms:
+        made = {**values, "delay_ms": begin_ms(frames), "refractory": refractory}
+        if frames_ms and float(every.get("tau", Neuron().tau)) < period_ms:
             made |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": _STEP_SHARE * period_ms}
         return made
 
@@ -170,8 +170,8 @@ def in_pictures(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cl
         ages = getattr(part, "ages_ms", None)
         if ages is None:
             return part
-        counts = {count(age) for age in ages} | used | {pictures + 1 for pictures in used}
-        return copy(part).set_params(ages_ms=[begin_ms(pictures) for pictures in sorted(counts)])
+        counts = {count(age) for age in ages} | used | {frames + 1 for frames in used}
+        return copy(part).set_params(ages_ms=[begin_ms(frames) for frames in sorted(counts)])
 
     neurons = {label: neuron(values) for label, values in recipe.neurons.items()}
     whole = recipe.encoder

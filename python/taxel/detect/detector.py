@@ -113,7 +113,7 @@ class _Detector(Saved):
         array : Array, optional
             The sensor; its own where it is left out, or else that of the first piece.
         frame_us : float, us
-            How long the board's frame (or a picture) lasts; 192 is the board at reset.
+            How long a frame of the board (or of the input) lasts; 192 is the board at reset.
         tare : Tare, optional
             The taxels' rest, where the encoder needs one and has none.
         wire_version : int, from 1 to 2
@@ -137,7 +137,7 @@ class ReadoutStream:
     array : Array, optional
         The sensor; the readout's own where it is left out, or else that of the first piece.
     frame_us : float, us
-        How long the board's frame (or a picture) lasts; 192 is the board at reset.
+        How long a frame of the board (or of the input) lasts; 192 is the board at reset.
     tare : Tare, optional
         The taxels' rest, where the encoder needs one and has none.
     wire_version : int, from 1 to 2

@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number, shown
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, instance, number, shown
 from taxel._base.errors import refused
 from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5

@@ -16,7 +16,7 @@ _SHARE_OF_RANGE = 0.01
 
 
 def measured_floor(examples: Sequence[Example]) -> float | None:
-    """Return the noise floor of pictures of a sensor, in its unit; None of a board's, whose registers set it.
+    """Return the noise floor of frames of a sensor, in its unit; None of a board's, whose registers set it.
 
     Six standard deviations of the noise in the tare, and a hundredth of the largest value above rest at least, both
     those that 90 % of the taxels have at most; the largest of all examples, to three digits.

@@ -19,7 +19,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect.ages import in_pictures
+from taxel.detect.ages import in_frames
 from taxel.detect.examples import Example, array_of, checked, unit_of
 from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, floor_of, plain_score
@@ -161,7 +161,7 @@ def judge(
     report = reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
-    whole = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
+    whole = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
     recipe = possible(whole, examples)
     patterns = Encoded(examples, recipe, report, search=search)
     array, unit = array_of(examples), unit_of(examples)
@@ -250,7 +250,7 @@ def choose(
     """
     examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
     unit_of(examples)
-    recipe = in_pictures(instance("recipe", recipe, Recipe), examples, clocks)
+    recipe = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
     report = reporting(progress)
     parts = [Part(n) for n in range(len(examples))]
     ways = whole("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -99,9 +100,8 @@ def _every(patterns: Sequence[SpikeTrains], quantities: Sequence[int]) -> Iterat
     """Yield all onsets and ends of each quantity, by threshold and number of samples."""
     for train in quantities:
         sampled = [_samples(pattern, train) for pattern in patterns]
-        for threshold in _THRESHOLDS:
-            for count in _SAMPLES:
-                yield train, tuple(_edges(clock, values >= np.log1p(threshold), count) for clock, values in sampled)
+        for threshold, count in product(_THRESHOLDS, _SAMPLES):
+            yield train, tuple(_edges(clock, values >= np.log1p(threshold), count) for clock, values in sampled)
 
 
 def _samples(pattern: SpikeTrains, train: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -199,7 +199,7 @@ def distinct(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:
     """Return patterns in which, of trains with the same spikes in all of them, only the first has any.
 
     Weights that equal trains share require all of these to spike at once, as levels do that every touch of the training
-    reached in one picture. Of levels the first is the lowest, which weaker touches reach as well.
+    reached in one frame. Of levels the first is the lowest, which weaker touches reach as well.
     """
     spikes = [tuple(pattern[train].tobytes() for pattern in patterns) for train in range(len(patterns[0]))]
     first = {key: train for train, key in reversed(list(enumerate(spikes)))}

@@ -65,7 +65,7 @@ class Loads:
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
         self.every: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
-        self._picture_ms = max(map(picture_ms, examples))
+        self._frame_ms = max(map(frame_ms, examples))
         self._curves: dict[str, list[_core.LoadCurve]] = {}
         self._changes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
         self._edges: dict[tuple[str, float, float, int], tuple[FoundTimes, FoundTimes]] = {}
@@ -93,14 +93,14 @@ class Loads:
     def ages_ms(self, ages_ms: Iterable[float]) -> list[float]:
         """Return ages at which something else is read than at those before.
 
-        A picture holds until the next one, so of pictures those are 0 for the first of a touch, and for each later one
-        the middle of the time for which it holds, as stamps are not regular. Of several examples the longest picture
+        A frame holds until the next one, so of frames those are 0 for the first of a touch, and for each later one
+        the middle of the time for which it holds, as stamps are not regular. Of several examples the longest frame
         counts.
         """
-        if not self._picture_ms:
+        if not self._frame_ms:
             return list(ages_ms)
-        holds = sorted({int(age / self._picture_ms + 1e-6) for age in ages_ms})
-        return [to_ms(round(to_us((k + 0.5) * self._picture_ms))) if k else 0.0 for k in holds]
+        holds = sorted({int(age / self._frame_ms + 1e-6) for age in ages_ms})
+        return [to_ms(round(to_us((k + 0.5) * self._frame_ms))) if k else 0.0 for k in holds]
 
     def at_age(self, age_ms: float) -> FoundTimes:
         """Return the area at an age of every touch."""
@@ -154,14 +154,14 @@ def lacks_neighbours(examples: Sequence[Example]) -> bool:
     return any(not source.array._has_neighbours for source in sensed)  # type: ignore[union-attr]
 
 
-def picture_ms(example: Example) -> float:
-    """Return the median distance of the pictures of a (checked) example, ms; 0 of what has no pictures."""
+def frame_ms(example: Example) -> float:
+    """Return the median distance of the frames of a (checked) example, ms; 0 of what has no frames."""
     source = example.source
     return to_ms(float(np.median(np.diff(source.t)))) if isinstance(source, Frames) and len(source) > 1 else 0.0
 
 
 def _first(example: Example) -> int:
-    """Return the time of an example's first event or picture, us."""
+    """Return the time of an example's first event or frame, us."""
     source = example.source
     assert not isinstance(source, SpikeTrains)
     t = source.t  # type: ignore[union-attr]

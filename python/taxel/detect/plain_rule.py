@@ -60,7 +60,7 @@ class PlainRule(_Detector):
     Notes
     -----
     A frame of events is the board's; its quantity is that after its last event, and its time the stamp with which the
-    quantity passed the threshold. Silent frames count: taxels hold their values. Each picture of `Frames` is a frame.
+    quantity passed the threshold. Silent frames count: taxels hold their values. Each of a `Frames` is one frame.
     The local load also changes while nothing comes, with its rest: it is computed 10 ms after the last stamp too, and
     from 80 ms on after each further eighth of the time since it. Detections have no slope (NaN).
 

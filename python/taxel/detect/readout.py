@@ -172,6 +172,12 @@ class Readout(_Detector):
             for label, cell in self._parts["neurons"].items()
         }
 
+    def _neuron(self, label: str) -> TrainedNeuron:
+        """Return the neuron of a label; refuse one that there is not."""
+        if text("label", label) not in self.labels:
+            raise ProblemError(f"label {shown(label)}: there are {', '.join(self.labels)}")
+        return self.neurons[label]
+
     def encoder_of(self, label: str) -> Encoder:
         """Return the encoder whose trains a neuron receives: the readout's, or of a composite one its own inputs.
 
@@ -187,9 +193,7 @@ class Readout(_Detector):
         ------
         ProblemError : no neuron of that label
         """
-        if text("label", label) not in self.labels:
-            raise ProblemError(f"label {shown(label)}: there are {', '.join(self.labels)}")
-        encoder, inputs = self.encoder, self.neurons[label].inputs
+        encoder, inputs = self.encoder, self._neuron(label).inputs
         return encoder.only(inputs) if inputs and isinstance(encoder, Composite) else encoder
 
     def trains_of(self, label: str, trains: SpikeTrains) -> SpikeTrains:
@@ -212,9 +216,7 @@ class Readout(_Detector):
         """
         instance("trains", trains, SpikeTrains)
         inputs = trains.split_by_sign() if trains.signed else trains
-        if text("label", label) not in self.labels:
-            raise ProblemError(f"label {shown(label)}: there are {', '.join(self.labels)}")
-        received = _received(self.encoder, self.neurons[label], self.array, 1)
+        received = _received(self.encoder, self._neuron(label), self.array, 1)
         return (inputs if received is None else inputs.select(received)).delayed(self.delays_ms)
 
     @property

@@ -19,7 +19,7 @@ from taxel._base.progress import Progress, reporting
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_pictures, later_us, silent_windows
+from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_frames, later_us, silent_windows
 from taxel.detect.alignment import Alignment, align, aligned
 from taxel.detect.examples import Example, array_of, called, checked, unit_of
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
@@ -125,7 +125,7 @@ def trained(examples: Sequence[Example], recipe: Recipe, progress: Progress | No
     """Train a readout as `fit` does, and return how its labels were aligned as well."""
     sound, clocks = checked(examples), [clock_of(example) for example in examples]
     report = reporting(progress)
-    recipe = in_pictures(instance("recipe", recipe, Recipe), sound, clocks)
+    recipe = in_frames(instance("recipe", recipe, Recipe), sound, clocks)
     possibly = possible(recipe, sound)
     unit = unit_of(sound)
     made = learn(Encoded(sound, possibly, report), possibly, array_of(sound), report)

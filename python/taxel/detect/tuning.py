@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,7 +65,7 @@ def tune(
     releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
     where exactly two are nearer to onsets than to ends, or where there are only two: then thresholds of the area at
     each of `AGES_MS` are tried too, on a logarithmic scale, and hold for both where they are better for both together.
-    Of pictures each counts once that holds at one of these ages.
+    Of frames each counts once that holds at one of these ages.
 
     Parameters
     ----------
@@ -146,10 +147,8 @@ def _points(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, float
     by_total = np.unique(np.quantile(totals, QUANTILES)).tolist() if len(totals) else []
     thresholds = {"area": AREAS, "total": by_total, "local_load": LOCAL_LOADS}
     for quantity in loads.quantities:
-        for threshold in thresholds[quantity]:
-            for frames in FRAMES:
-                for release in RELEASES:
-                    yield quantity, threshold, release, frames
+        for threshold, frames, release in product(thresholds[quantity], FRAMES, RELEASES):
+            yield quantity, threshold, release, frames
 
 
 def _at_edges(

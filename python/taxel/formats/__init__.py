@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._core import FormatError
 from taxel.formats.trial import Trial

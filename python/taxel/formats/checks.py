@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path
 from taxel._base.limits import TAXELS, TIME_US
 from taxel._core import FormatError
 from taxel.array import Array
@@ -49,7 +49,7 @@ def sensor(place: str, array: Array) -> Array:
 
 
 def table(place: Path | str, held: Events | Frames) -> Events | Frames:
-    """Return events or pictures of a file, if their sensor and their times are within the limits.
+    """Return events or frames of a file, if their sensor and their times are within the limits.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""novel emed plates: the ``.lst`` export, one page a picture, kPa on 64 x 95 sensors or other sizes.
+"""novel emed plates: the ``.lst`` export, one page a frame, kPa on 64 x 95 sensors or other sizes.
 
 Each page has a head, the numbers of the printed columns, a line a row that begins with its number, and margins: the
 last column and the last line, ``Force``, are the forces of row and column in N, not sensors. Rows and columns that are
-not printed were not loaded. Pages without a picture's number are summaries and are skipped.
+not printed were not loaded. Pages without a frame's number are summaries and are skipped.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ _HEAD = {
     "size": re.compile(rf"Sensor size:\s*{_NUMBER}\s*x\s*{_NUMBER}\s*cm", re.ASCII),
     "period": re.compile(rf"Time/picture:\s*{_NUMBER}\s*ms", re.ASCII),
 }
-_PICTURE = re.compile(r"Pict-No\.:\s*(\d{1,9})\b", re.ASCII)
+_FRAME_LINE = re.compile(r"Pict-No\.:\s*(\d{1,9})\b", re.ASCII)
 #: The force in N of a cell of value 1 and area 1 cm2, by the unit of the cells.
 _NEWTON = {"kPa": 0.1, "N/cm2": 1.0}
 
 
 def files(path: Path) -> list[Path]:
-    """Find the files of this format: ``.lst`` whose head names the matrix and the time a picture."""
+    """Find the files of this format: ``.lst`` whose head names the matrix and the time a frame."""
     candidates = sorted(path.iterdir()) if path.is_dir() else [path]
     return [f for f in candidates if f.suffix.lower() == ".lst" and _is_export(f)]
 
@@ -55,7 +55,7 @@ def _is_export(path: Path) -> bool:
 def trials(path: str | Path) -> Iterator[Trial]:
     """Yield the step of a file, or of all files in a folder.
 
-    Picture 1 is at 0 us. The file does not state its unit: it is the one in which the cells sum to the forces that the
+    Frame 1 is at 0 us. The file does not state its unit: it is the one in which the cells sum to the forces that the
     file states. A page whose cells do not sum to its force is an error.
 
     Parameters
@@ -77,7 +77,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
 @dataclass(frozen=True)
 class _Page:
-    """One picture: its number and that one's line, the sum of its cells, how many are not 0, the force it states."""
+    """One frame: its number and that one's line, the sum of its cells, how many are not 0, the force it states."""
 
     number: int
     line: int
@@ -91,7 +91,7 @@ def _pages(at: int, begin: str, content: Iterator[str]) -> Iterator[tuple[int, l
     """Yield the lines of each page, with the number of the first; the first page begins at line `at` with `begin`."""
     page, size = [begin], 0
     for line in content:
-        if _PICTURE.search(line):
+        if _FRAME_LINE.search(line):
             yield at, page
             at, page, size = at + len(page), [], 0
         page.append(line)
@@ -103,24 +103,24 @@ def _pages(at: int, begin: str, content: Iterator[str]) -> Iterator[tuple[int, l
 
 def _read(file: Path) -> Trial:
     content = text.stream(file)
-    above, begin = text.before(content, lambda line: _PICTURE.search(line) is not None)
+    above, begin = text.before(content, lambda line: _FRAME_LINE.search(line) is not None)
     head = [*above, *([] if begin is None else [begin])]
     shape, size, period = _head(file, head)
     if begin is None:
-        raise FormatError(f"{file.name}: no page with a picture's number (Pict-No.: 1)")
+        raise FormatError(f"{file.name}: no page with a frame's number (Pict-No.: 1)")
     area, pages = size[0] * size[1], list[_Page]()
     read = Growing(file.name, values=(shape, np.float32))
     for first, lines in _pages(len(head), begin, content):
         page, places, cells = _page(file, lines, first, shape)
         if pages and page.number <= pages[-1].number:
-            raise FormatError(f"{file.name}, line {page.line}: picture {page.number} after picture {pages[-1].number}")
-        picture = np.zeros((1, *shape), np.float32)
-        picture[0][np.ix_(*places)] = cells
-        read.add(values=picture)
+            raise FormatError(f"{file.name}, line {page.line}: frame {page.number} after frame {pages[-1].number}")
+        frame = np.zeros((1, *shape), np.float32)
+        frame[0][np.ix_(*places)] = cells
+        read.add(values=frame)
         pages.append(page)
     t = np.rint(to_us((np.array([page.number for page in pages], np.float64) - 1) * period))
     if t[-1] > TIME_US or (np.diff(t) <= 0).any():
-        raise FormatError(f"{file.name}: {period:g} ms a picture; must be .001 ms or more, and end within 142 years")
+        raise FormatError(f"{file.name}: {period:g} ms a frame; must be .001 ms or more, and end within 142 years")
     # The size is named as the matrix is: across first.
     array = Array(*shape, pitch_mm=(10 * size[1], 10 * size[0]), name="emed plate")
     return Trial(
@@ -135,8 +135,8 @@ def _read(file: Path) -> Trial:
 
 
 def _head(file: Path, content: Sequence[str]) -> tuple[tuple[int, int], tuple[float, float], float]:
-    """Return rows and columns, the size of a sensor in cm, and the time between pictures in ms."""
-    first = next((k for k, line in enumerate(content) if _PICTURE.search(line)), len(content))
+    """Return rows and columns, the size of a sensor in cm, and the time between frames in ms."""
+    first = next((k for k, line in enumerate(content) if _FRAME_LINE.search(line)), len(content))
     head = "\n".join(content[: first + 1])
     matches = {name: pattern.search(head) for name, pattern in _HEAD.items()}
     expected = {"matrix": "Matrix: 64x95", "size": "Sensor size: 0.500x0.500 cm", "period": "Time/picture:10.0 ms"}
@@ -159,7 +159,7 @@ def _page(
     file: Path, content: Sequence[str], line: int, shape: tuple[int, int]
 ) -> tuple[_Page, tuple[NDArray[np.int64], NDArray[np.int64]], NDArray[np.float64]]:
     """Return a page, the rows and columns that it prints, and their cells; `line` is the number of its first line."""
-    match = _PICTURE.search(content[0])
+    match = _FRAME_LINE.search(content[0])
     assert match is not None  # the page was found by this pattern
     end, before = len(content), line - 1
     head = next((k for k in range(1, end) if content[k].strip()), end)
@@ -168,7 +168,7 @@ def _page(
         raise FormatError(f"{file.name}, line {before + head + 1}: no line of column numbers that ends in {_MARGIN}")
     last = next((k for k in range(head + 1, end) if content[k].startswith(_MARGIN)), None)
     if last is None:
-        raise FormatError(f"{file.name}, line {before + end}: picture {match[1]} ends without the line {_MARGIN}")
+        raise FormatError(f"{file.name}, line {before + end}: frame {match[1]} ends without the line {_MARGIN}")
     lines = (row.split() for row in content[head + 1 : last])
     labels = ["row", *(f"column {n}" for n in names[:-1]), _MARGIN]
     read = text.numbers(lines, file, before + head + 2, labels)
@@ -213,7 +213,7 @@ def _unit(file: Path, pages: Sequence[_Page], area_cm2: float) -> str:
     if len(wrong):
         page, made = pages[int(wrong[0])], _NEWTON[unit] * sums[wrong[0]]
         raise FormatError(
-            f"{file.name}, line {page.force_line}: {_MARGIN} is {page.force:g} N; the cells of picture {page.number} "
+            f"{file.name}, line {page.force_line}: {_MARGIN} is {page.force:g} N; the cells of frame {page.number} "
             f"make {made:g} N ({unit} on {area_cm2:g} cm2)"
         )
     return unit

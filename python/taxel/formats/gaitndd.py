@@ -137,7 +137,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     ------
     FormatError : a line without 13 numbers, or times that do not ascend (names file and line)
     """
-    path = Path(arguments.path("path", path))
+    path = Path(arguments.checked_path("path", path))
     rows = [line.split() for line in text.lines(path)]
     values = text.numbers(rows, path, 1, _TS_COLUMNS)
     if not len(values):
@@ -189,7 +189,7 @@ def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.
             raise FormatError(
                 f"{path.name}: {size} bytes; {samples} samples of format 212 are {3 * ((samples + 1) // 2)}"
             )
-        # A picture of one channel has 12 bytes.
+        # A frame of one channel has 12 bytes.
         unpacked(path.name, 12 * samples)
         read = Growing(path.name, values=((), np.int16))
         while data := file.read(3 * _AT_ONCE):

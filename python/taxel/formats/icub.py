@@ -48,8 +48,8 @@ def _begins_so(path: Path) -> bool:
 def trials(path: str | Path) -> Iterator[Trial]:
     """Yield the grasps of one object's file, or of all in a folder.
 
-    Pictures are 5 x 12 (fingers by rows), 255 less the raw value, so that they rise with pressure. As the file has no
-    times, the time of a picture is the number of its slice in us: 0, 1, 2 ...
+    Frames are 5 x 12 (fingers by rows), 255 less the raw value, so that they rise with pressure. As the file has no
+    times, the time of a frame is the number of its slice in us: 0, 1, 2 ...
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ ISO = "iso"
 
 @dataclass(frozen=True)
 class Table:
-    """Say how to read a table of text: a line a picture, a column a taxel.
+    """Say how to read a table of text: a line a frame, a column a taxel.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ def _column(name: str, value: object) -> None:
 
 @dataclass(frozen=True)
 class Data:
-    """Say which array of another program's .npz or .h5 holds the pictures; a .npy holds one array without a name.
+    """Say which array of another program's .npz or .h5 holds the frames; a .npy holds one array without a name.
 
     Parameters
     ----------
     array : str, optional
-        Of shape (pictures, rows, columns) or (pictures, taxels); in a group of a .h5 by its path, "run1/pressure".
+        Of shape (frames, rows, columns) or (frames, taxels); in a group of a .h5 by its path, "run1/pressure".
     time : str, optional
-        An array of one time a picture; default: none.
+        An array of one time a frame; default: none.
     time_unit : {"s", "ms", "us"}
 
     Raises
@@ -137,7 +137,7 @@ class Layout:
     unit : str, optional
         Of the readings, turned or not.
     rate_hz : float, Hz, above 0, optional
-        Pictures a second, where the recording has no times.
+        Frames a second, where the recording has no times.
     table : Table, optional
     data : Data, optional
     ros : mapping, optional
@@ -170,7 +170,7 @@ class Layout:
         if self.heel:
             text("heel", self.heel, ("top", "bottom"))
         if self.falls is not None and not isinstance(self.falls, bool):
-            # Pictures have 32 bits.
+            # Frames have 32 bits.
             object.__setattr__(self, "falls", finite("falls", self.falls, least=-VALUE, most=VALUE))
         if self.unit is not None and not text("unit", self.unit):
             raise refused("unit", " is '': must say what the readings are in")

@@ -48,7 +48,7 @@ def files(path: Path) -> list[Path]:
 def trials(path: str | Path) -> Iterator[Trial]:
     """Yield the footfalls of one person's file, or of all in a folder.
 
-    Pictures are of the plate's own sensors (7.62 mm along the walk, 5.08 mm across), from the first frame to the one
+    Frames are of the plate's own sensors (7.62 mm along the walk, 5.08 mm across), from the first frame to the one
     after foot-off. Reference events are those of ``events.csv`` if the folder has it, else computed by `events` (by the
     same rules).
 

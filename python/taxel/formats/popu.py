@@ -1,4 +1,4 @@
-"""Pictures of people lying on a mat of 64 x 27 taxels, no movement (PoPu).
+"""Frames of people lying on a mat of 64 x 27 taxels, no movement (PoPu).
 
 A file ``*.npz`` holds ``readings``, uint8, poses x snapshots x rows x columns, and ``pose``, the names of the poses:
 left, prone, right or supine with a number and a variant (``supine3_1``), and the empty mat.
@@ -45,7 +45,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     Yields
     ------
     Trial
-        Its pictures are snapshots of the same lying person; as the file has no times, the time of a picture is its
+        Its frames are snapshots of the same lying person; as the file has no times, the time of a frame is its
         number in us: 0, 1, 2 ... `about` has the posture, the pose (without its variant) and the variant.
 
     Raises
@@ -58,14 +58,14 @@ def trials(path: str | Path) -> Iterator[Trial]:
         if readings.ndim != 4 or readings.dtype.kind not in "ui" or names.shape != readings.shape[:1]:
             raise FormatError(f"{file.name}: readings must be poses x snapshots x rows x columns, with a name a pose")
         array = Array(readings.shape[2], readings.shape[3], name="bed mat")
-        for name, pictures in zip(names, readings, strict=True):
+        for name, frames in zip(names, readings, strict=True):
             match = _NAME.fullmatch(str(name))
             if match is None:
                 raise FormatError(f"{file.name}: pose {arguments.shown(str(name))}; must be named like supine3_1")
             yield Trial(
                 str(name),
                 "",
-                Frames(pictures, np.arange(len(pictures)), array=array),
+                Frames(frames, np.arange(len(frames)), array=array),
                 {},
                 "",
                 about={"posture": match[1], "pose": f"{match[1]}{match[2]}", "variant": match[3] or ""},

@@ -221,7 +221,7 @@ def number(cell: str, path: Path, line: int, what: str, *, unmarked: bool = Fals
             problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
             problem += remedy
         raise FormatError(f"{path.name}, line {line}: {what} {problem}") from None
-    # Values of pictures have 32 bits.
+    # Values of frames have 32 bits.
     if not abs(value) <= VALUE:
         raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number{remedy}")
     return value

@@ -23,7 +23,7 @@ MARGIN_US = 100_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trial:
-    """Hold one recording of a published data set: its pictures or events, its subject, and reference times.
+    """Hold one recording of a published data set: its frames or events, its subject, and reference times.
 
     `taxel.open` returns it as a `Recording`; a `taxel.detect.Example` has labels and no subject, group or condition.
 
@@ -33,7 +33,7 @@ class Trial:
         "subj003/17", "GaCo02_01 left": unique among the trials of a folder.
     person : str
     recorded : Frames or Events
-        Pictures that are missing in the file are missing here too, so that times jump.
+        Frames that are missing in the file are missing here too, so that times jump.
     truth : mapping from event to int64, shape (events,), us
         Ascending; "contact", "heel_off", "foot_off", as far as the data set has them.
     source : str
@@ -45,12 +45,12 @@ class Trial:
     scored : (int, int), us, optional
         The interval in which reference times are complete; detections outside it are never counted as false. Default:
         the whole trial.
-    series : mapping from name to float64, shape (pictures,) or (events,), in the file's unit
+    series : mapping from name to float64, shape (frames,) or (events,), in the file's unit
         Further columns of the file, such as the total force computed by the manufacturer.
     about : mapping
         Other information: condition, speed, age ...
     timed : bool
-        Whether the recording has times; else its pictures are numbered, one a us.
+        Whether the recording has times; else its frames are numbered, one a us.
     unread : tuple of str
         Names of further columns of the file, which are not read.
 
@@ -113,14 +113,14 @@ class Trial:
 
     @property
     def frames(self) -> Frames:
-        """The pictures.
+        """The frames.
 
         Raises
         ------
         ProblemError : the trial holds events
         """
         if not isinstance(self.recorded, Frames):
-            raise ProblemError(f"{self.name}: holds events and no pictures")
+            raise ProblemError(f"{self.name}: holds events and no frames")
         return self.recorded
 
     @property
@@ -129,10 +129,10 @@ class Trial:
 
         Raises
         ------
-        ProblemError : the trial holds pictures
+        ProblemError : the trial holds frames
         """
         if not isinstance(self.recorded, Events):
-            raise ProblemError(f"{self.name}: holds pictures and no events")
+            raise ProblemError(f"{self.name}: holds frames and no events")
         return self.recorded
 
     def __repr__(self) -> str:

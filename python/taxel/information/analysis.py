@@ -22,7 +22,7 @@ from taxel.information.question import Question
 from taxel.information.rasters import frame_grams
 from taxel.information.sampling import (
     Spikes,
-    pictures_of,
+    frames_of,
 )
 from taxel.information.spiking import readout_responses
 from taxel.information.trials import LabelledTrial
@@ -35,7 +35,7 @@ __all__ = ["CLASSIFIERS", "answer"]
 CLASSIFIERS = ("neighbours", "cone_r", "tempotron")
 #: Numbers of neighbours that are tried.
 NEIGHBOURS = (1, 3, 5, 9, 15)
-#: Pictures are compared with events only where they have at most so many values.
+#: Frames are compared with events only where they have at most so many values.
 _MOST_VALUES = 2**28
 
 
@@ -151,10 +151,10 @@ class _Answering(Question):
                 for name in self.columns:
                     pace.begin(f"{to_ms(period):g} ms, {name}", self.work.prediction(period))
                     by_column.setdefault((name, period), []).append(self.nested(matrices, name, draw).responses)
-                pace.begin(f"{to_ms(period):g} ms, pictures", self.work.pictures(period))
-                picture = self._pictures(spikes)
-                if picture is not None:
-                    frames.setdefault(period, []).append(self.nested(picture, draw=draw).responses)
+                pace.begin(f"{to_ms(period):g} ms, frames", self.work.frames(period))
+                of_frames = self._frames(spikes)
+                if of_frames is not None:
+                    frames.setdefault(period, []).append(self.nested(of_frames, draw=draw).responses)
         assert reference is not None  # there are a period, a draw and a window at least
         estimates = {}
         for key, responses in responses_at.items():
@@ -207,13 +207,13 @@ class _Answering(Question):
         self.pace.begin("labels shuffled", self.work.prediction(self.periods[0]))
         return predictions(matrices, self.split(labels)).responses
 
-    def _pictures(self, spikes: Spikes) -> Matrices | None:
-        """Return the pictures' inner products to the whole window; None without values, or where they are too many."""
+    def _frames(self, spikes: Spikes) -> Matrices | None:
+        """Return the frames' inner products to the whole window; None without values, or where they are too many."""
         bins = int(spikes.bins_to(self.window_us).max(initial=0))
         active = len(np.unique(spikes.taxel))
         if not all(held.has_values for held in self.held) or not 0 < bins * active * spikes.trials <= _MOST_VALUES:
             return None
-        values = pictures_of(self.trials, self.held, spikes, self.contact, bins)
+        values = frames_of(self.trials, self.held, spikes, self.contact, bins)
         return Matrices(frame_grams(values, spikes, [self.window_us]), [bins * active])
 
     def _by_taxels(self, full: Point, values: bool) -> tuple[Point, ...]:

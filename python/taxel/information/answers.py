@@ -113,7 +113,7 @@ class Answer:
     taxels : tuple of Point
         By number of taxels, at one period.
     frames : dict of float to Estimate
-        By period, ms: pictures instead of events, the whole window.
+        By period, ms: frames instead of events, the whole window.
     controls : tuple of Control
     zero : ZeroTest
     training : tuple of (int, float)

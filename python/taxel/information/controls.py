@@ -22,7 +22,7 @@ __all__ = ["controls"]
 
 
 def controls(question: Question) -> tuple[Control, ...]:
-    """Return the bits of the stretch before the contact, the length, the count of events and the first picture."""
+    """Return the bits of the stretch before the contact, the length, the count of events and the first frame."""
     finest, window = question.periods[0], question.window_us
     spikes = question.spikes(finest, 0)
     count = spikes.counts(window).astype(np.float64)
@@ -43,7 +43,7 @@ def controls(question: Question) -> tuple[Control, ...]:
         if np.ptp(first, axis=0).any():
             gram = Matrices([first @ first.T], [first.shape[1]])
             bits = question.estimate(question.nested(gram).responses)
-            results.append(Control("first picture", bits, "the pressure itself before the start, no change since"))
+            results.append(Control("first frame", bits, "the pressure itself before the start, no change since"))
     return tuple(results)
 
 

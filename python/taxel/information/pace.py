@@ -33,8 +33,8 @@ class Work:
         """Return the time of nested predictions at a period (us)."""
         return self._predicted(len(self._question.smoothings(period)))
 
-    def pictures(self, period: int) -> float:
-        """Return the time of pictures at a period (us)."""
+    def frames(self, period: int) -> float:
+        """Return the time of frames at a period (us)."""
         return self._products(period, len(self._question.active), smoothings=1) + self._predicted(1)
 
     def taxels(self, kind: str, size: int) -> float:
@@ -68,7 +68,7 @@ class Work:
         settings = [*(("random", n) for n in asked.random_taxels), *(("pooled", n) for n in asked.pools)]
         draw = sum(self.taxels(*setting) for setting in settings)
         for period in asked.periods:
-            draw += self.rasters(period) + (windows + columns) * self.prediction(period) + self.pictures(period)
+            draw += self.rasters(period) + (windows + columns) * self.prediction(period) + self.frames(period)
         estimates = len(asked.periods) * (windows + columns) * self.estimate()
         further = self.controls() + sum(map(self.classifier, classifiers))
         return asked.draws * draw + estimates + (shuffles + 1) * self.prediction(asked.periods[0]) + further

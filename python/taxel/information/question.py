@@ -92,7 +92,7 @@ class Question:
             lasts = max(int(np.ptp(trial.source.t)) for trial in self.trials if len(trial.source))
             if lasts < STEP_US:
                 raise ProblemError(
-                    f"{self.trials[0].name}: its pictures all lie within {lasts} us, so they have no times; "
+                    f"{self.trials[0].name}: its frames all lie within {lasts} us, so they have no times; "
                     "give them some (taxel.Frames)"
                 )
             raise refused("trials", f": no event in any of them by {self.encoder!r}; a lower noise_floor may help")
@@ -227,7 +227,7 @@ def floor_of(trials: Sequence[LabelledTrial]) -> float:
     sources = {id(trial.source): trial.source for trial in trials}.values()
     largest = max(float(np.abs(source.values).max(initial=0.0)) for source in sources if isinstance(source, Frames))
     if largest == 0:
-        raise refused("trials", ": every picture is 0")
+        raise refused("trials", ": every frame is 0")
     return float(f"{largest / 40:.2g}")
 
 

@@ -50,7 +50,7 @@ def event_grams(spikes: Spikes, windows_us: Sequence[float], tau_ms: float) -> l
 
 
 def frame_grams(values: NDArray[np.float32], spikes: Spikes, windows_us: Sequence[float]) -> list[NDArray[np.float64]]:
-    """Return the inner products of pictures instead of events, at the same period, aligned in the same way.
+    """Return the inner products of frames instead of events, at the same period, aligned in the same way.
 
     Parameters
     ----------

@@ -19,14 +19,14 @@ from taxel.frames import Frames
 from taxel.information.trials import LabelledTrial
 from taxel.spikes import to_ms, to_us
 
-__all__ = ["STEP_US", "HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "pictures_of", "spikes_of"]
+__all__ = ["STEP_US", "HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "frames_of", "spikes_of"]
 
 #: The finest grid on which a touch's beginning is searched, us.
 STEP_US = 100
 
 
 class HeldValues:
-    """Return what every taxel holds at any time: the last picture, or the last intensity that came.
+    """Return what every taxel holds at any time: the last frame, or the last intensity that came.
 
     Events without intensities count as steps of one, up or down, from their beginning on.
 
@@ -51,7 +51,7 @@ class HeldValues:
         return isinstance(self.source, Frames) or self.source.intensity is not None
 
     def at(self, times: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Return the held values, shape (times, existing taxels); before the first picture, the first picture.
+        """Return the held values, shape (times, existing taxels); before the first frame, the first frame.
 
         Parameters
         ----------
@@ -140,10 +140,10 @@ class _Pools(NamedTuple):
 
 
 def finest_us(sources: Sequence[Events | Frames]) -> int:
-    """Return the finest period that recordings can show, us: between pictures, or what all stamps are multiples of."""
-    pictures = [int(np.median(np.diff(of.t))) for of in sources if isinstance(of, Frames) and len(of) > 1]
+    """Return the finest period that recordings can show, us: between frames, or what all stamps are multiples of."""
+    periods = [int(np.median(np.diff(of.t))) for of in sources if isinstance(of, Frames) and len(of) > 1]
     stamps = [int(np.gcd.reduce(np.append(of.t, 0))) for of in sources if not isinstance(of, Frames)]
-    return max(1, int(np.gcd.reduce([0, *stamps])), *pictures)
+    return max(1, int(np.gcd.reduce([0, *stamps])), *periods)
 
 
 def contacts(
@@ -236,14 +236,14 @@ def spikes_of(
     return Spikes(period_us, taxels, trial_, taxel_, bin_, value_.astype(np.float32), first, length)
 
 
-def pictures_of(
+def frames_of(
     trials: Sequence[LabelledTrial],
     held: Sequence[HeldValues],
     spikes: Spikes,
     contact_us: NDArray[np.float64],
     bins: int,
 ) -> NDArray[np.float32]:
-    """Return pictures at the same times as the events: the change since before the touch.
+    """Return frames at the same times as the events: the change since before the touch.
 
     Parameters
     ----------
@@ -261,8 +261,8 @@ def pictures_of(
     for k, values in enumerate(held):
         if np.isfinite(spikes.first_us[k]):
             zero = int(contact_us[k] + spikes.first_us[k])
-            pictures = values.at(zero + spikes.period_us * np.arange(-1, bins))[:, active]
-            changes[:, k] = pictures[1:] - pictures[0]
+            frames = values.at(zero + spikes.period_us * np.arange(-1, bins))[:, active]
+            changes[:, k] = frames[1:] - frames[0]
     return changes
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from taxel._base.arguments import instance, mapping, number, path, several, shown, text, whole
+from taxel._base.arguments import checked_path, instance, mapping, number, several, shown, text, whole
 from taxel._base.errors import helped, refused
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.number_text import float_of, int_of
@@ -118,7 +118,7 @@ def read_trials(
     ProblemError : recordings and table do not match, a recording is there twice or has no times, a start outside its
         recording, trials without an end, trials that overlap, or the host's time of another run
     """
-    place = Path(path("table", table))
+    place = Path(checked_path("table", table))
     opened = _once(recordings)
     window_us = 0 if window_ms is None else _window_us(window_ms)
     by_name = _by_unique_name(opened)

@@ -146,8 +146,8 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
             if not rows.on_grid:
                 slope = min(slope, float(-rows.slope(k)[0] @ w + rows.fall(k)))
         exponentials = exact.left
-    said = (wrong[0] if wrong else None, unproven[0] if unproven else None)
-    return Checked(not wrong and not unproven, missed, float(room), slope, *said)
+    reasons = (wrong[0] if wrong else None, unproven[0] if unproven else None)
+    return Checked(not wrong and not unproven, missed, float(room), slope, *reasons)
 
 
 class _Least(NamedTuple):
@@ -156,11 +156,6 @@ class _Least(NamedTuple):
     room: float
     at: float
     silent: bool | None
-
-
-def _decided(excess: float, rounding: float) -> bool | None:
-    """Return whether an excess is 0 or more; None where its rounding leaves that open."""
-    return None if abs(excess) < rounding else bool(excess >= 0)
 
 
 def _vague(excess: _Floats, rounding: _Floats) -> NDArray[np.bool_]:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, several
+from taxel._base.arguments import instance
 from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel.learn._learner import SpikeLearner
+from taxel.learn._learner import SpikeLearner, patterns_of
 from taxel.spikes import SpikeTrains
 
 _DEFAULT = defaults("stdp")
@@ -111,7 +111,7 @@ class STDP(SpikeLearner):
         ProblemError : no patterns, or an invalid one (names it)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights learnt until then stay
         """
-        trains = [instance(f"pattern {p}", train, SpikeTrains) for p, train in enumerate(several("patterns", patterns))]
+        trains = patterns_of(patterns)
         if not trains:
             raise refused("patterns", ": none, must be one or more")
         self._neuron = _core.STDP(self._json(), len(trains[0]))

@@ -14,8 +14,6 @@ from dataclasses import dataclass, replace
 from taxel._core import ProblemError
 from taxel.labels import Note
 
-__all__ = ["Acknowledged", "Conflict", "Edit", "Joined", "conflict_of", "fold", "join", "minus", "settled"]
-
 #: Deletions that are remembered, the newest: a label moved by keys leaves one at every step, which was in the table.
 _MOST_DELETED = 100_000
 

@@ -14,8 +14,6 @@ from pathlib import Path
 
 from taxel._core import ProblemError
 
-__all__ = ["LOCK", "locked", "locked_at_once"]
-
 #: The lock of all tables of a folder.
 LOCK = ".taxel-labels.lock"
 

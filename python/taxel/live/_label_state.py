@@ -13,19 +13,6 @@ from taxel._core import FormatError, open_regular
 from taxel.labels import Note
 from taxel.live._label_join import Acknowledged
 
-__all__ = [
-    "MOST_SAVED",
-    "NOT_SAVED",
-    "bytes_of",
-    "from_json",
-    "newest_of",
-    "not_saved",
-    "saved_of",
-    "state_place",
-    "to_json",
-    "whole",
-]
-
 #: The size of the file of what was acknowledged, bytes.
 MOST_SAVED = 1 << 26
 

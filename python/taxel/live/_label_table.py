@@ -50,8 +50,6 @@ from taxel.live._label_state import (
     whole,
 )
 
-__all__ = ["LabelTables", "TableRead"]
-
 #: A table that does not end, or cannot be read, and was written within this time is being written, s.
 _WRITTEN_S = 2.0
 

@@ -26,19 +26,17 @@ from taxel.recording.convert import convert
 from taxel.recording.health import health
 from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import is_recording, open_joined
-from taxel.recording.rest import flickering, loaded_from, of_pictures, ticks_by_unit
-
-__all__ = ["Opening", "ReadPictures", "ShownFiles", "side_by_side"]
+from taxel.recording.rest import flickering, loaded_from, of_frames, ticks_by_unit
 
 #: Of a text table of more bytes than this the beginning is shown first, of so many bytes.
 _LARGE, _BEGINNING = 8 << 20, 1 << 19
 _TEXTS = {".csv", ".txt", ".asc", ".asf", ".lst"}
 
-#: Time from one picture to the next, us, where pictures are numbered: a view shows them as 100 a second.
-_PICTURE_US = 10_000
+#: Time from one frame to the next, us, where frames are numbered: a view shows them as 100 a second.
+_NUMBER_US = 10_000
 
-#: Pictures as `_core.PanelRequests.read` returns them.
-ReadPictures = tuple[Any, ...]
+#: Frames as `_core.PanelRequests.read` returns them.
+ReadFrames = tuple[Any, ...]
 
 _Taxels = list[tuple[int, int]]
 
@@ -54,8 +52,8 @@ class Opening:
     file : path, optional
         The file that is opened so; default: each file.
     options : OpenOptions
-        Those by which it is opened so. Labels of numbered pictures that have times by its `rate_hz` are in numbers of
-        pictures.
+        Those by which it is opened so. Labels of numbered frames that have times by its `rate_hz` are in numbers of
+        frames.
     """
 
     opens: Callable[[Path], Sequence[Recording]] = open_joined
@@ -121,8 +119,8 @@ class ShownFiles:
             raise ProblemError(f"{path.name}: holds no trial {trial}")
         return every[0 if trial is None else names.index(trial)], names
 
-    def read(self, path: Path, trial: str | None, *, whole: bool) -> tuple[Path | None, ReadPictures | None]:
-        """Return events as a .mcap, or pictures; arguments are those of `FileRequests.read`."""
+    def read(self, path: Path, trial: str | None, *, whole: bool) -> tuple[Path | None, ReadFrames | None]:
+        """Return events as a .mcap, or frames; arguments are those of `FileRequests.read`."""
         beginning = None if whole else self._beginning(path)
         if beginning is not None:
             recording, names, left_s = beginning
@@ -130,7 +128,7 @@ class ShownFiles:
             (recording, names), left_s = self.opened(path, trial), None
         if not recording._contents.is_several and recording.has_events:
             return self._converted(recording), None
-        return None, (*_pictures(recording), recording.name if names else None, names, left_s)
+        return None, (*_frames(recording), recording.name if names else None, names, left_s)
 
     def health(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
         """Return the taxels that are dead, stuck, noisy, in the array that is shown, and how many cannot be judged."""
@@ -185,21 +183,21 @@ class ShownFiles:
 
 
 def _sources(recording: Recording) -> dict[str, Recording]:
-    """Return the sensors of a recording of pictures: its sources, or itself."""
+    """Return the sensors of a recording of frames: its sources, or itself."""
     several = recording._contents.is_several
     every = recording.sources if several else {recording.label or "board": recording}
     return {name: one for name, one in every.items() if not one.has_events and not one.is_stream} if several else every
 
 
-def _pictures(recording: Recording) -> tuple[Any, ...]:
-    """Return array, sources, unit, distance of numbered pictures, remarks and verdict (empty if unknown)."""
+def _frames(recording: Recording) -> tuple[Any, ...]:
+    """Return array, sources, unit, distance of numbered frames, remarks and verdict (empty if unknown)."""
     sources = _sources(recording)
     frames = {name: _in_its_unit(one) for name, one in sources.items()}
     units = {one.unit for one in frames.values()}
     if len(units) > 1:
         raise ProblemError(f"{recording.path}: its sources are in {', '.join(sorted(units))}; must be in one unit")
     array, lefts = side_by_side([one.array for one in frames.values()])
-    us = 1 if recording.timed else _PICTURE_US
+    us = 1 if recording.timed else _NUMBER_US
     parts = [
         (name, left, one.array.rows, one.array.columns, _times(one.t, us), _values(one), _rest(one))
         for (name, one), left in zip(frames.items(), lefts, strict=True)
@@ -223,7 +221,7 @@ def _labels_beside(recording: Recording) -> tuple[Any, ...]:
 
 
 def _in_its_unit(recording: Recording) -> Frames:
-    """Return pictures in N or kPa where a calibration gives it, else in the file's unit."""
+    """Return frames in N or kPa where a calibration gives it, else in the file's unit."""
     return recording.frames() if recording.calibration is None else recording.calibrated()
 
 
@@ -233,7 +231,7 @@ def _rest(frames: Frames) -> tuple[str, NDArray[np.float64], float, float, bool,
     These are the rest's source, that of each taxel, ticks by the unit, from where on a value above it is a load,
     whether values fall, what flickers, and what lay on it.
     """
-    rest = of_pictures(frames)
+    rest = of_frames(frames)
     source, flickers = {"unit": "given"}.get(rest.source, rest.source), np.flatnonzero(flickering(frames)).tolist()
     return source, rest.values, ticks_by_unit(frames), loaded_from(frames, rest), rest.falls, flickers, rest.preload_at
 

@@ -28,24 +28,24 @@ from taxel.spikes import to_us
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
 
-__all__ = ["Curves", "Item", "PanelClient", "Picture", "Spikes", "Subject"]
+__all__ = ["Curves", "Frame", "Item", "PanelClient", "Spikes", "Subject"]
 
-#: Pressure of a taxel without any event so far, and time of a picture before the first event.
+#: Pressure of a taxel without any event so far, and time of a frame before the first event.
 _UNKNOWN, _NO_TIME = 65_535, -(2**63)
 
-#: A flag of a picture: all earlier columns are void.
+#: A flag of a frame: all earlier columns are void.
 _RESTART = 4
 
 #: How long late events can change a column of time, us; after that it is final.
 _LATE_US = 120_000
 
-#: The scale of pictures is the largest value within this time, us.
+#: The scale of frames is the largest value within this time, us.
 _SCALE_US = 10_000_000
 
 #: Longer than the server waits between two messages of spikes, s.
 _SPIKES_WITHIN_S = 0.05
 
-#: The server sends at most 60 pictures a second.
+#: The server sends at most 60 frames a second.
 _MOST_HZ = 60.0
 
 _CURVES = np.dtype([("force", "<u4"), ("area", "<u4"), ("x", "<f4"), ("y", "<f4")])
@@ -69,7 +69,7 @@ class Subject:
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class Frame:
     """Hold the state of the array at a time.
 
     Attributes
@@ -133,13 +133,13 @@ class Spikes:
     left_out: int
 
 
-Item = Picture | Curves | Spikes | Detection | Note
+Item = Frame | Curves | Spikes | Detection | Note
 
 
 class PanelClient:
     """Receive what a panel shows: a context manager, and an iterator over pairs of `Subject` and `Item`.
 
-    The client is one more viewer of the panel. It receives a picture only when it has asked for one, so that it may be
+    The client is one more viewer of the panel. It receives a frame only when it has asked for one, so that it may be
     as slow as it likes without delaying what is received and recorded. The iteration ends with the recording or with
     the panel's server.
 
@@ -149,7 +149,7 @@ class PanelClient:
         The panel's address with its token, as `Panel.url` holds it and ``taxel live --panel`` prints it. The recording
         that it names, if any, is opened at its beginning, paused: see `play`.
     rate_hz : float, 1 to 60
-        Maximum number of pictures a second.
+        Maximum number of frames a second.
     encoder : Encoder, optional
         The encoder whose spikes are sent too.
     recording : str, optional
@@ -166,8 +166,8 @@ class PanelClient:
     >>> from taxel.live import Live, Panel, PanelClient, send
     >>> with Live(0, host="127.0.0.1") as live, Panel(live) as panel, PanelClient(panel.url) as client:
     ...     _ = send([bytes.fromhex("c000050304")], *live.address, seconds=0.2)
-    ...     subject, picture = next(iter(client))
-    >>> picture.above.shape
+    ...     subject, frame = next(iter(client))
+    >>> frame.above.shape
     (64, 64)
     """
 
@@ -239,7 +239,7 @@ class PanelClient:
                 break
             if isinstance(message, bytes):
                 due = time.monotonic() + self._period_s
-                yield from self._picture(message)
+                yield from self._frame(message)
                 if self._ends:
                     yield from self._last_spikes()
                     break
@@ -305,7 +305,7 @@ class PanelClient:
     def _yield_later(self, items: Sequence[Detection | Note]) -> None:
         self._later = deque(sorted([*self._later, *items], key=_time_of))
 
-    def _picture(self, message: bytes) -> Iterator[tuple[Subject, Item]]:
+    def _frame(self, message: bytes) -> Iterator[tuple[Subject, Item]]:
         flags, _, rows, columns, t = struct.unpack_from("<HIHHq", message, 6)
         column_us, first, count = struct.unpack_from("<IqI", message, 44)
         pressure, change, curves, rest = (_section(message, *which) for which in _SECTIONS)
@@ -329,7 +329,7 @@ class PanelClient:
         full = self._full.of(t, int(above.max(initial=0)))
         full_change = self._full_change.of(t, int(np.abs(change.astype(np.int16)).max(initial=0)))
         drawn = above.astype(np.uint16).reshape(shape)
-        yield subject, Picture(t, drawn, known.reshape(shape), change.reshape(shape), full, full_change)
+        yield subject, Frame(t, drawn, known.reshape(shape), change.reshape(shape), full, full_change)
         self._columns = (np.arange(first + 1, first + count + 1, dtype=np.int64) * column_us, curves)
         yield from self._final_curves(over=False)
         while self._later and _time_of(self._later[0]) <= t:
@@ -348,7 +348,7 @@ class PanelClient:
             yield self._subject, Curves(ends[new], chosen["force"], chosen["area"], chosen["x"], chosen["y"])
 
     def _last_spikes(self) -> Iterator[tuple[Subject, Item]]:
-        """Yield the spikes that the server sends after a recording's last picture."""
+        """Yield the spikes that the server sends after a recording's last frame."""
         from websockets.exceptions import ConnectionClosed  # noqa: PLC0415  an extra
 
         for n in range(2):
@@ -413,7 +413,7 @@ def _connected(address: str, token: str) -> ClientConnection:
         raise ProblemError(f"panel at {address}: refuses the connection, perhaps for its token: {error}") from None
 
 
-#: Number and type of the sections of a picture that are read.
+#: Number and type of the sections of a frame that are read.
 _SECTIONS = ((0, np.dtype("<u2")), (1, np.dtype("i1")), (3, _CURVES), (5, np.dtype("<u2")))
 
 

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, flag, numbers, shown, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, finite, flag, numbers, shown, text, whole
 from taxel._base.errors import refused
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, escaped
@@ -28,8 +27,6 @@ from taxel.live.options import LiveOptions
 from taxel.live.summary import Summary, summary_of
 from taxel.recording.changes import Zeroing
 from taxel.tare import Tare
-
-__all__ = ["Live"]
 
 #: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"
@@ -218,7 +215,7 @@ class Live:
     def copies(self) -> _core.Copies:
         """Return what copies everything that arrives from now on, for other computers.
 
-        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("picture", JSON) ten
+        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("frame", JSON) ten
         times a second, ("detection", JSON); ``is_over()`` says whether the pipeline has ended and all were taken.
         """
         return self._core.copy()
@@ -290,9 +287,9 @@ class Live:
         return self._core.counters()
 
     @property
-    def picture(self) -> NDArray[np.uint16]:
+    def frame(self) -> NDArray[np.uint16]:
         """Values that the taxels hold, ticks, shape (rows, columns), ten times a second; 0 without any event so far."""
-        return self._core.picture().reshape(self.array.shape)
+        return self._core.frame().reshape(self.array.shape)
 
     @property
     def tare(self) -> Tare | None:

@@ -17,8 +17,6 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import installing, warn
 from taxel._core import Error, ProblemError
 
-__all__ = ["LslInlet", "LslOutlet"]
-
 #: How long a stream is searched for, and a sample waited for, s.
 _LOOK_S, _WAIT_S = 3.0, 0.05
 

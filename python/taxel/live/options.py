@@ -22,8 +22,6 @@ from taxel.wire import Registers
 if TYPE_CHECKING:
     from taxel.detections import Detection
 
-__all__ = ["LiveOptions"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class LiveOptions(StatedOptions):

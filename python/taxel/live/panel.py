@@ -9,8 +9,7 @@ from pathlib import Path
 from types import TracebackType
 
 from taxel import _core
-from taxel._base.arguments import callback, flag, instance, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import callback, checked_path, flag, instance, text, whole
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.detect import load
@@ -22,12 +21,10 @@ from taxel.live._requests.board import BoardRequests
 from taxel.live._shown_files import Opening
 from taxel.live.live import Live
 from taxel.recording import Recording
+from taxel.recording.frames import period_us
 from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import check_recording, recordings_in
-from taxel.recording.pictures import period_us
 from taxel.tare import Tare
-
-__all__ = ["Panel"]
 
 
 class Panel:
@@ -54,8 +51,8 @@ class Panel:
         Opens the recording that is shown first, or of a folder each of its files, and returns its trials, and must heed
         `options`; default: `OpenOptions.joined`.
     options : taxel.recording.open_options.OpenOptions, optional
-        What the files do not hold themselves; the page trains on a file by them too. Labels of pictures that have times
-        by its `rate_hz` are saved in numbers of pictures.
+        What the files do not hold themselves; the page trains on a file by them too. Labels of frames that have times
+        by its `rate_hz` are saved in numbers of frames.
 
     Raises
     ------
@@ -171,7 +168,7 @@ class Panel:
     def delta_intensity(self, on: bool) -> None:
         """Interpret intensities as differences from the previous value, or as values, from now on.
 
-        Earlier events were decoded the other way, so they are discarded: time, picture, a readout and its tare restart,
+        Earlier events were decoded the other way, so they are discarded: time, values, a readout and its tare restart,
         on the same address.
 
         Parameters
@@ -193,7 +190,7 @@ class Panel:
             self._attach(before._again(port, host, differences=on))
 
     def read_out(self, readout: str | os.PathLike[str]) -> None:
-        """Read the board out with another readout from now on: time, picture and past restart, on the same address.
+        """Read the board out with another readout from now on: time, values and past restart, on the same address.
 
         A readout that needs a tare uses that of the board, if there is one; else the values that the taxels hold now
         are their rest, so the sensor must be unloaded.
@@ -292,7 +289,7 @@ def _shown(place: Path, layout: str | os.PathLike[str] | None) -> tuple[Path, st
 
 def _held(live: Live) -> Tare:
     """Return the values that the taxels of a board hold now as their rest."""
-    held = live.picture.astype(float)
+    held = live.frame.astype(float)
     if not held.any():
         raise ProblemError("read_out: no value has arrived yet that could be the taxels' rest; wait for the board")
     return Tare.take(Frames([held, held], [0, 1], unit="ticks", array=live.array), note="held when the readout began")

@@ -10,8 +10,6 @@ from taxel._base.arguments import flag, number, several, shown, text, whole
 from taxel._core import ProblemError
 from taxel.wire import FRAME_US
 
-__all__ = ["PORT", "send"]
-
 #: Where the board's datagrams go (reading: the thesis names no port).
 PORT = 5208
 

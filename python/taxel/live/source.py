@@ -15,8 +15,6 @@ from taxel.array import Array
 from taxel.live.sending import PORT
 from taxel.wire import Registers
 
-__all__ = ["Source"]
-
 
 class Source:
     """Send frames of any sensor as a board does: they become events by the board's rules, in datagrams of version 2.

@@ -12,8 +12,6 @@ from taxel.recording.read_mcap import DOUBTS, STEPS
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
 
-__all__ = ["Summary", "delays"]
-
 
 @dataclass(frozen=True)
 class Summary:

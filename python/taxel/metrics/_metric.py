@@ -17,8 +17,6 @@ from taxel._base.parameters import ranges
 from taxel.array import Array
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Pattern", "distance", "listed", "stated"]
-
 Pattern = ArrayLike | SpikeTrains
 
 

@@ -13,8 +13,6 @@ from taxel._base.arguments import floats, number, several
 from taxel._base.errors import refused
 from taxel._base.parameters import defaults
 
-__all__ = ["Matching", "f1", "matching"]
-
 _DEFAULT = defaults("matching")
 
 

@@ -13,8 +13,6 @@ from taxel._base.arguments import callback, whole
 from taxel.metrics._metric import Pattern, listed, stated
 from taxel.spikes import SpikeTrains
 
-__all__ = ["pairwise"]
-
 
 def pairwise(
     metric: str,

@@ -5,9 +5,6 @@ from __future__ import annotations
 from taxel._base.parameters import defaults
 from taxel.metrics._metric import Pattern, distance
 
-__all__ = ["van_rossum_absolute"]
-
-
 _DEFAULT = defaults("van_rossum_absolute")
 
 

@@ -8,9 +8,6 @@ from taxel.array import Array
 from taxel.metrics._metric import distance
 from taxel.spikes import SpikeTrains
 
-__all__ = ["van_rossum_spatial_absolute"]
-
-
 _DEFAULT = defaults("van_rossum_spatial_absolute")
 
 

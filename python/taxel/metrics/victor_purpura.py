@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from taxel.metrics._metric import Pattern, distance
 
-__all__ = ["victor_purpura"]
-
 
 def victor_purpura(a: Pattern, b: Pattern, *, q: float) -> float:
     """Return the least cost of changing spike train `a` into spike train `b`.

@@ -6,8 +6,6 @@ from taxel._base.arguments import instance
 from taxel.metrics._metric import distance
 from taxel.spikes import SpikeTrains
 
-__all__ = ["victor_purpura_multi_unit"]
-
 
 def victor_purpura_multi_unit(a: SpikeTrains, b: SpikeTrains, *, q: float, k: float) -> float:
     """Return the least cost of changing pattern `a` into pattern `b`, where a spike may also change its train.

@@ -26,11 +26,9 @@ from taxel.recording.pressure import above_rest_at
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 
-__all__ = ["film", "writer_of"]
-
 #: Frame rate of the film, Hz.
 _RATE_HZ = 20
-#: The most pictures of a film.
+#: The most frames of a film.
 _MOST = 2_000
 
 
@@ -61,11 +59,11 @@ def film(
     overwrite : bool
         Whether an existing file may be replaced.
     watch : function, optional
-        Called with the share of pictures drawn.
+        Called with the share of frames drawn.
 
     Raises
     ------
-    ProblemError : no event, no intensities, a file ending without a writer, or a film of more than 2000 pictures
+    ProblemError : no event, no intensities, a file ending without a writer, or a film of more than 2000 frames
     FileExistsError : the file is there already
     """
     place = Path(path)
@@ -80,7 +78,7 @@ def film(
     times = np.arange(begin, int(events.t[-1]) + period_us, period_us)
     if len(times) > _MOST:
         raise ProblemError(
-            f"{len(times)} pictures: at most {_MOST}; choose slower below {slower * _MOST / len(times):.3g}"
+            f"{len(times)} frames: at most {_MOST}; choose slower below {slower * _MOST / len(times):.3g}"
         )
     over = above_rest_at(events, times.astype(np.int64))
 
@@ -103,8 +101,8 @@ def film(
         with tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{place.suffix.lower()}"
             with writer.saving(figure, str(film), dpi=80):
-                for n, (t, picture) in enumerate(zip(times, over, strict=True)):
-                    image.set_data(picture)
+                for n, (t, frame) in enumerate(zip(times, over, strict=True)):
+                    image.set_data(frame)
                     cursor.set_xdata([to_ms(t - begin)] * 2)
                     writer.grab_frame()
                     watch((n + 1) / len(times))

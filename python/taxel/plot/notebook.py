@@ -19,8 +19,6 @@ from taxel.recording import Recording
 from taxel.recording.health import Health
 from taxel.spikes import SpikeTrains
 
-__all__ = ["html"]
-
 Drawn = Events | Frames | SpikeTrains | Detections | Recording | Health
 
 

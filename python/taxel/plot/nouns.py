@@ -17,8 +17,6 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["detections", "event_picture", "pressure_map", "raster"]
-
 ON, OFF = "#c44e52", "#4c72b0"
 
 
@@ -72,7 +70,7 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
 
 
 def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) -> Axes:
-    """Draw one picture: the last at or before a time, or the one with the largest sum.
+    """Draw one frame: the last at or before a time, or the one with the largest sum.
 
     Parameters
     ----------
@@ -101,7 +99,7 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
     instance("frames", frames, Frames)
     until = None if at is None else finite("at", at, "us")
     if not len(frames):
-        raise ProblemError("no picture to draw: the frames are empty")
+        raise ProblemError("no frame to draw: the frames are empty")
     ax = axes(ax, (5, 4.4))
     k = int(frames.total().argmax())
     if until is not None:

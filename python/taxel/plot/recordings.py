@@ -19,8 +19,6 @@ from taxel.recording import Health, Recording, health
 from taxel.recording.pressure import Series, above_rest
 from taxel.recording.rest import Rest
 
-__all__ = ["health_map", "overview", "pressure"]
-
 F = TypeVar("F", bound=FigureBase)
 
 _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
@@ -85,7 +83,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         over.plot((frames.t - begin_us) / 1e6, frames.total(), color="black", linewidth=0.8)
         over.set_ylabel(escaped(f"sum of taxels ({frames.unit})"))
         above = above_rest(recording)
-        assert above is not None  # of pictures
+        assert above is not None  # of frames
         pressed, _, rest = above
         if rest.falls:
             # Above the rest of readings that fall is nothing but noise.

@@ -23,8 +23,6 @@ from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.verdict import Verdict
 
-__all__ = ["Slices", "between", "inside"]
-
 #: So many bytes at either end of a file name a recording.
 _END = 1 << 16
 
@@ -34,12 +32,12 @@ def between(of: Contents, start: float, stop: float) -> Contents:
 
     The held values at its beginning follow from the events before it. Taxels that were zeroed before it stay zeroed.
     """
-    every, whole = of.sources, _between(of.one, of.sources, start, stop)
+    every, whole = of.sources, _between(of.main, of.sources, start, stop)
     if len(every) == 1:
         return Contents.of(whole)
     every_part = {name: _between(source, every, start, stop) for name, source in inside(every).items()}
-    apart = Once(lambda: len(every) > 1 and of.one.timing.clock_of is None and not together(every))
-    return Contents(whole, Slices(every_part, of.one.origin, apart))
+    apart = Once(lambda: len(every) > 1 and of.main.timing.clock_of is None and not together(every))
+    return Contents(whole, Slices(every_part, of.main.origin, apart))
 
 
 def _between(of: S, sources: Mapping[str, Source], start: float, stop: float) -> S:

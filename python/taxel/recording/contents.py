@@ -18,7 +18,7 @@ __all__ = [
     "Board",
     "Contents",
     "Drawn",
-    "Pictures",
+    "FrameSource",
     "S",
     "Several",
     "Source",
@@ -70,7 +70,7 @@ class Source(ABC):
     @property
     def untimed(self) -> bool:
         """Whether its frames are numbered."""
-        return isinstance(self, Pictures) and self.readings.untimed
+        return isinstance(self, FrameSource) and self.readings.untimed
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class Board(Source):
 
 
 @dataclass(frozen=True, eq=False)
-class Pictures(Source):
+class FrameSource(Source):
     """Hold frames."""
 
     readings: parts.Readings
@@ -99,14 +99,14 @@ class Pictures(Source):
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn(Pictures):
+class Drawn(FrameSource):
     """Hold frames that were drawn of a board's events, whose bytes are still there."""
 
     wire: parts.Wire = field(default_factory=parts.Wire)
 
 
 @dataclass(frozen=True, eq=False)
-class Stream(Pictures):
+class Stream(FrameSource):
     """Hold a stream of numbers, whose lines are frames of one row."""
 
     lines: parts.Lines
@@ -175,7 +175,7 @@ def source_from(
     turned: float | None = None,
     columns: Sequence[str] = (),
     **header: Any,
-) -> Board | Pictures:
+) -> Board | FrameSource:
     """Return a source of a table.
 
     Parameters
@@ -196,7 +196,7 @@ def source_from(
     readings = parts.Readings(known(table), untimed, turned)
     if columns:
         return Stream(origin, sensor, readings, parts.Lines(tuple(columns)), **header)
-    return Pictures(origin, sensor, readings, **header)
+    return FrameSource(origin, sensor, readings, **header)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,13 +205,13 @@ class Contents:
 
     Parameters
     ----------
-    one : Source
+    main : Source
         Its only source, the chosen one, the only board beside streams of numbers, or `Several`.
     sources : mapping from str to Source
         All sources of the file by their names.
     """
 
-    one: Source
+    main: Source
     sources: Mapping[str, Source]
 
     @classmethod
@@ -221,12 +221,12 @@ class Contents:
 
     def others(self) -> list[str]:
         """Return what is lost without the other sources."""
-        return [f"the source {name}" for name in self.sources if name != self.one.origin.label]
+        return [f"the source {name}" for name in self.sources if name != self.main.origin.label]
 
     @property
     def is_several(self) -> bool:
         """Whether these are the contents of a file of several boards as a whole."""
-        return isinstance(self.one, Several)
+        return isinstance(self.main, Several)
 
 
 def alone(sources: Mapping[str, Source]) -> Contents:

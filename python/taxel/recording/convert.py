@@ -13,7 +13,7 @@ import numpy as np
 
 from taxel import _core
 from taxel._base import limits
-from taxel._base.arguments import flag, path, shown, text
+from taxel._base.arguments import checked_path, flag, shown, text
 from taxel._base.errors import refused
 from taxel._base.files import whole_file, write_whole
 from taxel._base.messages import counted
@@ -21,10 +21,10 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, Source, Stream, alone, source_from, together
+from taxel.recording.frames import as_frames, period_us
 from taxel.recording.kinds import ENDINGS
 from taxel.recording.opening import open_recording
 from taxel.recording.parts import Wire
-from taxel.recording.pictures import period_us, pictures
 from taxel.recording.recording import Recording
 from taxel.recording.stored import is_made, stored
 from taxel.recording.write_csv import write_csv
@@ -53,7 +53,7 @@ def convert(
     source : Recording, Events, Frames or path
     target : path ending in .mcap, .lsa, .npz, .csv or .h5
     frames_hz : float, Hz, optional
-        Write pictures at this rate (.mcap, .npz, .csv, .h5) instead of events.
+        Write frames at this rate (.mcap, .npz, .csv, .h5) instead of events.
     compression : {"none", "lz4", "zstd"}
         Of a .mcap.
     overwrite : bool
@@ -67,7 +67,7 @@ def convert(
 
     Raises
     ------
-    ProblemError : another ending, or something that the target cannot hold at all (pictures in a .lsa)
+    ProblemError : another ending, or something that the target cannot hold at all (frames in a .lsa)
     FormatError : a source that is not a recording
     OSError : a target that exists, a folder that does not, a full disk ...
 
@@ -83,7 +83,7 @@ def convert(
     >>> taxel.convert(folder / "two.npz", folder / "two.lsa")
     ['the sensor (8 x 8 taxels, of unknown pitch, "array")', 'times finer than 100 us']
     """
-    place = Path(path("target", target))
+    place = Path(checked_path("target", target))
     kind = place.suffix.lower()
     if kind not in KINDS:
         raise ProblemError(f"{place}: ends in {kind or 'nothing'!r}; must be {', '.join(KINDS)}")
@@ -95,15 +95,15 @@ def convert(
     whole = _contents(source)
     if frames_hz is not None:
         if isinstance(source, Frames):
-            raise refused("frames_hz", ": pictures keep their own times; open the file and ask it for frames(rate_hz)")
+            raise refused("frames_hz", ": frames keep their own times; open the file and ask it for frames(rate_hz)")
         if whole.is_several and together(whole.sources):
             whole = alone(
-                {name: pictures(source, frames_hz, name="frames_hz") for name, source in whole.sources.items()}
+                {name: as_frames(source, frames_hz, name="frames_hz") for name, source in whole.sources.items()}
             )
         else:
-            whole = Contents(pictures(whole.one, frames_hz, name="frames_hz"), whole.sources)
+            whole = Contents(as_frames(whole.main, frames_hz, name="frames_hz"), whole.sources)
     written = stored(whole, place)
-    made, lost = written.one, list(written.one.losses.lost())
+    made, lost = written.main, list(written.main.losses.lost())
     match kind:
         case ".lsa":
             _write_lsa(place, made, overwrite)
@@ -115,10 +115,10 @@ def convert(
             write_h5(place, made, overwrite=overwrite)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                before = whole.sources if written.is_several else {made.origin.label: whole.one}
+                before = whole.sources if written.is_several else {made.origin.label: whole.main}
                 counts = {name: _counts(before[name], source) for name, source in written.sources.items()}
                 write_mcap(part, written, compression, counts)
-                lost += _read_otherwise(part, whole.one)
+                lost += _read_otherwise(part, whole.main)
     return lost
 
 

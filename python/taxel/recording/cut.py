@@ -17,8 +17,6 @@ from taxel.recording.contents import Contents, applied
 from taxel.recording.once import Once
 from taxel.recording.recording import Recording
 
-__all__ = ["cut", "region", "span_us"]
-
 
 def cut(
     recording: Recording,
@@ -96,7 +94,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
     ------
     ProblemError : an end beyond the array, no taxel in the rectangle, or the file holds several boards
     """
-    array = of.one.sensor.array
+    array = of.main.sensor.array
     (left, right), (top, bottom) = array.region(columns, rows)
     for name, chosen, count in (("columns", columns, array.columns), ("rows", rows, array.rows)):
         if any(not -count <= end <= count for end in (chosen.start, chosen.stop) if end is not None):
@@ -112,7 +110,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
         return of
     if of.is_several:
         # Reading the events raises the error that lists the sources.
-        _ = of.one.table
+        _ = of.main.table
     small = array._part(columns, rows)
 
     def events(whole: Events) -> Events:
@@ -148,7 +146,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
             case _:
                 assert_never(part)
 
-    return Contents.of(applied(of.one, rule, lambda: [*of.one.part(parts.Lines).received(), *of.others()]))
+    return Contents.of(applied(of.main, rule, lambda: [*of.main.part(parts.Lines).received(), *of.others()]))
 
 
 def _cropped(

@@ -23,16 +23,11 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Pictures, Source, source_from
+from taxel.recording.contents import FrameSource, Source, source_from
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import known
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
-
-__all__ = [
-    "about_of", "array_of", "board_changes_of", "counts_of", "described_source", "detections_of", "json_of",
-    "notes_of", "turned_of", "zeroings_of",
-]  # fmt: skip
 
 
 def json_of(of: Source) -> str:
@@ -65,7 +60,7 @@ def json_of(of: Source) -> str:
         "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in of.marks.zeroings()],
         "columns": of.columns,
         "untimed": of.untimed,
-        "turned": of.readings.turned if isinstance(of, Pictures) else None,
+        "turned": of.readings.turned if isinstance(of, FrameSource) else None,
         "truncated": losses.truncated,
         "rebuilt": dict(losses.rebuilt()),
         "lost": losses.lost(),
@@ -203,7 +198,7 @@ def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
         raise ProblemError("no object")
     return {
         name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else whole(name, n, 0)
-        for name, n in counts.items()
+        for name, n in ((_OLD_KEYS.get(name, str(name)), n) for name, n in counts.items())
     }
 
 
@@ -217,6 +212,9 @@ def _texts(texts: Any) -> tuple[str, ...]:
         raise ProblemError("no list")
     return tuple(text("entry", entry) for entry in texts)
 
+
+#: Keys of files that earlier commits wrote, and what they are called now.
+_OLD_KEYS = {"pictures": "frames", "pictures_that_could_not_be_read": "frames_that_could_not_be_read"}
 
 #: The reader of each entry by name; registers are checked later, as the array that they drive is another entry.
 _ENTRIES: dict[str, Any] = {

@@ -24,8 +24,6 @@ from taxel.recording.rest import FORCE_UNITS, flickering, ticks_by_unit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Health", "TaxelStatistics", "Touches", "health", "judged"]
-
 #: Reading: a taxel is dead, or stuck, if its place was touched at least this number of times (`_core`, *touch counts*)
 #: and it never changed meanwhile, if it has this number of neighbours: beyond the edge of an insole nothing presses ...
 TOUCHED_FROM, NEIGHBOURS_FROM = 3, 5
@@ -58,7 +56,7 @@ class Health:
     ----------
     array : Array
     activity : int64, shape (rows, columns)
-        Number of events (or changes of the picture) at each taxel.
+        Number of events (or changes of the frame) at each taxel.
     dead, stuck, noisy : bool, shape (rows, columns)
     untested : bool, shape (rows, columns)
         Not touched enough to say: neither named nor seen to work.
@@ -104,7 +102,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     Parameters
     ----------
     recorded : Events, Frames or Recording
-        In pictures each change of a value counts as an event.
+        In frames each change of a value counts as an event.
 
     Returns
     -------
@@ -117,15 +115,15 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     Notes
     -----
     *Reading* (the thesis defines none). A place is touched while three in four of its up to 8 neighbours are 8 ticks
-    above their rest, until all but one in four are back; in pictures 150 ticks are the range of the values. Dead: three
+    above their rest, until all but one in four are back; in frames 150 ticks are the range of the values. Dead: three
     touches or more and no change in any of them, with 5 neighbours or more; or no event and known to hold 0, while the
     median of the least values of its neighbours is 10 ticks or more and a fifth of the array's largest value; or no
     event in noise so strong that, over half of the array or more, the taxels with 1 to 9 events are at most a tenth as
     many as the silent ones. Stuck: like a dead one, but known to hold a value other than 0; or 3 events or more, all
     with one intensity, while its neighbours show more than one. Noisy: in 10 bins of 50 ms or more, half of all in
     which it changes, it has 3 changes or more, and more than 8 times those of all but one of the 24 taxels around it;
-    and at most 45 % of its changes go on in the direction of the one before. Of pictures, too, one that jumps for less
-    than two pictures at a time, 10 times or more, more than half as far from its median as ever, while all but one of
+    and at most 45 % of its changes go on in the direction of the one before. Of frames, too, one that jumps for less
+    than two frames at a time, 10 times or more, more than half as far from its median as ever, while all but one of
     its neighbours move less than an eighth as much.
 
     Examples
@@ -143,7 +141,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     if not isinstance(held, Frames):
         raise refused("recorded", f" is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     activity, moved = (of.astype(np.int64).reshape(held.array.shape) for of in _core.changes_of_frames(held._parts()))
-    # The values of pictures count from the least one.
+    # The values of frames count from the least one.
     scale, least = ticks_by_unit(held), np.fmin.reduce(held.values, axis=None, initial=np.inf)
     ticks = held
     if np.isfinite(least):
@@ -155,7 +153,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     result = judged(held.array, TaxelStatistics(activity, moved, Touches.of(*counts)), loud=False)
     if not len(held):
         return result
-    # In pictures a taxel that never changes is dead or stuck, depending on its value.
+    # In frames a taxel that never changes is dead or stuck, depending on its value.
     loaded = held.values[0] > least
     noisy = result.noisy | flickering(held)
     dead, stuck = (of & ~noisy for of in (result.dead & ~loaded, result.stuck | result.dead & loaded))

@@ -11,8 +11,6 @@ from taxel.formats.ros import is_bag
 from taxel.recording.contents import Source
 from taxel.recording.verdict import Verdict
 
-__all__ = ["ENDINGS", "LABELS", "is_label_table", "is_own_table", "kind_of", "kind_of_file", "verdict_of"]
-
 #: taxel's own kinds of files by their endings.
 ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
 

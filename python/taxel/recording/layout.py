@@ -19,19 +19,17 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.layout import Layout, packaged
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, Pictures, S, Source, Stream, alone
+from taxel.recording.contents import Board, Contents, FrameSource, S, Source, Stream, alone
+from taxel.recording.frames import times_at
 from taxel.recording.once import known
 from taxel.recording.parts import Changes, Readings
-from taxel.recording.pictures import times_at
-
-__all__ = ["check_size", "laid_out", "on_array"]
 
 #: Units that say nothing: what a table or a stream of numbers holds.
 _UNSAID = ("counts", "as sent")
 
 
 def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
-    """Refuse a given array of other rows and columns than a file's pictures.
+    """Refuse a given array of other rows and columns than a file's frames.
 
     Raises
     ------
@@ -39,7 +37,7 @@ def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
     """
     if size != array.shape:
         held = " x ".join(map(str, size))
-        raise refused("array", f": {array.rows} x {array.columns} taxels; {path} holds pictures of {held}")
+        raise refused("array", f": {array.rows} x {array.columns} taxels; {path} holds frames of {held}")
 
 
 def on_array(of: S, array: Array) -> S:
@@ -58,7 +56,7 @@ def on_array(of: S, array: Array) -> S:
     same = replace(of, sensor=replace(of.sensor, array=array))
     if isinstance(same, Board):
         return replace(same, changes=Changes(same.changes.events.to(events)))
-    if isinstance(same, Pictures):
+    if isinstance(same, FrameSource):
         return replace(same, readings=replace(same.readings, frames=same.readings.frames.to(frames)))
     return same
 
@@ -100,9 +98,9 @@ def _laid_out(of: Source, layout: Layout, *, given: bool) -> Source:
         raise FormatError(f"{layout.place}: says heel {layout.heel}; {name} says {sensor.heel}")
     same = of if array == sensor.array else on_array(of, array)
     same = replace(same, sensor=replace(same.sensor, side=sensor.side or layout.side, heel=sensor.heel or layout.heel))
-    if not isinstance(same, Pictures):
+    if not isinstance(same, FrameSource):
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz):
-            raise FormatError(f"{layout.place}: {name} holds events; falls, unit and rate_hz are of pictures")
+            raise FormatError(f"{layout.place}: {name} holds events; falls, unit and rate_hz are of frames")
         return same
     was = same.readings.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
@@ -151,9 +149,9 @@ _STATING = ("mcap", "npz", "h5")
 
 
 def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_alone: bool, strict: bool) -> Frames:
-    """Return pictures in the unit and at the rate that a layout says, turned to `full` less the reading if it is given.
+    """Return frames in the unit and at the rate that a layout says, turned to `full` less the reading if it is given.
 
-    If it is not `strict`, the unit and the times of the file stay where it has them. No other code holds these pictures
+    If it is not `strict`, the unit and the times of the file stay where it has them. No other code holds these frames
     yet, so that `own` is changed in place: its times only if it is alone in its file.
     """
     unit, t, values = table.unit, table.t, table.values
@@ -193,12 +191,12 @@ def _parts(length: int) -> Iterator[slice]:
 
 
 def _are_numbers(t: NDArray[np.int64]) -> bool:
-    """Return whether times only number the pictures: 0, 1, 2 ..."""
+    """Return whether times only number the frames: 0, 1, 2 ..."""
     return all(np.array_equal(t[part], np.arange(part.start, part.stop)) for part in _parts(len(t)))
 
 
 def _times_at(rate_hz: float, t: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Fill a column with the times of pictures at a rate (`times_at`)."""
+    """Fill a column with the times of frames at a rate (`times_at`)."""
     # The last is refused before the others change.
     times_at(np.array([len(t) - 1]), rate_hz)
     for part in _parts(len(t)):

@@ -24,14 +24,12 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
 from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, named, with_losses
+from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, named, with_losses
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import UNKNOWN, anything, known
 from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
-
-__all__ = ["merge", "merged"]
 
 T = TypeVar("T")
 #: What has a time of its own.
@@ -44,12 +42,12 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
     Parameters
     ----------
     recordings : iterable of Recording
-        All of events, or all of pictures in one unit.
+        All of events, or all of frames in one unit.
     gap_us : float, us, 0 or more, optional
         Pause between the end of a recording and the next one, which is shifted to follow it; default: all keep their
         times (one clock).
     beside : bool
-        Whether to place the sensors side by side, left to right, as one sensor with all their columns; pictures must
+        Whether to place the sensors side by side, left to right, as one sensor with all their columns; frames must
         then have equal times. Otherwise the sensors must be equal.
 
     Returns
@@ -61,7 +59,7 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
 
     Raises
     ------
-    ProblemError : nothing to merge, sensors that differ, events among pictures, or pictures at one time twice
+    ProblemError : nothing to merge, sensors that differ, events among frames, or frames at one time twice
 
     Examples
     --------
@@ -86,12 +84,12 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
 
 def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: bool = False) -> Contents:
     """Return the contents of several recordings as those of one; arguments and errors are those of `merge`."""
-    sources = [recording.one for recording in recordings]
+    sources = [recording.main for recording in recordings]
     if len({part.has_events for part in sources}) > 1:
         differing = next(part for part in sources if part.has_events != sources[0].has_events)
-        events, pictures = (sources[0], differing) if sources[0].has_events else (differing, sources[0])
+        events, frames = (sources[0], differing) if sources[0].has_events else (differing, sources[0])
         raise ProblemError(
-            f"recordings: {events.origin.name} holds events, {pictures.origin.name} pictures; convert one of them first"
+            f"recordings: {events.origin.name} holds events, {frames.origin.name} frames; convert one of them first"
         )
     tables = [part.table for part in sources]
     shifts = _shifts(tables, gap)
@@ -133,7 +131,7 @@ class _Merging:
             return Board(changes=parts.Changes(known(_events(tables, self.shifts, self.array, self.lefts))), **header)
         columns = self.columns()
         if columns is None:
-            return Pictures(readings=self.readings(), **header)
+            return FrameSource(readings=self.readings(), **header)
         return Stream(readings=self.readings(), lines=parts.Lines(columns), **header)
 
     def agreed(self, values: Iterable[T], empty: T, line: str, same: Callable[[T, T], bool] = operator.eq) -> T:
@@ -237,7 +235,7 @@ class _Merging:
     def readings(self) -> parts.Readings:
         """Merge frames."""
         tables = [table for table in self.tables if isinstance(table, Frames)]
-        each = [part.readings for part in self.sources if isinstance(part, Pictures)]
+        each = [part.readings for part in self.sources if isinstance(part, FrameSource)]
         return parts.Readings(
             known(_frames(tables, self.shifts, self.array, self.beside)),
             all(readings.untimed for readings in each),
@@ -422,11 +420,11 @@ def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[i
 def _frames(tables: list[Frames], shifts: list[int], array: Array, beside: bool) -> Frames:
     units = {table.unit for table in tables}
     if len(units) > 1:
-        raise ProblemError(f"recordings: pictures in {' and '.join(sorted(units))}; must be in one unit")
+        raise ProblemError(f"recordings: frames in {' and '.join(sorted(units))}; must be in one unit")
     times = [table.t + shift for table, shift in zip(tables, shifts, strict=True)]
     if beside:
         if any(not np.array_equal(t, times[0]) for t in times):
-            raise ProblemError("recordings: pictures beside one another must have the same times")
+            raise ProblemError("recordings: frames beside one another must have the same times")
         values = np.zeros((len(times[0]), *array.shape), np.float32)
         left = 0
         for table in tables:

@@ -23,8 +23,6 @@ from taxel.recording.once import Once
 from taxel.recording.read_mcap import ascending
 from taxel.recording.verdict import Verdict
 
-__all__ = ["HOST", "on_clock"]
-
 #: The name of the host's clock, us since 1970.
 HOST = "host"
 
@@ -40,7 +38,7 @@ def on_clock(of: Contents, name: str) -> Contents:
     ------
     ProblemError : no such source, one without arrival times, or a part by another clock
     """
-    whole, sources = of.one, of.sources
+    whole, sources = of.main, of.sources
     path, label = whole.origin.path, whole.origin.label
     if whole.timing.stretch is not None and whole.timing.clock_of is None:
         raise ProblemError(f"{path}: a slice by its own clock; say on_clock({name!r}) before between")
@@ -60,7 +58,7 @@ def on_clock(of: Contents, name: str) -> Contents:
     def verdict() -> Verdict | None:
         # It may be that of all sources.
         is_own = whole.losses.verdict() == sources[label].losses.verdict()
-        return (named if is_own else alone(moved).one).losses.verdict()
+        return (named if is_own else alone(moved).main).losses.verdict()
 
     return Contents(replace(named, losses=replace(named.losses, verdict=Once(verdict))), moved)
 

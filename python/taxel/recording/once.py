@@ -10,8 +10,6 @@ import numpy as np
 from taxel import _core
 from taxel.clock import Clock
 
-__all__ = ["UNKNOWN", "Once", "anything", "known"]
-
 #: The held value, in files, of a taxel without any event so far.
 UNKNOWN = _core.UNKNOWN
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import instance, several, text
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, instance, several, text
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
@@ -19,8 +18,6 @@ from taxel.recording.contents import Contents
 from taxel.recording.layout import on_array
 from taxel.recording.opening import joined, sensors
 from taxel.recording.read_foreign import is_lone_array
-
-__all__ = ["OpenOptions", "sensors_of"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +37,7 @@ class OpenOptions:
     ros : str, optional
         The release of ROS whose messages a bag holds undefined, as "humble".
     rate_hz : float, Hz, optional
-        Pictures a second, for recordings without times.
+        Frames a second, for recordings without times.
     limit : int, bytes, optional
         How much of a recording may be read into memory.
     """
@@ -154,11 +151,11 @@ class OpenOptions:
 def _laid_on(recording: Recording, array: Array) -> Recording:
     """Return a recording on another description of its sensor."""
     contents = recording._contents
-    return type(recording)(Contents(on_array(contents.one, array), contents.sources))
+    return type(recording)(Contents(on_array(contents.main, array), contents.sources))
 
 
 def _is_row_of(recording: Recording, given: Array) -> bool:
-    """Return whether pictures are a row of as many channels as a sensor has taxels, as tables and arrays may be."""
+    """Return whether frames are a row of as many channels as a sensor has taxels, as tables and arrays may be."""
     stated, is_one = recording.array, len(recording.sources) < 2
     row = stated.shape == (1, given.rows * given.columns) and given.rows > 1 and stated.taxels == stated.columns
     return is_one and row and not stated._is_measured and not recording.has_events and not recording.is_stream

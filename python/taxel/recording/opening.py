@@ -27,7 +27,7 @@ from taxel.formats.ros import is_bag
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording import parts
-from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, several, source_from
+from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, several, source_from
 from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_own_table, kind_of
 from taxel.recording.layout import check_size, laid_out, on_array
 from taxel.recording.once import known
@@ -41,18 +41,6 @@ from taxel.recording.read_ros import Topics, read_ros
 from taxel.recording.recording import Recording, noted
 from taxel.recording.sidecars import labels_of, with_sidecars
 from taxel.recording.without_layout import refuse_without_layout
-
-__all__ = [
-    "check_recording",
-    "is_recording",
-    "joined",
-    "open_all",
-    "open_joined",
-    "open_one",
-    "open_recording",
-    "recordings_in",
-    "sensors",
-]
 
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
@@ -92,7 +80,7 @@ def open_one(
     differences : bool
         Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
     topic, field : str, or list of str, optional
-        What of a ROS bag is opened as pictures: a topic, and the path of a field of its messages, as "left.taxels"
+        What of a ROS bag is opened as frames: a topic, and the path of a field of its messages, as "left.taxels"
         (default: the only one with numbers). Of lists each entry becomes a source, with its own `array` if that is a
         list too.
     types, ros : path and str, optional
@@ -118,7 +106,7 @@ def open_one(
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
     is described in `taxel.recording.write_h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`)
-    become notes of a file of pictures that it names.
+    become notes of a file of frames that it names.
 
     Examples
     --------
@@ -130,7 +118,7 @@ def open_one(
     Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
     """
     how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
-    place = Path(arguments.path("path", path))
+    place = Path(arguments.checked_path("path", path))
     if place.is_dir() and not is_bag(place):
         raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
     every = _open(place, how)
@@ -195,7 +183,7 @@ def open_all(
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
     how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
-    return _open(Path(arguments.path("path", path)), how)
+    return _open(Path(arguments.checked_path("path", path)), how)
 
 
 def _open(place: Path, how: How) -> list[Recording]:
@@ -258,7 +246,7 @@ def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
     """
     said = How(**how)
     with said.within():
-        return _open_one(Path(arguments.path("path", path)), said)
+        return _open_one(Path(arguments.checked_path("path", path)), said)
 
 
 def _open_one(place: Path, how: How) -> Recording:
@@ -275,7 +263,7 @@ def _open_one(place: Path, how: How) -> Recording:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
             contents = Contents.of(read_foreign(place, said))
             if how.array is not None:
-                contents = Contents.of(_on_given(contents.one, instance("array", how.array, Array)))
+                contents = Contents.of(_on_given(contents.main, instance("array", how.array, Array)))
         elif (kind := kind_of(place)) == "ros":
             grid = said.grid() if how.array is None and said is not None else how.array
             contents = read_ros(place, how.topics.but(of_layout), grid)
@@ -296,7 +284,7 @@ def _open_one(place: Path, how: How) -> Recording:
 
 
 def _on_given(of: Source, array: Array) -> Source:
-    """Return pictures of another program on the given sensor: as many rows and columns, or a row of as many channels.
+    """Return frames of another program on the given sensor: as many rows and columns, or a row of as many channels.
 
     Raises
     ------
@@ -360,14 +348,14 @@ def _kept_one(recording: Recording) -> Recording:
     for source in recording._contents.sources.values():
         for table in (
             source.changes.events if isinstance(source, Board) else None,
-            source.readings.frames if isinstance(source, Pictures) else None,
+            source.readings.frames if isinstance(source, FrameSource) else None,
         ):
             limits.keep(0 if table is None or not table.is_read else _size(table()))
     return recording
 
 
 def _size(table: object) -> int:
-    """Return the bytes of the columns of events or pictures; 0 of those that are not read yet."""
+    """Return the bytes of the columns of events or frames; 0 of those that are not read yet."""
     columns = vars(table).values() if isinstance(table, Events | Frames) else ()
     return sum(column.nbytes for column in columns if isinstance(column, np.ndarray))
 
@@ -404,7 +392,7 @@ def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recordin
 
 
 def _named_beside(place: Path, name: Path, recording: Recording) -> Recording:
-    """Add the reference events of the folder to the notes of pictures that it names; the page opens them one by one."""
+    """Add the reference events of the folder to the notes of frames that it names; the page opens them one by one."""
     table, contents = place.parent / LABELS, recording._contents
     if any(source.has_events for source in contents.sources.values()):
         return recording
@@ -418,7 +406,7 @@ def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     """Add the reference events of a recording, and of each of its sources, to the notes."""
     contents = recording._contents
     if not contents.is_several:
-        return recording.with_notes(_notes(labels, name, contents.one))
+        return recording.with_notes(_notes(labels, name, contents.main))
     sources = {
         label: source if isinstance(source, Stream) else noted(source, tuple(_notes(labels, name, source)))
         for label, source in contents.sources.items()
@@ -455,7 +443,7 @@ def _layout(place: Path, given: str | os.PathLike[str] | Layout | None) -> Layou
     """Return what the given layout file says, or the one beside a recording; None if there is none."""
     if isinstance(given, Layout):
         return given
-    file = Layout.beside(place) if given is None else Path(arguments.path("layout", given))
+    file = Layout.beside(place) if given is None else Path(arguments.checked_path("layout", given))
     return None if file is None else Layout.read(file)
 
 
@@ -473,14 +461,14 @@ def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | N
             untimed=not trial.timed,
             sensor=parts.Sensor(trial.recorded.array, trial.foot),
             marks=parts.Marks(notes=known(tuple(notes))),
-            losses=parts.Losses(lost=known(_beside_pictures(trial))),
+            losses=parts.Losses(lost=known(_beside_frames(trial))),
         )
     )
     said = _layout(place, layout)
     return Recording(with_sidecars(contents if said is None else laid_out(contents, said, given=layout is not None)))
 
 
-def _beside_pictures(trial: Trial) -> tuple[str, ...]:
+def _beside_frames(trial: Trial) -> tuple[str, ...]:
     """Return the line of `lost` for what a file holds of a trial beside its taxels, times and reference events."""
     names = [*trial.series, *trial.unread]
     return (f"columns that are no taxels: {', '.join(names)}",) if names else ()
@@ -552,14 +540,14 @@ def joined(opened: Sequence[Recording]) -> list[Recording]:
     """
     groups: dict[tuple[str, str], dict[str, Contents]] = {}
     for recording in opened:
-        origin = recording._contents.one.origin
+        origin = recording._contents.main.origin
         # In a folder the path of a trial ends with its name, and so with its foot.
         key = (str(origin.path).removesuffix(f" {origin.label}"), origin.name.removesuffix(f" {origin.label}"))
         groups.setdefault(key, {})[origin.label or origin.name] = recording._contents
     together: list[Recording] = []
     for (path, _), feet in groups.items():
         if set(feet) == set(FEET):
-            sources = {foot: feet[foot].one for foot in FEET}
+            sources = {foot: feet[foot].main for foot in FEET}
             sources = {
                 foot: replace(source, origin=replace(source.origin, path=Path(path)))
                 for foot, source in sources.items()

@@ -226,7 +226,7 @@ class Readings:
 
     def lines(self) -> list[str]:
         """Return what is lost without it, but for the frames."""
-        lines = ["that its pictures have no times"] * self.untimed
+        lines = ["that its frames have no times"] * self.untimed
         return lines + ([] if self.turned is None else [f"that its readings were turned (falls = {self.turned:g})"])
 
 

@@ -12,10 +12,8 @@ from taxel.recording.recording import Recording
 from taxel.recording.rest import Rest, of_quiet
 from taxel.tare import Tare
 
-__all__ = ["free_of_preload", "without_preload"]
-
-#: A tare lasts so long at least, us, and so many pictures.
-_LEAST_US, _LEAST_PICTURES = 10_000, 20
+#: A tare lasts so long at least, us, and so many frames.
+_LEAST_US, _LEAST_FRAMES = 10_000, 20
 
 
 def without_preload(recording: Recording, first_us: int) -> tuple[Tare | None, str]:
@@ -50,31 +48,31 @@ def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] |
     return span, f"{line}, so the tare is of a time without it"
 
 
-def _free(pictures: Frames, rest: Rest) -> NDArray[np.int64]:
-    """Return the numbers of the pictures without what lay on the array in the quiet stretch of a rest."""
+def _free(frames: Frames, rest: Rest) -> NDArray[np.int64]:
+    """Return the numbers of the frames without what lay on the array in the quiet stretch of a rest."""
     assert rest.quiet_us is not None
     assert rest.preload is not None
     is_loaded = rest.preload > 0
-    values = pictures.values.reshape(len(pictures), -1)[:, is_loaded]
-    quiet = values[slice(*np.searchsorted(pictures.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
+    values = frames.values.reshape(len(frames), -1)[:, is_loaded]
+    quiet = values[slice(*np.searchsorted(frames.t, rest.quiet_us))].mean(axis=0, dtype=np.float64)
     return np.flatnonzero((values < quiet - rest.preload[is_loaded] / 2).all(axis=1))
 
 
-def _later(pictures: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:
-    """Return the first quiet stretch from the first of these pictures on, us, unless something lies on the array."""
-    later = of_quiet(pictures.between(pictures.t[free[0]], np.inf))
+def _later(frames: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:
+    """Return the first quiet stretch from the first of these frames on, us, unless something lies on the array."""
+    later = of_quiet(frames.between(frames.t[free[0]], np.inf))
     return None if later.preload_at else later.quiet_us
 
 
-def _without(pictures: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:
+def _without(frames: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:
     """Return the longest time before the first label without what lay on the array, else a later quiet one, us."""
-    free = _free(pictures, rest)
+    free = _free(frames, rest)
     if not len(free):
         return None
     runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
-    spans = [(int(pictures.t[run[0]]), min(int(pictures.t[run[-1]]), first_us)) for run in runs]
+    spans = [(int(frames.t[run[0]]), min(int(frames.t[run[-1]]), first_us)) for run in runs]
     begin, end = max(spans, key=lambda span: span[1] - span[0])
-    count = np.count_nonzero((pictures.t >= begin) & (pictures.t < end))
-    if end - begin >= _LEAST_US and count >= _LEAST_PICTURES:
+    count = np.count_nonzero((frames.t >= begin) & (frames.t < end))
+    if end - begin >= _LEAST_US and count >= _LEAST_FRAMES:
         return begin, end
-    return _later(pictures, free)
+    return _later(frames, free)

@@ -1,4 +1,4 @@
-"""Pictures of a recording above rest, and their contact area, peak, sum and centre of pressure over time."""
+"""Frames of a recording above rest, and their contact area, peak, sum and centre of pressure over time."""
 
 from __future__ import annotations
 
@@ -18,28 +18,24 @@ from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import Contents, source_from
+from taxel.recording.frames import FRAMES_HZ, period_us
 from taxel.recording.once import UNKNOWN
-from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
 from taxel.recording.rest import (
-    Picture,
+    FrameBlock,
     Rest,
     flickering,
     found,
     loaded_from,
-    of_pictures,
+    of_frames,
     ticks_by_unit,
     tracked,
 )
 from taxel.tare import Tare
 
-__all__ = ["Series", "above_rest", "above_rest_at", "quiet_rest", "readings", "series"]
-
-#: The most pictures of a long recording, as a plot resolves no more points.
-MOST_PICTURES = 2000
-#: Rate of the pictures of a short recording of events, Hz.
-PICTURES_HZ = 100.0
-#: Number of values of pictures that are computed at once.
+#: The most frames of a long recording, as a plot resolves no more points.
+MOST_FRAMES = 2000
+#: Number of values of frames that are computed at once.
 _BLOCK = 1 << 21
 #: So many events are looked at at once for where area, peak and sum are largest, in so many moments of each.
 _EVENTS, _MOMENTS = 1 << 16, 32
@@ -49,7 +45,7 @@ _TRACKED_US, _STRETCH = 50_000, 10
 #: it: a wrong time stamp may make it one of years.
 _IN_SILENCE = 64
 #: *Reading*: noise adds up to at most so many times the greatest sum of the stretch of this length, us, in which it is
-#: least, and so many taxels just above the floor (crates/taxel-panel/src/keyframe_index/pictures.rs has the same).
+#: least, and so many taxels just above the floor (crates/taxel-panel/src/keyframe_index/frames.rs has the same).
 _TIMES_LEAST, _STRETCH_US, _NOISY_TAXELS = 1.5, 250_000, 4
 #: Largest rectangle around the taxels with events whose rest is tracked with regard to neighbours.
 _MOST_PLACES = 1 << 18
@@ -71,7 +67,7 @@ class Series:
     peak, total : float64, shape (n,), in `unit`
         The largest value, and the sum of the loaded taxels, 0 without one; of all where `above` is 0.
     centre : float64, shape (n, 2), in `centre_unit`; None of channels
-        As of `Frames.centre`; NaN in pictures above the rest of a quiet stretch whose sum is one that noise adds up to.
+        As of `Frames.centre`; NaN in frames above the rest of a quiet stretch whose sum is one that noise adds up to.
     centre_unit : {"mm", "taxels", "places"}
         As of `Array.centre_unit`.
     rest : Rest
@@ -79,7 +75,7 @@ class Series:
     force : float64, shape (n,), N
         Of values in kPa, if the area of each taxel is known.
     largest : Series, optional
-        Of events: the same at the moments between the pictures where area, peak and sum are largest.
+        Of events: the same at the moments between the frames where area, peak and sum are largest.
     """
 
     t: NDArray[np.int64]
@@ -97,7 +93,7 @@ class Series:
 
     @classmethod
     def of(cls, frames: Frames, above: float, rest: Rest) -> Series:
-        """Return the series of pictures above rest."""
+        """Return the series of frames above rest."""
         array = frames.array
         each = max(1, _BLOCK // max(1, array.rows * array.columns))
         # A block at a time, because the centre's weights have 64 bits.
@@ -124,7 +120,7 @@ class Series:
 
 
 def _of_noise(t: NDArray[np.int64], total: NDArray[np.float64], above: float) -> float:
-    """Return the most that the noise of pictures adds up to, as on the page: by the stretch in which it is least."""
+    """Return the most that the noise of frames adds up to, as on the page: by the stretch in which it is least."""
     begins = np.flatnonzero(np.diff((t - t[0]) // _STRETCH_US, prepend=-1))
     greatest = np.maximum.reduceat(total, begins)
     # The last one may be short.
@@ -132,7 +128,7 @@ def _of_noise(t: NDArray[np.int64], total: NDArray[np.float64], above: float) ->
 
 
 def force_n(frames: Frames) -> NDArray[np.float64] | None:
-    """Return the force of each picture in kPa, N, from each taxel's area; None in another unit or of unknown area."""
+    """Return the force of each frame in kPa, N, from each taxel's area; None in another unit or of unknown area."""
     areas = frames.array.area_mm2
     if frames.unit != "kPa" or areas is None:
         return None
@@ -140,17 +136,17 @@ def force_n(frames: Frames) -> NDArray[np.float64] | None:
 
 
 def series(recording: Recording, tare: Tare | None = None) -> Series | None:
-    """Return area, peak, sum and centre of a recording's pictures above rest (`above_rest`); None without intensities.
+    """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities.
 
-    Taxels of pictures that flicker (`taxel.recording.rest.flickering`) count as 0. For events only taxels with events
-    are computed, a block of pictures at a time: for a large sensor with few events no whole picture is in memory.
+    Taxels of frames that flicker (`taxel.recording.rest.flickering`) count as 0. For events only taxels with events
+    are computed, a block of frames at a time: for a large sensor with few events no whole frame is in memory.
     """
     if not recording.has_events or recording.calibration is not None:
         result = above_rest(recording, tare)
         if result is None or recording.has_events:
             return None if result is None else Series.of(*result)
         frames, above, rest = result
-        # As on the page, a taxel that jumps alone for single pictures is no load.
+        # As on the page, a taxel that jumps alone for single frames is no load.
         values = np.where(flickering(recording.frames()), np.float32(0), frames.values)
         return Series.of(Frames(values, frames.t, unit=frames.unit, array=frames.array), above, rest)
     events = recording.events
@@ -160,7 +156,7 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     rest = _rest_of(recording, drawn, tare)
     of = _series_of(drawn, rest, events.array)
     moments = _moments(events, drawn, rest, of)
-    # They are pictures more, at which the rest is tracked as at the others.
+    # They are frames more, at which the rest is tracked as at the others.
     at_all = replace(drawn, t=np.union1d(drawn.t, moments))
     return replace(of, largest=_series_of(at_all, rest, events.array)) if len(at_all.t) > len(drawn.t) else of
 
@@ -189,8 +185,8 @@ def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
 def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[np.int64]:
     """Return the times of events at which area, peak and sum may be largest, us.
 
-    Each event changes them by what its taxel changes, above a rest that stands still from one picture to the next:
-    from each picture's own values on, that tells where to look, not what is there.
+    Each event changes them by what its taxel changes, above a rest that stands still from one frame to the next:
+    from each frame's own values on, that tells where to look, not what is there.
     """
     assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
     events = events if np.all(np.diff(events.t) >= 0) else events.sorted()
@@ -230,27 +226,27 @@ def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[n
             steps["area"] = each[taxel] * ((now > 0) - 1.0 * (before > 0))
         # Only what is there once all of a moment's events are read.
         last = np.append(np.diff(t) > 0, True)
-        picture = np.searchsorted(drawn.t, t, side="right") - 1
-        starts = np.flatnonzero(np.diff(picture, prepend=-1))
+        frame = np.searchsorted(drawn.t, t, side="right") - 1
+        starts = np.flatnonzero(np.diff(frame, prepend=-1))
         for name, step in steps.items():
             curve = np.empty(len(t))
             curve[order] = step
             if name in sums:
                 curve = sums[name] + np.cumsum(curve)
-                at_picture = np.append(sums[name], curve[:-1])[starts]
-                off = getattr(of, name)[picture[starts]] - at_picture
-                if picture[0] == seen:
+                at_frame = np.append(sums[name], curve[:-1])[starts]
+                off = getattr(of, name)[frame[starts]] - at_frame
+                if frame[0] == seen:
                     off[0] = offs[name]
                 sums[name], offs[name] = curve[-1], off[-1]
                 curve += np.repeat(off, np.diff(starts, append=len(t)))
             curve[~last] = -np.inf
             found[name] = sorted(found[name] + _largest(curve, starts, t))[:_MOMENTS]
-        seen = picture[-1]
+        seen = frame[-1]
     return np.array(sorted({moment for each in found.values() for _, moment in each}), np.int64)
 
 
 def _largest(curve: NDArray[np.float64], starts: NDArray[np.int64], t: NDArray[np.int64]) -> list[tuple[float, int]]:
-    """Return the largest value of a curve after each picture, negative, and its time; of few pictures."""
+    """Return the largest value of a curve after each frame, negative, and its time; of few frames."""
     most, ends = np.maximum.reduceat(curve, starts), np.append(starts[1:], len(t))
     few = np.argsort(-most, kind="stable")[:_MOMENTS]
     return [(-most[k], int(t[starts[k] + np.argmax(curve[starts[k] : ends[k]])])) for k in few]
@@ -258,9 +254,9 @@ def _largest(curve: NDArray[np.float64], starts: NDArray[np.int64], t: NDArray[n
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """The held values of the taxels with events, in blocks of pictures."""
+    """The held values of the taxels with events, in blocks of frames."""
 
-    #: Times of the pictures, us.
+    #: Times of the frames, us.
     t: NDArray[np.int64]
     #: The indices of the taxels, the time from which the value of each is known, us, and their held values.
     taxels: NDArray[np.int64]
@@ -284,7 +280,7 @@ class _Drawn:
         taxels, column = np.unique(events.array.index(events.x[there], events.y[there]), return_inverse=True)
         since = np.full(len(taxels), np.iinfo(np.int64).max)
         np.minimum.at(since, column, events.t[there])
-        begins, held = None, recording._contents.one.settings.held()
+        begins, held = None, recording._contents.main.settings.held()
         if held is not None:
             known = held.reshape(-1)[taxels] != UNKNOWN
             begins = np.where(known, held.reshape(-1)[taxels], 0).astype(np.float32)
@@ -310,9 +306,9 @@ class _Drawn:
 
     @cached_property
     def sampled(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """The times at which values are read: the pictures', and those at which the rest is tracked.
+        """The times at which values are read: the frames', and those at which the rest is tracked.
 
-        Beside each stands how many times it stands for, of the pictures' and of all multiples of `_TRACKED_US`.
+        Beside each stands how many times it stands for, of the frames' and of all multiples of `_TRACKED_US`.
         """
         if not len(self.t):
             return self.t, self.t
@@ -327,7 +323,7 @@ class _Drawn:
         many = np.searchsorted(since, until - steps)
         place = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
         grid = np.repeat(steps, many) + np.array(since)[place]
-        # Stretches begin and end where they would with all times: in silence, around pictures, and where events begin.
+        # Stretches begin and end where they would with all times: in silence, around frames, and where events begin.
         later = place >= _IN_SILENCE
         grid[later] -= grid[later] % _STRETCH
         around = np.unique((self.t - first) // (_STRETCH * _TRACKED_US))[:, None] * _STRETCH + [0, _STRETCH]
@@ -338,10 +334,10 @@ class _Drawn:
         is_multiple = (first + begins * _TRACKED_US == times) & (times < last)
         return times, np.diff(begins, append=count) + ~is_multiple
 
-    def blocks(self) -> Iterator[tuple[NDArray[np.bool_], Picture]]:
-        """Yield the held values in the rectangle, at the pictures' times and often enough between them.
+    def blocks(self) -> Iterator[tuple[NDArray[np.bool_], FrameBlock]]:
+        """Yield the held values in the rectangle, at the frames' times and often enough between them.
 
-        Beside them stands which of them are pictures.
+        Beside them stands which of them are frames.
         """
         times, _ = self.sampled
         shown = np.isin(times, self.t)
@@ -356,17 +352,17 @@ class _Drawn:
 
     def found(self) -> Rest:
         """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""
-        size, pictures = self.box[0] * self.box[1], lambda: (picture for _, picture in self.blocks())
-        rest = found(pictures, size, self.box[1], corner=self.corner, stands_for=self.sampled[1])
+        size, blocks = self.box[0] * self.box[1], lambda: (block for _, block in self.blocks())
+        rest = found(blocks, size, self.box[1], corner=self.corner, stands_for=self.sampled[1])
         preload = None if rest.preload is None else rest.preload[self.places]
         # A board's comparators are turned by its register, not by a layout file.
         return replace(rest, values=rest.values[self.places], preload=preload, falls=False)
 
     def above(self, rest: Rest) -> Iterator[tuple[int, NDArray[np.float32]]]:
-        """Yield the number of the first picture of each block, and the values of the taxels above rest."""
-        kept: deque[tuple[NDArray[np.bool_], Picture]] = deque()
+        """Yield the number of the first frame of each block, and the values of the taxels above rest."""
+        kept: deque[tuple[NDArray[np.bool_], FrameBlock]] = deque()
 
-        def read() -> Iterator[Picture]:
+        def read() -> Iterator[FrameBlock]:
             for block in self.blocks():
                 kept.append(block)
                 yield block[1]
@@ -382,39 +378,39 @@ class _Drawn:
             yield first, over[shown][:, self.places]
             first += int(np.count_nonzero(shown))
 
-    def pictures(self, rest: Rest, array: Array) -> NDArray[np.float32]:
-        """Return the pictures above rest, shape (n, rows, columns); 0 of taxels without events."""
+    def frames(self, rest: Rest, array: Array) -> NDArray[np.float32]:
+        """Return the frames above rest, shape (n, rows, columns); 0 of taxels without events."""
         shown = np.zeros((len(self.t), array.rows * array.columns), np.float32)
         for first, over in self.above(rest):
             shown[first : first + len(over), self.taxels] = over
         return shown.reshape(-1, *array.shape)
 
 
-def _above(rest: Rest, pictures: Iterable[Picture], columns: int, scale: float = 1.0) -> Iterable[Picture]:
-    """Yield pictures above a rest: tracked where none is given; 0 where a value or its rest is not known."""
+def _above(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:
+    """Yield frames above a rest: tracked where none is given; 0 where a value or its rest is not known."""
     if rest.source in ("quiet", "none"):
-        yield from tracked(rest, pictures, columns, scale)
+        yield from tracked(rest, blocks, columns, scale)
         return
     known = np.where(np.isnan(rest.values), np.inf, rest.values)
-    for t, values in pictures:
+    for t, values in blocks:
         yield t, _core.above_rest(np.nan_to_num(values).reshape(-1), known).reshape(values.shape)
 
 
 def _rate_hz(recording: Recording) -> float:
     seconds = recording.events.duration_us / 1e6
-    return min(PICTURES_HZ, MOST_PICTURES / seconds) if seconds else PICTURES_HZ
+    return min(FRAMES_HZ, MOST_FRAMES / seconds) if seconds else FRAMES_HZ
 
 
 def _times(recording: Recording) -> NDArray[np.int64]:
-    """Return the times of the pictures of `Recording.frames`."""
+    """Return the times of the frames of `Recording.frames`."""
     t = recording.events.t
-    stretch = recording._contents.one.timing.stretch
+    stretch = recording._contents.main.timing.stretch
     first, stop = (int(t.min()), int(t.max()) + 1) if stretch is None else stretch()
     return np.arange(first, stop, period_us("rate_hz", _rate_hz(recording)), dtype=np.int64)
 
 
 def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, float, Rest] | None:
-    """Return pictures of the values above rest, the threshold of a loaded taxel, and the rest.
+    """Return frames of the values above rest, the threshold of a loaded taxel, and the rest.
 
     They are in N or kPa if the recording has a calibration file beside it. None without intensities.
 
@@ -428,7 +424,7 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
     -----
     *Reading*: the rest is a given tare, and that of a zeroed taxel what it was zeroed to; else the calibration's; else
     0 where the unit is one of force or pressure; else that of a quiet stretch, tracked from there on
-    (`taxel.encode.LocalLoad`); else it is not known: events are then above each taxel's first value, and pictures as
+    (`taxel.encode.LocalLoad`); else it is not known: events are then above each taxel's first value, and frames as
     they are. A taxel is loaded if it is above its rest by more than the noise floor of the board's fast presets and
     half a tick, as in `taxel.encode.ContactArea`; in another unit the range of a recording's values counts as 150
     ticks; in one of force or pressure by more than six times the noise of a quiet stretch, or than 0 without one.
@@ -442,12 +438,12 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
         return Frames(of._values(frames.values, values), frames.t, unit=of.unit, array=frames.array), 0.0, rest
     if recording.has_events:
         drawn = _Drawn.of(recording)
-        shown = drawn.pictures(replace(rest, values=rest.values.reshape(-1)[drawn.taxels]), frames.array)
+        shown = drawn.frames(replace(rest, values=rest.values.reshape(-1)[drawn.taxels]), frames.array)
     elif rest.source in ("unit", "none"):
         return frames, floor, rest
     else:
-        pictures = [(frames.t, frames.values.reshape(len(frames), frames.array.rows * frames.array.columns))]
-        [(_, shown)] = _above(rest, pictures, frames.array.columns, ticks_by_unit(frames))
+        blocks = [(frames.t, frames.values.reshape(len(frames), frames.array.rows * frames.array.columns))]
+        [(_, shown)] = _above(rest, blocks, frames.array.columns, ticks_by_unit(frames))
     shape = len(frames), *frames.array.shape
     return Frames(shown.reshape(shape), frames.t, unit=frames.unit, array=frames.array), floor, rest
 
@@ -471,11 +467,11 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     # The rest is found from the first event on.
     from_first = np.union1d(t, min(t[0], events.t.min())) if len(t) else t
     drawn = replace(drawn, t=from_first.astype(np.int64))
-    return drawn.pictures(_rest_of(recording, drawn, None), events.array)[len(from_first) - len(t) :]
+    return drawn.frames(_rest_of(recording, drawn, None), events.array)[len(from_first) - len(t) :]
 
 
 def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
-    """Return raw pictures, the rest of each taxel, and the threshold of a loaded taxel; None without intensities.
+    """Return raw frames, the rest of each taxel, and the threshold of a loaded taxel; None without intensities.
 
     The rest is as of `above_rest`, but that of a quiet stretch as it was there.
     """
@@ -494,7 +490,7 @@ def quiet_rest(recording: Recording) -> Rest | None:
 def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float] | None:
     if not recording.has_events:
         frames = recording.frames()
-        rest = _rest_of_pictures(recording, frames, tare)
+        rest = _rest_of_frames(recording, frames, tare)
         return frames, rest, loaded_from(frames, rest)
     events = recording.events
     if events.present is None or not events.present.any():
@@ -516,9 +512,9 @@ def _rest_of(recording: Recording, drawn: _Drawn, tare: Tare | None) -> Rest:
     return replace(rest, zeroed=len({k for k, *_ in drawn.zeroed}))
 
 
-def _rest_of_pictures(recording: Recording, frames: Frames, tare: Tare | None) -> Rest:
+def _rest_of_frames(recording: Recording, frames: Frames, tare: Tare | None) -> Rest:
     given = _given(recording, tare)
-    return of_pictures(frames) if given is None else given
+    return of_frames(frames) if given is None else given
 
 
 def _given(recording: Recording, tare: Tare | None) -> Rest | None:

@@ -1,4 +1,4 @@
-"""Reads tables of text: a .csv of events or of pictures.
+"""Reads tables of text: a .csv of events or of frames.
 
 A .csv has either the columns ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is an absent one), or ``t_us``
 and a column a taxel, named ``x3y5``, or, of channels, as they are called.
@@ -32,8 +32,6 @@ from taxel.recording.contents import Source, source_from
 from taxel.recording.parts import Origin
 from taxel.recording.read_npz import around
 
-__all__ = ["EVENTS", "MORE", "check_head", "read_csv"]
-
 #: Columns of events: those that a table must have, and those that may follow.
 EVENTS = ("t_us", "x", "y", "p")
 MORE = ("intensity", "repaired")
@@ -55,7 +53,7 @@ _Block = tuple[int, bytes]
 
 
 def read_csv(path: Path, array: Array | None) -> Source:
-    """Read a .csv of events or of pictures.
+    """Read a .csv of events or of frames.
 
     Raises
     ------
@@ -205,9 +203,9 @@ def _csv_frames(path: Path, names: list[str], blocks: Iterator[_Block], array: A
             raise FormatError(sparse)
         for k in range(0, len(table), at_once):
             part = table[k : k + at_once]
-            pictures = np.zeros((len(part), rows, columns), np.float32)
-            pictures[:, y, x] = part[:, 1:]
-            read.add(t=t[k : k + at_once], values=pictures)
+            frames = np.zeros((len(part), rows, columns), np.float32)
+            frames[:, y, x] = part[:, 1:]
+            read.add(t=t[k : k + at_once], values=frames)
     try:
         return Frames(read.column("values"), read.column("t"), array=sensor)
     except ProblemError as error:

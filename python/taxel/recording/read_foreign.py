@@ -37,23 +37,6 @@ from taxel.recording.once import known
 from taxel.recording.parts import Losses, Origin
 from taxel.recording.read_h5 import is_ours
 
-__all__ = [
-    "ARRAYS",
-    "MISSING",
-    "are_units",
-    "arrays_of",
-    "cells",
-    "ends_in_separator",
-    "is_foreign",
-    "is_lone_array",
-    "listed",
-    "read_foreign",
-    "seconds_of",
-    "shapes_of",
-    "times_of",
-    "unit_of",
-]
-
 #: The endings of tables of text, also compressed by gzip, and of files of arrays.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
@@ -62,7 +45,7 @@ ARRAYS = (".npy", ".npz", ".h5", ".hdf5")
 _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
 #: Characters of the name of an array that errors show; a path in a .h5 may have thousands.
 _NAME = 60
-#: Bytes of pictures that are compared at once, and times that are converted at once.
+#: Bytes of frames that are compared at once, and times that are converted at once.
 _PIECE, _TIMES_AT_ONCE = 1 << 22, 1 << 16
 #: Cells that tables hold where a value is missing.
 MISSING = ("", "nan", "NaN", "NA", "-", "null")
@@ -96,7 +79,7 @@ def is_foreign(path: Path, layout: Layout | None = None) -> bool:
 
 
 def is_lone_array(path: Path) -> bool:
-    """Return whether a file that taxel did not write holds one array only, of the shape of pictures."""
+    """Return whether a file that taxel did not write holds one array only, of the shape of frames."""
     if path.suffix.lower() not in ARRAYS or not is_foreign(path):
         return False
     there = shapes_of(path)
@@ -116,7 +99,7 @@ def read_foreign(path: Path, layout: Layout) -> Source:
     -------
     Source
         Readings as they are in the file: `taxel.recording.layout.laid_out` turns those that fall. Without a time column
-        and a rate the time of a picture is its number in us: 0, 1, 2 ...
+        and a rate the time of a frame is its number in us: 0, 1, 2 ...
 
     Raises
     ------
@@ -129,14 +112,14 @@ def read_foreign(path: Path, layout: Layout) -> Source:
     try:
         taxels = math.prod(values.shape[1:])
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
-            what = counted(taxels, "column") if is_table else f"pictures of {' x '.join(map(str, values.shape[1:]))}"
+            what = counted(taxels, "column") if is_table else f"frames of {' x '.join(map(str, values.shape[1:]))}"
             raise FormatError(f"{path}: {what}; {layout.place} says {layout.rows} x {layout.columns} taxels")
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
         array = layout.array(
             taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
         )
-        pictures = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
-        frames = Frames(frozen_whole(pictures), frozen_whole(t), array=array)
+        shaped = values.astype(np.float32, copy=False).reshape(-1, *array.shape)
+        frames = Frames(frozen_whole(shaped), frozen_whole(t), array=array)
     except ProblemError as error:
         raise FormatError(f"{layout.place}: {path.name}: {first_line(error)}") from None
     limited(path, frames)
@@ -163,7 +146,7 @@ def unit_of(name: str) -> str | None:
 
 
 def listed(there: Mapping[str, tuple[int, ...]]) -> str:
-    """Return the names and shapes of the first arrays, those that could hold pictures before the others."""
+    """Return the names and shapes of the first arrays, those that could hold frames before the others."""
     first = sorted(there.items(), key=lambda entry: len(entry[1]) not in (2, 3))[:8]
     said = [f"{_short(name) or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
     return (", ".join(said) or "no numbers") + " ..." * (len(there) > 8)
@@ -276,7 +259,7 @@ def _us(times: NDArray[np.float64], name: str, how: Table, path: Path, first: in
     """Return the times of some lines in us; `first` is the number of the first."""
     missing = np.flatnonzero(np.isnan(times))
     if len(missing):
-        raise FormatError(f"{path.name}, line {first + missing[0]}: {short(name)} is missing; every picture has a time")
+        raise FormatError(f"{path.name}, line {first + missing[0]}: {short(name)} is missing; every frame has a time")
     return whole_us(path.name, times * UNITS_US.get(how.time_unit, UNITS_US["s"]) / 1e6, first)
 
 
@@ -404,23 +387,23 @@ def _data(path: Path, how: Data) -> _Read:
             hint = f"; a size is said by {size}" if size else ""
             raise FormatError(f"{path}: holds no array {missing}; there are {listed(every)}{hint}")
         if len(wanted) > 1 and every[wanted[1]] != every[wanted[0]][:1]:
-            count, pictures = math.prod(every[wanted[1]]), math.prod(every[wanted[0]][:1])
-            raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(pictures, 'picture')}")
-        arrays = arrays_of(path, wanted, pictures=wanted[0])
+            count, frames = math.prod(every[wanted[1]]), math.prod(every[wanted[0]][:1])
+            raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}")
+        arrays = arrays_of(path, wanted, frames=wanted[0])
     values, unread = arrays[wanted[0]], ", ".join(name for name in there if name not in wanted)
     lost = (f"other arrays of the file: {unread}",) if unread else ()
     if values.dtype.kind not in "uifb" or values.ndim not in (2, 3) or 0 in values.shape:
         shape = " x ".join(map(str, values.shape))
         raise FormatError(
             f"{path}, {wanted[0] or 'the array'}: {values.dtype} of shape {shape}; must be numbers of shape "
-            "pictures x rows x columns, or pictures x taxels"
+            "frames x rows x columns, or frames x taxels"
         )
     large = _too_large(values)
     if large is not None:
-        picture, *place = large
+        frame, *place = large
         at = f"row {place[0]}, column {place[1]}" if len(place) == 2 else f"taxel {place[0]}"
         raise FormatError(
-            f"{path}, {wanted[0] or 'the array'}, picture {picture}, {at}: {values[large]}; must fit 32 "
+            f"{path}, {wanted[0] or 'the array'}, frame {frame}, {at}: {values[large]}; must fit 32 "
             "bits, or be NaN where it is missing"
         )
     if len(wanted) == 1:
@@ -468,9 +451,9 @@ def _left_out_of(path: Path) -> dict[str, str]:
         return h5.left_out
 
 
-def arrays_of(path: Path, names: Sequence[str], pictures: str | None = None) -> dict[str, NDArray[Any]]:
-    """Read the arrays of these names of a .npz or .h5; of a .h5 that of the pictures as float32, without a copy."""
+def arrays_of(path: Path, names: Sequence[str], frames: str | None = None) -> dict[str, NDArray[Any]]:
+    """Read the arrays of these names of a .npz or .h5; of a .h5 that of the frames as float32, without a copy."""
     if path.suffix.lower() == ".npz":
-        return read_arrays(path, names, dtypes={} if pictures is None else {pictures: np.float32})
+        return read_arrays(path, names, dtypes={} if frames is None else {frames: np.float32})
     with H5File(path) as h5:
-        return {name: h5.numbers(name, np.float32 if name == pictures else None) for name in names}
+        return {name: h5.numbers(name, np.float32 if name == frames else None) for name in names}

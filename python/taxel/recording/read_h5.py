@@ -1,4 +1,4 @@
-"""Reads events or pictures of a .h5 that taxel wrote (`taxel.recording.write_h5`)."""
+"""Reads events or frames of a .h5 that taxel wrote (`taxel.recording.write_h5`)."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from taxel.recording.contents import Source
 from taxel.recording.read_npz import DTYPES, chosen, source_of_columns
 from taxel.recording.write_h5 import MARK, VERSION
 from taxel.recording.write_npz import TEXTS
-
-__all__ = ["is_ours", "read_h5"]
 
 #: Bytes of a file that are searched at once.
 _PIECE_BYTES = 1 << 20

@@ -13,8 +13,6 @@ from taxel.recording.once import known
 from taxel.recording.parts import Changes, Losses, Origin, Sensor, Wire
 from taxel.recording.verdict import Verdict
 
-__all__ = ["read_lsa"]
-
 
 def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Board:
     """Return the contents of a .lsa.

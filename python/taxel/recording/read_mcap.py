@@ -19,7 +19,7 @@ from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording import parts
-from taxel.recording.contents import Board, Contents, Pictures, Source, Stream, alone
+from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, alone
 from taxel.recording.description import (
     array_of,
     board_changes_of,
@@ -33,8 +33,6 @@ from taxel.recording.once import Once, known
 from taxel.recording.raw import Datagrams, Samples
 from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
-
-__all__ = ["DOUBTS", "STEPS", "ascending", "read_mcap"]
 
 #: The damage after which times are doubtful; from when on is known by the file's own times alone.
 DOUBTS = ("jumps_of_time", "stamps_out_of_order", "drifts_from_arrival")
@@ -55,11 +53,11 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     sources: dict[str, Source] = {}
     for name in reader.sources():
         channel = _Source(path, reader.of_source(name), limit)
-        if channel.header.get("pictures") is not None:
-            sources[name] = channel.pictures()
+        if channel.header.get("frames") is not None:
+            sources[name] = channel.frames()
         else:
             sources[name] = channel.board(pairing) if channel.header.get("stream") is None else channel.stream()
-    sensors = [name for name, source in sources.items() if type(source) is Pictures]
+    sensors = [name for name, source in sources.items() if type(source) is FrameSource]
     if len(sensors) > 1:
         for name in sensors:
             source = sources[name]
@@ -124,7 +122,7 @@ class _Source:
         )
 
     def settings(self) -> parts.Settings:
-        """Return the board's state of a board, or of the pictures that were made of one."""
+        """Return the board's state of a board, or of the frames that were made of one."""
         return parts.Settings(Once(self.held), Once(self.registers), Once(self.register_changes))
 
     def marks(self) -> parts.Marks:
@@ -136,10 +134,10 @@ class _Source:
             zeroings=Once(lambda: zeroings_of([remark for _, remark in self.remarks().zeroings])),
         )
 
-    def pictures(self) -> Pictures:
-        """Return the contents of a source of pictures."""
-        about, path = self.header["pictures"], self.origin.path
-        read = Once(lambda: self.reader().pictures())
+    def frames(self) -> FrameSource:
+        """Return the contents of a source of frames."""
+        about, path = self.header["frames"], self.origin.path
+        read = Once(lambda: self.reader().frames())
 
         def frames() -> Frames:
             t, values, _ = read()
@@ -151,18 +149,18 @@ class _Source:
 
         def counts() -> dict[str, Any]:
             t, _, bad = read()
-            damage = {"pictures": len(t), "pictures_that_could_not_be_read": bad}
+            damage = {"frames": len(t), "frames_that_could_not_be_read": bad}
             return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
         turned = _stated(path, "turned", turned_of, about.get("turned"))
         readings = parts.Readings(Once(frames), not about.get("clock", True), turned)
         header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
         if not about.get("columns"):
-            return Pictures(self.origin, self.sensor, readings, **header)
+            return FrameSource(self.origin, self.sensor, readings, **header)
         return Stream(self.origin, self.sensor, readings, parts.Lines(tuple(about["columns"])), **header)
 
     def stream(self) -> Stream:
-        """Return the contents of a stream of numbers, whose lines are pictures of one row."""
+        """Return the contents of a stream of numbers, whose lines are frames of one row."""
         stream = self.header["stream"]
         read = Once(lambda: self.reader().samples())
 
@@ -290,6 +288,6 @@ def _clock(decoded: _core.Decoded) -> Clock:
 
 
 def ascending(t: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return times of pictures, with equal times moved apart by 1 us."""
+    """Return times of frames, with equal times moved apart by 1 us."""
     steps = np.arange(len(t))
     return np.maximum.accumulate(t - steps) + steps if len(t) else t

@@ -1,4 +1,4 @@
-"""Reads events or pictures as named columns: a .npz, and what a .h5 holds (`taxel.recording.write_npz`)."""
+"""Reads events or frames as named columns: a .npz, and what a .h5 holds (`taxel.recording.write_npz`)."""
 
 from __future__ import annotations
 
@@ -26,8 +26,6 @@ from taxel.recording.description import about_of, described_source
 from taxel.recording.layout import check_size
 from taxel.recording.parts import Origin
 from taxel.recording.write_npz import COLUMNS, DIGEST, EVENTS, PIECE_BYTES, TEXTS, digest_of
-
-__all__ = ["DTYPES", "around", "chosen", "read_npz", "source_of_columns"]
 
 #: Columns of events, one entry each.
 _OF_EVENTS = (*EVENTS, "intensity", "present", "repaired")
@@ -57,7 +55,7 @@ def chosen(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
 
 def _wrong_shape(name: str, there: Mapping[str, tuple[int, ...]]) -> str | None:
     """Return what the shape of a column must be, if it is another; None if it is right."""
-    shape, pictures = there[name], there.get("values")
+    shape, frames = there[name], there.get("values")
     if name in TEXTS:
         return "one text" if shape else None
     if name == DIGEST:
@@ -68,9 +66,9 @@ def _wrong_shape(name: str, there: Mapping[str, tuple[int, ...]]) -> str | None:
         return None if is_right else f"a time and whether it is a start, of at most {MARKERS} markers"
     if name == "held":
         return f"a value a taxel, at most {TAXELS}" if math.prod(shape) > TAXELS else None
-    if pictures is not None:
-        is_right = name == "values" or shape == pictures[:1]
-        return None if is_right else f"a time for each of {counted(math.prod(pictures[:1]), 'picture')}"
+    if frames is not None:
+        is_right = name == "values" or shape == frames[:1]
+        return None if is_right else f"a time for each of {counted(math.prod(frames[:1]), 'frame')}"
     is_right = len(shape) == 1 and shape == there.get("t", shape)
     return None if is_right else "one value an event, as many as t has"
 
@@ -89,7 +87,7 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
     Raises
     ------
     FormatError : a column is missing or invalid, or the columns are not those of which the file has the checksum
-    ProblemError : the given sensor has other rows or columns than the pictures
+    ProblemError : the given sensor has other rows or columns than the frames
     """
     if DIGEST in columns and not np.array_equal(columns[DIGEST], digest_of(columns)):
         raise FormatError(f"{path}: damaged: what it holds is not what was written")
@@ -116,8 +114,7 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
             if missing:
                 names = ", ".join(columns) or "nothing"
                 raise FormatError(
-                    f"{path}: holds {names}: {missing[0]} is missing; must be t, x, y, p (events) or values, t "
-                    "(pictures)"
+                    f"{path}: holds {names}: {missing[0]} is missing; must be t, x, y, p (events) or values, t (frames)"
                 )
             t, x, y, p = (columns[name] for name in EVENTS)
             markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]

@@ -1,4 +1,4 @@
-"""Reads chosen topics of a ROS bag: each as a source of pictures."""
+"""Reads chosen topics of a ROS bag: each as a source of frames."""
 
 from __future__ import annotations
 
@@ -22,8 +22,6 @@ from taxel.recording.once import known
 from taxel.recording.parts import Losses, Origin
 from taxel.recording.read_mcap import ascending
 
-__all__ = ["Topics", "read_ros"]
-
 
 @dataclass(frozen=True)
 class Topics:
@@ -43,7 +41,7 @@ class Topics:
         for name in ("topic", "field"):
             _texts(name, getattr(self, name))
         if self.types is not None:
-            arguments.path("types", self.types)
+            arguments.checked_path("types", self.types)
         if self.ros is not None:
             arguments.text("ros", self.ros)
 

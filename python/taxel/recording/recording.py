@@ -1,4 +1,4 @@
-"""An opened recording: its events or pictures, their times, and what was lost."""
+"""An opened recording: its events or frames, their times, and what was lost."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from taxel.labels import Note
 from taxel.recording.between import Slices, between, inside
 from taxel.recording.changes import BoardChange, Zeroing
 from taxel.recording.contents import Contents, S, Stream
+from taxel.recording.frames import as_frames, at_rate, calibrated
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import UNKNOWN, Once
 from taxel.recording.parts import Wire
-from taxel.recording.pictures import at_rate, calibrated, pictures
 from taxel.recording.raw import Datagrams
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
@@ -38,8 +38,6 @@ from taxel.wire import Registers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["Recording"]
 
 
 class Recording:
@@ -89,7 +87,7 @@ class Recording:
         if not isinstance(contents, Contents):
             raise refused("contents", f" is {shown(contents)}: a recording is opened by taxel.open(path), not built")
         self._contents = contents
-        whole = contents.one
+        whole = contents.main
         self.path, self.name, self.kind = whole.origin.path, whole.origin.name, whole.origin.kind
         self.array, self.source = whole.sensor.array, whole.origin.source
         self._cut_from: tuple[weakref.ref[Recording], float, float] | None = None
@@ -106,32 +104,32 @@ class Recording:
 
         Raises
         ------
-        ProblemError : the file holds pictures
+        ProblemError : the file holds frames
         """
-        events = self._contents.one.table
+        events = self._contents.main.table
         if not isinstance(events, Events):
-            raise ProblemError(f"{self.path}: holds pictures and no events; ask for frames()")
+            raise ProblemError(f"{self.path}: holds frames and no events; ask for frames()")
         return events
 
     def frames(self, rate_hz: float | None = None) -> Frames:
-        """Return pictures over time.
+        """Return frames over time.
 
         Parameters
         ----------
         rate_hz : float, above 0, optional
-            Pictures a second, with a period rounded to whole us; default: a file of pictures returns its own, one of
+            Frames a second, with a period rounded to whole us; default: a file of frames returns its own, one of
             events 100 a second.
 
         Returns
         -------
         Frames
-            For events: the held intensities, beginning with `held`, or with 0; for pictures: the last at each time.
+            For events: the held intensities, beginning with `held`, or with 0; for frames: the last at each time.
 
         Raises
         ------
         ProblemError : an invalid rate, or events without intensities
         """
-        return pictures(self._contents.one, rate_hz).table
+        return as_frames(self._contents.main, rate_hz).table
 
     @property
     def sources(self) -> dict[str, Recording]:
@@ -177,7 +175,7 @@ class Recording:
         otherwise be unknown; for a slice they follow from the events before it. `frames` begins with them, and so do
         encoders and readouts whose argument is the recording (not its events alone).
         """
-        held = self._contents.one.settings.held()
+        held = self._contents.main.settings.held()
         return None if held is None else np.where(held == UNKNOWN, np.nan, held).astype(np.float32)
 
     @property
@@ -189,10 +187,10 @@ class Recording:
         FormatError : it cannot be read
         ProblemError : it is of another array, or of readings in another unit
         """
-        return self._contents.one.sensor.calibration()
+        return self._contents.main.sensor.calibration()
 
     def calibrated(self, rate_hz: float | None = None, rest: Tare | None = None) -> Frames:
-        """Return pictures in N or kPa, by the calibration in the file's folder.
+        """Return frames in N or kPa, by the calibration in the file's folder.
 
         Parameters
         ----------
@@ -205,37 +203,37 @@ class Recording:
         ------
         ProblemError : no calibration lies beside it, or one of another array
         """
-        return calibrated(self._contents.one, rate_hz, rest).table
+        return calibrated(self._contents.main, rate_hz, rest).table
 
     @property
     def side(self) -> str:
         """The foot or hand that the sensor is of, "left" or "right"; "" if not stated."""
-        return self._contents.one.sensor.side
+        return self._contents.main.sensor.side
 
     @property
     def heel(self) -> str:
         """Where on the sensor the heel lies, "top" or "bottom"; "" if not stated."""
-        return self._contents.one.sensor.heel
+        return self._contents.main.sensor.heel
 
     @property
     def is_slice(self) -> bool:
         """Whether this is a part of the file by time, made by `between`."""
-        return self._contents.one.timing.stretch is not None
+        return self._contents.main.timing.stretch is not None
 
     @property
     def has_events(self) -> bool:
-        """Whether the file holds events (else pictures)."""
-        return self._contents.one.has_events
+        """Whether the file holds events (else frames)."""
+        return self._contents.main.has_events
 
     @property
     def timed(self) -> bool:
-        """Whether it has times; else its pictures are numbered: the time of picture k is k us (`at_rate`)."""
-        return not self._contents.one.untimed
+        """Whether it has times; else its frames are numbered: the time of frame k is k us (`at_rate`)."""
+        return not self._contents.main.untimed
 
     @property
     def label(self) -> str:
         """The name of the source within its file, as "left"; "" for a file of several sensors as a whole."""
-        return self._contents.one.origin.label
+        return self._contents.main.origin.label
 
     @property
     def title(self) -> str:
@@ -255,17 +253,17 @@ class Recording:
         ------
         FormatError : an invalid table of labels (names the line)
         """
-        return self._contents.one.marks.notes()
+        return self._contents.main.marks.notes()
 
     @property
     def zeroings(self) -> tuple[Zeroing, ...]:
         """Taxels that people zeroed while recording, in order; a slice includes those before it, which still apply."""
-        return self._contents.one.marks.zeroings()
+        return self._contents.main.marks.zeroings()
 
     @property
     def detections(self) -> Detections:
         """The detections of a readout while recording."""
-        return self._contents.one.marks.detections()
+        return self._contents.main.marks.detections()
 
     @property
     def registers(self) -> Registers | None:
@@ -273,22 +271,22 @@ class Recording:
 
         They are those of the whole sensor (`Registers.array`), even if the recording is a part of it.
         """
-        return self._contents.one.settings.registers()
+        return self._contents.main.settings.registers()
 
     @property
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:
         """The registers at each change while recording, with the host's time (ns since 1970)."""
-        return self._contents.one.settings.register_changes()
+        return self._contents.main.settings.register_changes()
 
     @property
     def board_changes(self) -> tuple[BoardChange, ...]:
         """Resets of the board and changes of its version of the wire, as detected while recording."""
-        return self._contents.one.marks.board_changes()
+        return self._contents.main.marks.board_changes()
 
     @property
     def clock(self) -> Clock | None:
         """Arrival times against board time; None if the file has no arrival times."""
-        return self._contents.one.timing.clock()
+        return self._contents.main.timing.clock()
 
     @property
     def columns(self) -> list[str]:
@@ -298,7 +296,7 @@ class Recording:
         ------
         ProblemError : the recording is not a stream of numbers
         """
-        columns = self._contents.one.columns
+        columns = self._contents.main.columns
         if columns is None:
             raise ProblemError(f"{self.path}: source {self.label!r} is no stream of numbers, so it has no columns")
         return list(columns)
@@ -306,12 +304,12 @@ class Recording:
     @property
     def is_stream(self) -> bool:
         """Whether it is a stream of numbers, such as that of an IMU, instead of an array of taxels."""
-        return self._contents.one.columns is not None
+        return self._contents.main.columns is not None
 
     @property
     def is_on_clock(self) -> bool:
         """Whether times were converted to another clock by `on_clock`."""
-        return self._contents.one.timing.clock_of is not None
+        return self._contents.main.timing.clock_of is not None
 
     def datagrams(self) -> Datagrams:
         """Return the raw datagrams as received; a slice returns all those of the file.
@@ -322,8 +320,8 @@ class Recording:
         """
         if self._contents.is_several:
             # Reading the events raises the error that lists the sources.
-            _ = self._contents.one.table
-        datagrams = self._contents.one.part(Wire).datagrams()
+            _ = self._contents.main.table
+        datagrams = self._contents.main.part(Wire).datagrams()
         if datagrams is not None:
             return datagrams
         if self.is_stream:
@@ -337,7 +335,7 @@ class Recording:
     @property
     def counts(self) -> dict[str, Any]:
         """The numbers of what was received and lost, by cause."""
-        return dict(self._contents.one.losses.counts())
+        return dict(self._contents.main.losses.counts())
 
     @property
     def verdict(self) -> Verdict:
@@ -346,7 +344,7 @@ class Recording:
         That of a part is that of the whole file. The page *What the output means* lists statuses, causes and wordings;
         all else there is to know is in `remarks`.
         """
-        return verdict_of(self._contents.one)
+        return verdict_of(self._contents.main)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -364,7 +362,7 @@ class Recording:
         >>> one.verdict, one.remarks
         ('the .npz does not say what was lost', ('converted from one.npz',))
         """
-        return self._contents.one.losses.remarks
+        return self._contents.main.losses.remarks
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -384,12 +382,12 @@ class Recording:
         >>> whole.lost, half.lost
         ((), ('raw datagrams',))
         """
-        return self._contents.one.losses.lost()
+        return self._contents.main.losses.lost()
 
     @property
     def truncated(self) -> bool:
         """Whether what came last is missing: the writer was killed, or the file was cut within its data."""
-        return self._contents.one.losses.truncated
+        return self._contents.main.losses.truncated
 
     @property
     def rebuilt(self) -> dict[str, int]:
@@ -397,7 +395,7 @@ class Recording:
 
         A missing or damaged summary (`no_summary`) and damaged final counts (`no_end`) count 1.
         """
-        return dict(self._contents.one.losses.rebuilt())
+        return dict(self._contents.main.losses.rebuilt())
 
     def between(self, start: float, stop: float) -> Recording:
         """Return the part of ``start <= t < stop`` (us of the board's clock).
@@ -430,18 +428,18 @@ class Recording:
         return vars(self) | {"_cut_from": None}
 
     def _why_empty(self) -> str:
-        """Return where the events or pictures of a recording are of which a part without any was taken."""
+        """Return where the events or frames of a recording are of which a part without any was taken."""
         if self._cut_from is None:
             return f": {self.title} is empty"
         of, start, stop = self._cut_from
         asked, whole = f" from {plain(start)} to {plain(stop)} us", of()
         if whole is None:
             return f"{asked} of {self.title}"
-        t = whole._contents.one.table.t
+        t = whole._contents.main.table.t
         return f"{asked}: {whole.title} " + (f"lies from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
-        """Return the same recording of numbered pictures with times: so many pictures a second, the first at 0.
+        """Return the same recording of numbered frames with times: so many frames a second, the first at 0.
 
         Parameters
         ----------
@@ -488,8 +486,8 @@ class Recording:
         contents = self._contents
         if contents.is_several:
             return escaped(f"Recording({self.name}: {len(contents.sources)} sources: {', '.join(contents.sources)})")
-        what = contents.one.table
-        noun = "event" if self.has_events else "picture"
+        what = contents.main.table
+        noun = "event" if self.has_events else "frame"
         time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) and self.timed else "no time"
         more = [counted(len(self.notes), "note")] * bool(self.notes)
         more += [counted(len(self.detections), "detection")] * bool(len(self.detections))
@@ -505,11 +503,11 @@ class Recording:
 
 def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:
     """Return the same contents with further notes."""
-    label, sources = of.one.origin.label, of.sources
+    label, sources = of.main.origin.label, of.sources
     if label in sources:
         source = noted(inside(sources)[label], more)
         sources = sources.but(label, source) if isinstance(sources, Slices) else {**sources, label: source}
-    return Contents(noted(of.one, more), sources)
+    return Contents(noted(of.main, more), sources)
 
 
 def noted(of: S, more: tuple[Note, ...]) -> S:

@@ -18,23 +18,6 @@ from taxel.formats.layout import Layout, or_given
 from taxel.frames import Frames
 from taxel.tare import Tare
 
-__all__ = [
-    "BY_UNIT",
-    "FORCE_UNITS",
-    "SHARE",
-    "TIMES_NOISE",
-    "Picture",
-    "Rest",
-    "by_unit",
-    "flickering",
-    "found",
-    "loaded_from",
-    "of_pictures",
-    "of_quiet",
-    "ticks_by_unit",
-    "tracked",
-]
-
 #: Units of force and pressure: an unloaded taxel reads 0 in them.
 FORCE_UNITS = ("N", "mN", "kPa", "Pa", "N/cm2")
 #: The note of a tare that was not measured.
@@ -48,25 +31,25 @@ NOISE_FLOOR = 3.0
 RANGE_TICKS = 150.0
 
 #: Reading: what a taxel reads in a quiet stretch is not its rest, but a load that stood still, if in more than this
-#: share of all pictures it reads less by so many ticks.
+#: share of all frames it reads less by so many ticks.
 LOADED_SHARE, LOADED_TICKS = 0.1, _core.LOADED_TICKS
 #: Values fall from a rest if they go so many times as far below it as above it, in the taxel that does so third most:
 #: bad taxels move alone or in pairs. In ...
 _FALLS, _THIRD = 3.0, 3
 #: ... a smaller array the first counts.
 _SMALL = 9
-#: Reading: a taxel of pictures flickers if it is more than half as far from its median as it ever is so many times or
-#: more, for less than two pictures at a time, while all but one of its neighbours move less than this share of it.
+#: Reading: a taxel of frames flickers if it is more than half as far from its median as it ever is so many times or
+#: more, for less than two frames at a time, while all but one of its neighbours move less than this share of it.
 #: At most one in so many taxels is taken for one.
 _FLICKERS, _ALONE, _FEW = 10, 1 / 8, 16
-#: So many pictures or fewer give a taxel's median.
+#: So many frames or fewer give a taxel's median.
 _MEDIAN_OF = 2000
 
-#: Values in a block of pictures.
+#: Values in a block of frames.
 _BLOCK = 1 << 16
 
-#: Pictures in order: their times, us, and their values by taxel, NaN where a taxel has none.
-Picture = tuple[NDArray[np.int64], NDArray[np.float32]]
+#: Frames in order: their times, us, and their values by taxel, NaN where a taxel has none.
+FrameBlock = tuple[NDArray[np.int64], NDArray[np.float32]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +69,7 @@ class Rest:
     zeroed : int
         Number of taxels that were zeroed while recording: from then on their rest is what was given.
     falls : bool
-        Whether values of pictures go further below the rest of a quiet stretch than above it, and come back: less may
+        Whether values of frames go further below the rest of a quiet stretch than above it, and come back: less may
         mean more pressure.
     preload : float64, one a taxel, in the sensor's unit, optional
         Of a grid: how much more than at rest a taxel read in the quiet stretch, where something lay on it then and was
@@ -141,7 +124,7 @@ class Rest:
 
 
 def by_unit(frames: Frames) -> Tare | None:
-    """Return the tare of pictures in a unit of force or pressure: 0, with the noise of a quiet stretch; None of others.
+    """Return the tare of frames in a unit of force or pressure: 0, with the noise of a quiet stretch; None of others.
 
     The noise of a taxel is 1.4826 times how much the third quartile of what it reads there is above the median: the
     standard deviation of normal noise, also where a sensor cuts off what is below 0, and in a stretch of which less
@@ -159,7 +142,7 @@ def by_unit(frames: Frames) -> Tare | None:
 
 
 def loaded_from(frames: Frames, rest: Rest) -> float:
-    """Return from how much above its rest on a taxel of pictures counts as loaded, in their unit.
+    """Return from how much above its rest on a taxel of frames counts as loaded, in their unit.
 
     Of force and pressure that is more than the noise of a quiet stretch, or than 0 without one; of a rest that a quiet
     stretch shows, more than the noise floor of the board; of any other rest, more than 0.
@@ -172,7 +155,7 @@ def loaded_from(frames: Frames, rest: Rest) -> float:
 
 
 def ticks_by_unit(frames: Frames) -> float:
-    """Return the ticks by the unit of pictures: the range of their values counts as that of a board's ramp.
+    """Return the ticks by the unit of frames: the range of their values counts as that of a board's ramp.
 
     The values of taxels that flicker (`flickering`) are left out.
     """
@@ -188,7 +171,7 @@ def ticks_by_unit(frames: Frames) -> float:
 
 
 def flickering(frames: Frames) -> NDArray[np.bool_]:
-    """Return which taxels of pictures jump again and again for one picture, alone, shape (rows, columns)."""
+    """Return which taxels of frames jump again and again for one frame, alone, shape (rows, columns)."""
     values, found = frames.values, np.zeros(frames.array.shape, bool)
     if min(found.shape) == 1 or found.size < _SMALL:
         return found
@@ -225,7 +208,7 @@ def _extremes(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray
 
 
 def found(
-    pictures: Callable[[], Iterable[Picture]],
+    blocks: Callable[[], Iterable[FrameBlock]],
     taxels: int,
     columns: int,
     scale: float = 1.0,
@@ -234,12 +217,12 @@ def found(
     corner: tuple[int, int] = (0, 0),
     stands_for: NDArray[np.int64] | None = None,
 ) -> Rest:
-    """Return the rest that a quiet stretch of pictures shows (`_core.TrackedRest`), or none.
+    """Return the rest that a quiet stretch of frames shows (`_core.TrackedRest`), or none.
 
     Parameters
     ----------
-    pictures : function
-        Returns the pictures in order, each time it is called.
+    blocks : function
+        Returns the frames in order, each time it is called.
     taxels, columns : int
     scale : float
         Ticks by the sensor's unit.
@@ -247,12 +230,12 @@ def found(
         Whether values fall from the rest with pressure.
     corner : (int, int)
         Row and column of the first taxel, for text.
-    stands_for : int64, shape (pictures,), optional
-        How many equal pictures each one is; default 1.
+    stands_for : int64, shape (frames,), optional
+        How many equal frames each one is; default 1.
     """
     rest = _core.TrackedRest(columns, NOISE_FLOOR, np.full(taxels, np.nan), falls)
     begin_us = None
-    for t, values in pictures():
+    for t, values in blocks():
         begin_us = beginning_us(t) if begin_us is None else begin_us
         rest.above(t, np.ascontiguousarray(values * np.float32(scale)).reshape(-1))
     unknown = np.full(taxels, np.nan)
@@ -261,7 +244,7 @@ def found(
     begins, known = rest.begins / scale, np.zeros(taxels, np.int64)
     released, less, quiet, in_quiet = known.copy(), np.zeros(taxels), np.zeros(taxels), known.copy()
     first = 0
-    for t, values in pictures():
+    for t, values in blocks():
         each = np.ones((len(t), 1), np.int64) if stands_for is None else stands_for[first : first + len(t), None]
         first += len(t)
         load = begins - values if falls else values - begins
@@ -282,15 +265,15 @@ def found(
     return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, preload=preload, preload_at=where)
 
 
-def of_pictures(frames: Frames) -> Rest:
-    """Return the rest of pictures without a tare: 0 of force or pressure, else what a quiet stretch shows, or none."""
+def of_frames(frames: Frames) -> Rest:
+    """Return the rest of frames without a tare: 0 of force or pressure, else what a quiet stretch shows, or none."""
     if frames.unit in FORCE_UNITS:
         return Rest("unit", np.zeros(frames.array.rows * frames.array.columns))
     return of_quiet(frames)
 
 
 def of_quiet(frames: Frames) -> Rest:
-    """Return the rest of pictures that a quiet stretch of them shows, or none."""
+    """Return the rest of frames that a quiet stretch of them shows, or none."""
     scale = ticks_by_unit(frames)
     rest = _of_rising(frames, scale)
     if rest.quiet_us is None or not _fall(frames, rest.quiet_us, scale):
@@ -301,13 +284,13 @@ def of_quiet(frames: Frames) -> Rest:
 
 
 def _of_rising(frames: Frames, scale: float, *, falls: bool = False) -> Rest:
-    """Return the rest that a quiet stretch of pictures shows if their values rise with pressure, or if they fall."""
-    pictures, columns = _blocks(frames), frames.array.columns
-    return found(lambda: pictures, frames.array.rows * columns, columns, scale, falls=falls)
+    """Return the rest that a quiet stretch of frames shows if their values rise with pressure, or if they fall."""
+    blocks, columns = _blocks(frames), frames.array.columns
+    return found(lambda: blocks, frames.array.rows * columns, columns, scale, falls=falls)
 
 
-def _blocks(frames: Frames) -> list[Picture]:
-    """Return pictures in blocks that a processor's cache holds."""
+def _blocks(frames: Frames) -> list[FrameBlock]:
+    """Return frames in blocks that a processor's cache holds."""
     taxels = frames.array.rows * frames.array.columns
     values, each = frames.values.reshape(len(frames), taxels), max(1, _BLOCK // max(1, taxels))
     return [(frames.t[k : k + each], values[k : k + each]) for k in range(0, len(frames), each)]
@@ -332,9 +315,9 @@ def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:
     return bool(deepest > max(_FALLS * most, 2 * LOADED_TICKS / scale))
 
 
-def tracked(rest: Rest, pictures: Iterable[Picture], columns: int, scale: float = 1.0) -> Iterable[Picture]:
-    """Yield pictures above a rest that is tracked, from a quiet stretch or from the first values; 0 below it."""
+def tracked(rest: Rest, blocks: Iterable[FrameBlock], columns: int, scale: float = 1.0) -> Iterable[FrameBlock]:
+    """Yield frames above a rest that is tracked, from a quiet stretch or from the first values; 0 below it."""
     at = _core.TrackedRest(columns, NOISE_FLOOR, rest.values * scale, rest.falls)
-    for t, values in pictures:
+    for t, values in blocks:
         above = at.above(t, np.ascontiguousarray(values * np.float32(scale)).reshape(-1))
         yield t, above.reshape(values.shape) / np.float32(scale)

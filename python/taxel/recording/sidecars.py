@@ -8,12 +8,10 @@ from pathlib import Path
 from taxel._core import ProblemError
 from taxel.calibration import Calibration
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import Contents, Pictures, Source, Stream, alone, together
+from taxel.recording.contents import Contents, FrameSource, Source, Stream, alone, together
+from taxel.recording.frames import calibrated
 from taxel.recording.once import Once, known
 from taxel.recording.parts import Origin
-from taxel.recording.pictures import calibrated
-
-__all__ = ["calibrated_by", "calibration_beside", "has_calibration", "labels_of", "with_sidecars"]
 
 
 def with_sidecars(of: Contents) -> Contents:
@@ -69,7 +67,7 @@ def calibration_beside(path: Path, of: Source) -> Once[Calibration | None]:
 
 
 def calibrated_by(of: Contents, place: Path) -> Contents:
-    """Return a recording, or each sensor of one with several, as pictures in N or kPa by a calibration file.
+    """Return a recording, or each sensor of one with several, as frames in N or kPa by a calibration file.
 
     Raises
     ------
@@ -89,7 +87,7 @@ def calibrated_by(of: Contents, place: Path) -> Contents:
 def _fitting(place: Path, of: Source) -> Calibration:
     """Return a calibration; refuse one of another array or of readings in another unit."""
     calibration = Calibration.load(place)
-    read = of.table.unit if isinstance(of, Pictures) else "ticks"
+    read = of.table.unit if isinstance(of, FrameSource) else "ticks"
     if not calibration.array.fits(of.sensor.array) or calibration.of != read:
         raise ProblemError(
             f"{place}: turns {calibration.of} of {calibration.array!r} into {calibration.unit}; {of.origin.name} holds "

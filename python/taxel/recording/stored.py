@@ -22,7 +22,7 @@ from taxel.recording.contents import (
     Board,
     Contents,
     Drawn,
-    Pictures,
+    FrameSource,
     Source,
     Stream,
     applied,
@@ -39,8 +39,6 @@ from taxel.recording.write_csv import array_in_csv
 from taxel.recording.write_mcap import cut_raw, encoded
 from taxel.wire import decode as wire_decode
 
-__all__ = ["STAMP_US", "is_made", "stored"]
-
 #: The unit of the stamps of wire version 1, us.
 STAMP_US = 100
 
@@ -56,9 +54,9 @@ def stored(of: Contents, place: Path) -> Contents:
 
     Raises
     ------
-    ProblemError : contents that the kind of file cannot hold at all (pictures in a .lsa)
+    ProblemError : contents that the kind of file cannot hold at all (frames in a .lsa)
     """
-    ending, main = place.suffix.lower(), of.one
+    ending, main = place.suffix.lower(), of.main
     if of.is_several and ending == ".mcap" and together(of.sources):
         each = {name: _stored(source, ending, place) for name, source in of.sources.items()}
         each = {name: _named(source, f"{place.name} {name}", name) for name, source in each.items()}
@@ -67,7 +65,7 @@ def stored(of: Contents, place: Path) -> Contents:
         # Reading the events raises the error that lists the sources.
         _ = main.table
     kept = _stored(main, ending, place)
-    if not isinstance(main, Pictures) or ending != ".mcap":
+    if not isinstance(main, FrameSource) or ending != ".mcap":
         kept = _named(kept, place.name, "board")
     return Contents.of(with_losses(kept, of.others))
 
@@ -146,7 +144,7 @@ def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
 
 def _csv(of: Source, place: Path) -> _Kept:
     """Return what a .csv holds: events without markers, or frames without their unit."""
-    beside, is_turned = Layout.beside(place), isinstance(of, Pictures) and of.readings.turned is not None
+    beside, is_turned = Layout.beside(place), isinstance(of, FrameSource) and of.readings.turned is not None
     if is_turned and beside is not None and Layout.read(beside).turned is not None:
         raise ProblemError(
             f"{place}: the readings were turned already, which a .csv cannot state, and {beside} beside it would turn "
@@ -202,7 +200,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     # Of what recordings were merged stands in `source`.
     converted = [f"converted from {of.origin.name}"] if is_file and of.origin.kind != "merged" else []
     samples = of.lines.samples() if isinstance(of, Stream) else None
-    events = None if isinstance(of, Pictures) else known(_board(of, place).table)
+    events = None if isinstance(of, FrameSource) else known(_board(of, place).table)
     clock = of.timing.usable()
     wire = _wire(of, clock, lines) if isinstance(of, Board) else parts.Wire()
     if samples is not None:
@@ -211,7 +209,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
         lines += ["arrival times of lines outside the part"] * (
             clock is not None and len(clock.board_us) > len(samples)
         )
-    elif isinstance(of, Pictures):
+    elif isinstance(of, FrameSource):
         # Frames have the times of the board alone.
         clock = None
         lines += _arrivals(of)
@@ -220,7 +218,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     def rule(part: parts.Part) -> parts.Part:
         match part:
             case parts.Origin():
-                return replace(part, source=part.source or part.name or ("events" if of.has_events else "pictures"))
+                return replace(part, source=part.source or part.name or ("events" if of.has_events else "frames"))
             case parts.Sensor() | parts.Settings() | parts.Marks() | parts.Readings() | parts.Lines():
                 return part
             case parts.Changes():
@@ -262,6 +260,6 @@ def _wire(of: Board, clock: Clock | None, lost: list[str]) -> parts.Wire:
 def _board(of: Source, place: Path) -> Board:
     if not isinstance(of, Board):
         raise ProblemError(
-            f"{place}: a {place.suffix.lower()} holds events and no pictures; write those to .mcap, .npz, .csv or .h5"
+            f"{place}: a {place.suffix.lower()} holds events and no frames; write those to .mcap, .npz, .csv or .h5"
         )
     return of

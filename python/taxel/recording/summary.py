@@ -14,13 +14,11 @@ from taxel.recording.health import health
 from taxel.recording.pressure import Series
 from taxel.recording.recording import Recording
 
-__all__ = ["summary"]
-
 #: The interval over which the highest rate is measured, us.
 _PEAK_US = 10_000
-#: Reading: pictures are apart by a gap if by so many median intervals.
+#: Reading: frames are apart by a gap if by so many median intervals.
 _GAP = 2.5
-#: Reading: a taxel was at full scale if it read the greatest value in so many pictures, of at least so many levels.
+#: Reading: a taxel was at full scale if it read the greatest value in so many frames, of at least so many levels.
 _AT_TOP, _LEVELS = 3, 50
 #: Reading: readings are cut off if the greatest value is so many times as frequent as each of so many values below it.
 _TIMES, _BELOW = 2, 3
@@ -62,8 +60,8 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         facts["events_per_s_board"] = len(events) / seconds if seconds else None
         facts["peak_events_per_s_board"], facts["peak_before_start"] = _peak(events)
     else:
-        facts["pictures"], facts["unit"] = len(table), table.unit
-        facts["pictures_per_s"] = (len(table) - 1) / seconds if seconds else None
+        facts["frames"], facts["unit"] = len(table), table.unit
+        facts["frames_per_s"] = (len(table) - 1) / seconds if seconds else None
         facts["missing"] = {"values": table.missing, "of": table.values.size}
         facts["full_scale"] = _full_scale(table)
         facts["gaps"] = _gaps(table.t) if recording.timed else None
@@ -113,7 +111,7 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     curves: dict[str, Any] = {f"area_{of.area_unit}": of.area, "peak": of.peak, "sum": of.total, "force_n": of.force}
     for name, values in curves.items():
         if values is not None:
-            # A picture of missing values alone has no peak.
+            # A frame of missing values alone has no peak.
             k = int(np.where(np.isnan(values), -np.inf, values).argmax())
             facts[name] = {"most": float(values[k]), "t_us": int(of.t[k])}
     if pressed.centre is None:
@@ -128,7 +126,7 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
 def _full_scale(frames: Frames) -> dict[str, Any] | None:
     """Return how many readings are at full scale, and of which value; None where the readings show none.
 
-    It is the greatest value if two taxels or more read exactly that one in several pictures, and other values too.
+    It is the greatest value if two taxels or more read exactly that one in several frames, and other values too.
     Readings of few levels reach their greatest one by chance, and in the tail of noise each value is rarer than the one
     below it.
     """
@@ -151,7 +149,7 @@ def _full_scale(frames: Frames) -> dict[str, Any] | None:
 
 
 def _gaps(t: NDArray[np.int64]) -> dict[str, int] | None:
-    """Return the number of gaps between pictures, and the length (us) and begin of the longest; None without any."""
+    """Return the number of gaps between frames, and the length (us) and begin of the longest; None without any."""
     apart = np.diff(t)
     gaps = np.flatnonzero(apart > _GAP * np.median(apart)) if len(apart) else apart
     if not len(gaps):

@@ -9,8 +9,6 @@ from typing import Any, Literal, Self, get_args
 from taxel import _core
 from taxel._core import ProblemError
 
-__all__ = ["STATUSES", "Status", "Verdict"]
-
 Status = Literal["complete", "complete after arrival", "unknown", "damaged", "unfinished", "nothing arrived", "lost"]
 
 #: All statuses, from the best to the worst.

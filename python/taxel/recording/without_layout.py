@@ -34,11 +34,9 @@ from taxel.recording.read_foreign import (
     unit_of,
 )
 
-__all__ = ["are_spike_trains", "refuse_without_layout"]
-
 #: A column without a name is one of times if it ascends for so many lines.
 _ASCENDS = 20
-_NO_RATE = "# rate_hz = 100  # pictures a second: the file does not say it, and without it pictures are numbered"
+_NO_RATE = "# rate_hz = 100  # frames a second: the file does not say it, and without it frames are numbered"
 
 
 def refuse_without_layout(path: Path) -> None:
@@ -74,11 +72,11 @@ def refuse_without_layout(path: Path) -> None:
         name = next((name for name, shape in there.items() if len(shape) in (2, 3)), None)
         if name is None:
             raise FormatError(
-                f"{path}: holds {listed(there)}; must be t, x, y, p (events), values, t (pictures), or, with a layout "
-                "file, an array of pictures x rows x columns or pictures x taxels (docs/files.md)"
+                f"{path}: holds {listed(there)}; must be t, x, y, p (events), values, t (frames), or, with a layout "
+                "file, an array of frames x rows x columns or frames x taxels (docs/files.md)"
             )
         holds, lines = listed(there), _of_arrays(path, name, there)
-        says = "says which are the pictures" if len(there) > 1 else "or rate_hz, says what it is"
+        says = "says which are the frames" if len(there) > 1 else "or rate_hz, says what it is"
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
@@ -223,7 +221,7 @@ def _refuse_decimal_commas(path: Path, lines: Sequence[str]) -> None:
 
 
 def _size(shape: Sequence[int]) -> list[str]:
-    """Return the lines that say rows and columns, of pictures of rows x columns, or of so many taxels."""
+    """Return the lines that say rows and columns, of frames of rows x columns, or of so many taxels."""
     if len(shape) == 2:
         return [f"rows = {shape[0]}", f"columns = {shape[1]}"]
     taxels = shape[0]
@@ -236,7 +234,7 @@ def _unit(name: str, times: NDArray[np.float64]) -> list[str]:
     most = float(np.nanmax(np.abs(times), initial=0.0))
     unit = said if said in UNITS_US else next((u for u in UNITS_US if most * UNITS_US[u] <= TIME_US), "us")
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} pictures/s"] if step > 0 else []
+    notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} frames/s"] if step > 0 else []
     notes += [" ".join(f"or {_quoted(unit_name)}" for unit_name in UNITS_US if unit_name != unit)] * (not said)
     return [f"time_unit = {_quoted(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
 

@@ -1,4 +1,4 @@
-"""Writes tables of text: a .csv of events or of pictures, as `taxel.recording.read_csv` reads them."""
+"""Writes tables of text: a .csv of events or of frames, as `taxel.recording.read_csv` reads them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,8 @@ from taxel.frames import Frames
 from taxel.recording.read_csv import EVENTS, MORE
 from taxel.recording.read_npz import around
 
-__all__ = ["array_in_csv", "write_csv"]
-
-#: Number of pictures that are written at once.
-_PICTURES = 4096
+#: Number of frames that are written at once.
+_FRAMES = 4096
 
 
 def array_in_csv(table: Events | Frames) -> Array:
@@ -37,13 +35,13 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
         names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
         file.write(names.encode() + b"\n")
         x, y = np.array(places).T
-        for k in range(0, len(table), _PICTURES):
-            values = table.values[k : k + _PICTURES, y, x]
+        for k in range(0, len(table), _FRAMES):
+            values = table.values[k : k + _FRAMES, y, x]
             # Each value is written once; as bits, because 0 equals -0.
             bits, which = np.unique(values.view(np.uint32), return_inverse=True)
             texts = np.array([_shortest(value) for value in bits.view(np.float32)], object)
             rows = texts[which.reshape(values.shape)].tolist()
-            times = table.t[k : k + _PICTURES].tolist()
+            times = table.t[k : k + _FRAMES].tolist()
             file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
         return
     columns: list[NDArray[Any]] = [table.t, table.x, table.y, table.p.astype(np.uint8)]

@@ -1,8 +1,8 @@
-"""Writes events or pictures to a .h5: one data set a column.
+"""Writes events or frames to a .h5: one data set a column.
 
 The root has the attribute ``taxel`` (1, the layout's version). Events are the data sets ``t`` (int64, us), ``x``, ``y``
 (uint16), ``p`` (bool), optionally ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
-``markers`` (int64, two columns: us, whether a start); pictures are ``values`` (float32, pictures x rows x columns)
+``markers`` (int64, two columns: us, whether a start); frames are ``values`` (float32, frames x rows x columns)
 with ``t`` and ``unit`` (text). ``held`` (uint16, rows x columns, 65 535 for unknown) is the values of the taxels at the
 beginning. ``about`` is JSON: the sensor, the source, registers, notes, detections and lost information. ``digest``
 (uint8) is the checksum over all data sets, of which `taxel.recording.write_npz` states the order.
@@ -21,8 +21,6 @@ import numpy as np
 from taxel._base import h5_writing
 from taxel.recording.contents import Source
 from taxel.recording.write_npz import TEXTS, columns_of
-
-__all__ = ["MARK", "VERSION", "write_h5"]
 
 #: Name of the attribute that has the version of the layout.
 MARK = "taxel"

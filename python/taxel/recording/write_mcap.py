@@ -16,7 +16,7 @@ from taxel._core import RecordingWriter
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Board, Contents, Pictures, Source, Stream
+from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream
 from taxel.recording.kinds import verdict_of
 from taxel.recording.once import known
 from taxel.recording.pressure import above_rest
@@ -26,7 +26,7 @@ from taxel.recording.rest import Rest, ticks_by_unit
 
 __all__ = ["RecordingWriter", "cut_raw", "encoded", "write_mcap"]
 
-#: Number of values of a block of pictures: a chunk of the file.
+#: Number of values of a block of frames: a chunk of the file.
 _BLOCK = 1 << 18
 #: Interval between the pictures for viewers, us.
 _EVERY_US = 100_000
@@ -50,7 +50,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     ------
     OSError : the disk is full ...
     """
-    whole = contents.one
+    whole = contents.main
     samples = whole.lines.samples() if isinstance(whole, Stream) else None
     if samples is not None:
         header = {**samples.about, "sources": [], **_told(whole)}
@@ -60,8 +60,8 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
         writer.finish(json.dumps(counts[whole.origin.label]))
         return
     if not isinstance(whole, Board):
-        every = {name: source for name, source in contents.sources.items() if isinstance(source, Pictures)}
-        _write_pictures(part, every, compression, counts)
+        every = {name: source for name, source in contents.sources.items() if isinstance(source, FrameSource)}
+        _write_frames(part, every, compression, counts)
         return
     wire, events = whole.wire, whole.table
     datagrams = wire.datagrams()
@@ -115,17 +115,17 @@ def _told(of: Source) -> dict[str, Any]:
     return {"lost": of.losses.lost(), "remarks": of.losses.remarks, "converted": converted, "counts": counts}
 
 
-def _write_pictures(
-    part: Path, sources: Mapping[str, Pictures], compression: str, counts: Mapping[str, dict[str, Any]]
+def _write_frames(
+    part: Path, sources: Mapping[str, FrameSource], compression: str, counts: Mapping[str, dict[str, Any]]
 ) -> None:
-    """Write sources of pictures, all by one clock; times in the file are those of the board, from 0 on."""
+    """Write sources of frames, all by one clock; times in the file are those of the board, from 0 on."""
     tables = {name: source.table for name, source in sources.items()}
     origin_us = min([0, *(int(table.t[0]) for table in tables.values() if len(table))])
     headers = [
         {
             **_header(source),
             "name": name,
-            "pictures": {
+            "frames": {
                 "unit": source.table.unit,
                 "clock": not source.untimed,
                 "columns": source.columns or (),
@@ -151,7 +151,7 @@ def _write_pictures(
     for name, first, block, whole in _blocks(tables):
         t = np.ascontiguousarray(block.t)
         values = np.ascontiguousarray(block.values).reshape(-1)
-        tracks[name].pictures(first, (t - origin_us) * 1000, t, values, whole)
+        tracks[name].frames(first, (t - origin_us) * 1000, t, values, whole)
         few, about = shown[name]
         stop = int(np.searchsorted(few.t, t[-1], side="right"))
         for k in range(drawn[name], stop):
@@ -165,10 +165,10 @@ def _write_pictures(
     writer.finish(json.dumps(counts[next(iter(sources))]))
 
 
-def _low_rate(of: Pictures) -> tuple[Frames, tuple[float, str, str]]:
-    """Return pictures above rest, ten a second, and what white is at least, the rest that was subtracted, the unit.
+def _low_rate(of: FrameSource) -> tuple[Frames, tuple[float, str, str]]:
+    """Return frames above rest, ten a second, and what white is at least, the rest that was subtracted, the unit.
 
-    There are none where pictures have no times.
+    There are none where frames have no times.
     """
     frames = of.table
     _, first = np.unique(frames.t // _EVERY_US, return_index=True)
@@ -182,10 +182,8 @@ def _low_rate(of: Pictures) -> tuple[Frames, tuple[float, str, str]]:
 
 
 def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bool]]:
-    """Yield name, number of the first picture, pictures, and whether 16 bits hold them, of all sources by time."""
-    whole = {
-        name: _core.whole_pictures(np.ascontiguousarray(table.values).reshape(-1)) for name, table in tables.items()
-    }
+    """Yield name, number of the first frame, frames, and whether 16 bits hold them, of all sources by time."""
+    whole = {name: _core.whole_frames(np.ascontiguousarray(table.values).reshape(-1)) for name, table in tables.items()}
     done = dict.fromkeys(tables, 0)
     each = {name: max(1, _BLOCK // max(1, table.array.rows * table.array.columns)) for name, table in tables.items()}
     while left := {name: table for name, table in tables.items() if done[name] < len(table)}:

@@ -1,6 +1,6 @@
-"""Writes events or pictures as named columns, the common layout of .npz and .h5.
+"""Writes events or frames as named columns, the common layout of .npz and .h5.
 
-Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and ``markers``; pictures are
+Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and ``markers``; frames are
 ``values t unit``. ``held`` is the values of the taxels at the beginning; ``about`` is JSON with all other fields.
 ``digest`` is a checksum over all of these, by which damage is found that the formats themselves do not notice.
 """
@@ -19,8 +19,6 @@ from taxel._core import ProblemError
 from taxel.frames import Frames
 from taxel.recording.contents import Source
 from taxel.recording.description import json_of
-
-__all__ = ["COLUMNS", "DIGEST", "EVENTS", "PIECE_BYTES", "TEXTS", "columns_of", "digest_of", "write_npz"]
 
 EVENTS = ("t", "x", "y", "p")
 COLUMNS = (*EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")

@@ -46,7 +46,7 @@ _MOMENTS, _AROUND = 4, 6.0
 _MISSED_MS = 50.0
 #: Files that `taxel view` shows, and the largest number of them that the page lists.
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
-#: Recordings of pictures whose sums are drawn, and stretches of a curve, each with its greatest value.
+#: Recordings of frames whose sums are drawn, and stretches of a curve, each with its greatest value.
 _MOST_SUMS, _STRETCHES = 4, 1000
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
@@ -187,9 +187,9 @@ def _drawn(figure: Figure | None) -> Markup | None:
 
 
 def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
-    """Draw the sum of each recording of pictures over time, so of each foot, and what was detected."""
-    pictures = [(outcome, recorded(outcome.example.source, hold=False)) for outcome in listened]
-    shown = [(outcome, of) for outcome, of in pictures if isinstance(of, Frames) and len(of)][:_MOST_SUMS]
+    """Draw the sum of each recording of frames over time, so of each foot, and what was detected."""
+    of_outcomes = [(outcome, recorded(outcome.example.source, hold=False)) for outcome in listened]
+    shown = [(outcome, of) for outcome, of in of_outcomes if isinstance(of, Frames) and len(of)][:_MOST_SUMS]
     if not shown:
         return None
     figure, axes = plt.subplots(
@@ -197,7 +197,7 @@ def _sums(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
     )
     for axis, (outcome, frames) in zip(axes[:, 0], shown, strict=True):
         of = series(Recording(Contents.of(source_from(frames, Origin(Path(outcome.name))))), outcome.example.tare)
-        assert of is not None  # pictures have values
+        assert of is not None  # frames have values
         total, unit = (of.total, of.unit) if of.force is None else (of.force, "N")
         begins = np.arange(0, len(total), 1 + len(total) // _STRETCHES)
         seconds, most = (of.t[begins] - outcome.begin_us) / 1e6, np.fmax.reduceat(total, begins)
@@ -269,14 +269,12 @@ def _potential(
         axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1, label="potential")
         threshold = readout.run_threshold * cell.neuron.theta_0
         axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
-        for k, t in enumerate(detected_ms[np.abs(detected_ms - at) < reach]):
-            axis.axvline(t - at, color=_DETECTED, linewidth=1.2, label="detected" * (k == 0))
         true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
-        for k, t in enumerate(true[np.abs(true - at) < reach]):
-            axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--", label="true" * (k == 0))
         felt = np.empty(0) if aligned is None else to_ms(aligned.felt(moment.recording))
-        for k, t in enumerate(felt[np.abs(felt - at) < reach]):
-            axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle=":", label="felt" * (k == 0))
+        lines = (("detected", detected_ms, _DETECTED, "-"), ("true", true, _TRUE, "--"), ("felt", felt, _TRUE, ":"))
+        for what, ms, color, style in lines:
+            for k, t in enumerate(ms[np.abs(ms - at) < reach]):
+                axis.axvline(t - at, color=color, linewidth=1.2, linestyle=style, label=what * (k == 0))
         axis.set_title(escaped(f"{moment.what}, {(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s"), fontsize=9)
         axis.set_xlabel("ms from then")
         axis.legend()

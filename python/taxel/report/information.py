@@ -134,7 +134,7 @@ def _by_period(ax: Axes, answer: Answer) -> None:
         label="events",
     )
     if answer.frames:
-        ax.plot(list(answer.frames), [e.bits for e in answer.frames.values()], "--", color="0.5", label="pictures")
+        ax.plot(list(answer.frames), [e.bits for e in answer.frames.values()], "--", color="0.5", label="frames")
     for name, points in answer.parameters.items():
         normal = [p.found.bits for p in points]
         ax.plot(

@@ -6,7 +6,7 @@ UDP: acts, a recording again, or the frames of any other sensor. `Board` is the 
 """
 
 from taxel.simulate import circuit
-from taxel.simulate.acts import Act, Contact, Motion, Pictures, Scene, Silence, Track
+from taxel.simulate.acts import Act, Contact, FrameSequence, Motion, Scene, Silence, Track
 from taxel.simulate.board import NOT_RETURNED, Board, Version2
 from taxel.simulate.emulator import Played, emulate, play, truth
 from taxel.simulate.emulator_report import EmulatorReport
@@ -24,9 +24,9 @@ __all__ = [
     "EmulatorReport",
     "Faults",
     "Flaws",
+    "FrameSequence",
     "Layer",
     "Motion",
-    "Pictures",
     "Pipe",
     "Played",
     "Pressed",

@@ -1,4 +1,4 @@
-"""What the emulated board is shown: silence, bodies, pictures."""
+"""What the emulated board is shown: silence, bodies, frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taxel._base.messages import escaped, plain, warn
 from taxel._core import ProblemError
 from taxel.array import Array
 
-__all__ = ["Act", "Contact", "Motion", "Pictures", "Scene", "Silence", "Track"]
+__all__ = ["Act", "Contact", "FrameSequence", "Motion", "Scene", "Silence", "Track"]
 
 
 class Contact(NamedTuple):
@@ -25,7 +25,7 @@ class Contact(NamedTuple):
     Attributes
     ----------
     kind : str
-        "first", "bounce", "hand", "rest" (stayed until it was lifted), "roll", "slide" or "pictures".
+        "first", "bounce", "hand", "rest" (stayed until it was lifted), "roll", "slide" or "frames".
     start_us : float, us
     stop_us : float, us
     speed_m_s : float, m/s, 0 or more
@@ -319,23 +319,23 @@ def _merged(before: Any, change: Any) -> Any:
     return {**before, **{name: _merged(before.get(name), value) for name, value in change.items()}}
 
 
-class Pictures:
-    """Lay pictures over the array, with straight lines in time between them.
+class FrameSequence:
+    """Lay frames over the array, with straight lines in time between them.
 
     Parameters
     ----------
     values : float32, shape (n, rows, columns), 0 to 1
         The share of the way from a taxel's rest to the ramp's end.
     period_us : float, us
-        From one picture to the next; a frame or more.
+        From one frame to the next; not less than the time of the board's frame.
 
     Raises
     ------
-    ProblemError : values that are no pictures, or outside 0 to 1
+    ProblemError : values that are no frames, or outside 0 to 1
 
     Examples
     --------
-    >>> Pictures([[[0.0]], [[0.5]]], period_us=192.0).period_us
+    >>> FrameSequence([[[0.0]], [[0.5]]], period_us=192.0).period_us
     192.0
     """
 
@@ -352,7 +352,7 @@ class Pictures:
 
     def __repr__(self) -> str:
         n, rows, columns = self.values.shape
-        return f"Pictures({n} of {rows} x {columns}, each {plain(self.period_us)} us)"
+        return f"FrameSequence({n} of {rows} x {columns}, each {plain(self.period_us)} us)"
 
 
-Act = Silence | Scene | Pictures
+Act = Silence | Scene | FrameSequence

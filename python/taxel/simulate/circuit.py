@@ -134,7 +134,7 @@ class _Lines(Value):
         ------
         ProblemError : a conductance that is none (names the taxel), or another shape
         """
-        checked = _pictures("conductance_us", conductance_us, "uS")
+        checked = _frames("conductance_us", conductance_us, "uS")
         shape: tuple[int, int] = checked.shape[-2:]
         return _core.circuit_volts(self._kind, self._json(), shape, checked.ravel()).reshape(checked.shape)
 
@@ -361,7 +361,7 @@ class Converter(Value):
         ------
         ProblemError : voltages that are not finite, or another shape
         """
-        checked = _pictures("volts", volts, "V")
+        checked = _frames("volts", volts, "V")
         if (np.abs(checked) > _MOST_V).any():
             raise refused("volts", f": must be from -{_MOST_V:g} to {_MOST_V:g} V")
         shape: tuple[int, int] = checked.shape[-2:]
@@ -521,7 +521,7 @@ class AdaptiveRamp(Value):
         ------
         ProblemError : voltages that are not finite, another shape, or so many that more than 2e8 readings could come
         """
-        checked = _pictures("volts", volts, "V")
+        checked = _frames("volts", volts, "V")
         frames = checked if checked.ndim == 3 else checked[None]
         shape: tuple[int, int] = frames.shape[1:]
         period = number("period_us", period_us, "us")
@@ -575,7 +575,7 @@ class Circuit(Value):
         return (self.converter or Converter()).ticks(volts)
 
 
-def _pictures(name: str, values: ArrayLike, unit: str) -> Values:
+def _frames(name: str, values: ArrayLike, unit: str) -> Values:
     checked = finite_numbers(name, values, unit)
     if checked.ndim not in (2, 3) or 0 in checked.shape[-2:]:
         raise refused(name, f" has shape {checked.shape}: must be (rows, columns) or (n, rows, columns)")

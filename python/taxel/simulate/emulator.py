@@ -15,7 +15,7 @@ from taxel._base.options import with_options
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence
+from taxel.simulate.acts import Act, Contact, FrameSequence, Scene, Silence
 from taxel.simulate.board import fitting, reading
 from taxel.simulate.circuit import Circuit
 from taxel.simulate.emulator_report import EmulatorReport
@@ -54,7 +54,7 @@ def truth(
 
     Parameters
     ----------
-    acts : sequence of Scene, Silence, Pictures
+    acts : sequence of Scene, Silence, FrameSequence
     preset : str, optional
         The board's registers, one of `taxel.wire.PRESETS`, with as many lines as the array has; left out, "5.2 kHz", or
         what a board of more than 64 lines resets to.
@@ -99,7 +99,7 @@ def play(
 
     Parameters
     ----------
-    acts : sequence of Scene, Silence, Pictures
+    acts : sequence of Scene, Silence, FrameSequence
         The first should be a Silence longer than the tare.
     seed : int, 0 or more
         Draws the taxels' spread and the noise.
@@ -162,7 +162,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     ----------
     to : str
         Address and port to send to, as "127.0.0.1:5208".
-    touch : iterable of Scene, Silence, Pictures; Replay; or Pipe
+    touch : iterable of Scene, Silence, FrameSequence; Replay; or Pipe
         The touch. An iterable of acts may be endless: each act is computed while those before it are played.
     seed : int, 0 or more
         Of the spread of the taxels and the noise.
@@ -286,8 +286,8 @@ def _warn(acts: Sequence[Act], narrow: list[tuple[int, str]]) -> None:
 
 
 def _part(n: int, act: Act, array: Array) -> Any:
-    if not isinstance(act, Silence | Scene | Pictures):
-        raise ProblemError(f"act {n} is {shown(act)}: must be a Scene, Silence or Pictures")
-    if isinstance(act, Pictures) and act.values.shape[1:] != array.shape:
-        raise ProblemError(f"act {n}: pictures of shape {act.values.shape[1:]}, the array has {array.shape}")
+    if not isinstance(act, Silence | Scene | FrameSequence):
+        raise ProblemError(f"act {n} is {shown(act)}: must be a Scene, Silence or FrameSequence")
+    if isinstance(act, FrameSequence) and act.values.shape[1:] != array.shape:
+        raise ProblemError(f"act {n}: frames of shape {act.values.shape[1:]}, the array has {array.shape}")
     return act._part()

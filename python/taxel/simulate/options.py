@@ -9,8 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from taxel._base.arguments import flag, instance, number, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, flag, instance, number, text, whole
 from taxel._base.options import option
 from taxel.array import Array
 from taxel.simulate.acts import Act, Contact

@@ -19,7 +19,7 @@ __all__ = ["Replay"]
 
 
 class Replay:
-    """Replay a recording to an emulated board: its events as they were, or its pictures by the board's rules.
+    """Replay a recording to an emulated board: its events as they were, or its frames by the board's rules.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Replay:
     Notes
     -----
     The board's frames quantise time: what came within one is sent at its end, of several events of a taxel the last.
-    Pictures that are not in ticks are scaled so that the largest value is the end of the ramp.
+    Frames that are not in ticks are scaled so that the largest value is the end of the ramp.
     """
 
     def __init__(self, source: Recording | Events | Frames, speed: float = 1.0) -> None:

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from taxel import _core
-from taxel._base.arguments import number, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, number, text, whole
 from taxel._base.documents import read_text, read_toml
 from taxel._base.limits import DESCRIPTION
 from taxel._core import SceneError

@@ -12,8 +12,7 @@ from uuid import uuid4
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import number, shown, text
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, number, shown, text
 from taxel._base.errors import refused
 from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5
@@ -47,8 +46,8 @@ def write_nwb(
         raise refused("begun", f" is {begun}: must be a date that this machine's clock knows") from None
     if "\0" in text("description", description):
         raise refused("description", f" is {shown(description)}: NWB takes no zero in a text")
-    told = (description, str(uuid4()), begun, times, values, kind, np.array([window_ms]) / 1000.0)
-    write_h5(path, _write, lambda pipe: pickle.dump(told, pipe), overwrite=overwrite)
+    sent = (description, str(uuid4()), begun, times, values, kind, np.array([window_ms]) / 1000.0)
+    write_h5(path, _write, lambda pipe: pickle.dump(sent, pipe), overwrite=overwrite)
     return Path(path)
 
 

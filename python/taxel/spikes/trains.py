@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.archive import read_arrays
-from taxel._base.arguments import bare, column, floats, instance, nth, number, several, shown, window
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import bare, checked_path, column, floats, instance, nth, number, several, shown, window
 from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
@@ -161,8 +160,8 @@ class SpikeTrains(Columns):
         if len(self) != len(other):
             raise ProblemError(f"{counted(len(self), 'train')} and {len(other)}: only equally many are merged")
         if self.signed != other.signed:
-            one, two = sorted((self.kind, other.kind))
-            raise ProblemError(f"{one} and {two} trains: only alike ones are merged; see split_by_sign")
+            first, second = sorted((self.kind, other.kind))
+            raise ProblemError(f"{first} and {second} trains: only alike ones are merged; see split_by_sign")
         times = np.concatenate([self.times, other.times])
         train = np.concatenate(
             [np.repeat(np.arange(len(self)), self.counts), np.repeat(np.arange(len(self)), other.counts)]
@@ -258,7 +257,10 @@ class SpikeTrains(Columns):
         SpikeTrains(2 trains, 1 spike, 2 to 5 ms)
         """
         start, stop = window("ms", start, stop)
-        return self._where((self.times >= start) & (self.times < stop), start, stop)
+        inside = (self.times >= start) & (self.times < stop)
+        offsets = np.concatenate([[0], np.cumsum(inside)])[self.offsets]
+        values = None if self.values is None else self.values[inside]
+        return self._of_own(self.times[inside], offsets, start, stop, values, self.kind)
 
     def select(self, trains: ArrayLike) -> SpikeTrains:
         """Return the named trains, in the order given.
@@ -365,11 +367,6 @@ class SpikeTrains(Columns):
         if self.kind == "graded":
             raise ProblemError(f"{reader} takes no graded trains: their spikes have values, which it does not read")
         return self
-
-    def _where(self, keep: NDArray[np.bool_], start: float, stop: float) -> SpikeTrains:
-        offsets = np.concatenate([[0], np.cumsum(keep)])[self.offsets]
-        values = None if self.values is None else self.values[keep]
-        return self._of_own(self.times[keep], offsets, start, stop, values, self.kind)
 
     def to_numpy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return times (ms) and train numbers of all spikes, by train."""

@@ -88,7 +88,7 @@ def _information(recordings: Sequence[Recording], request: Request, progress: Pr
 def _calibrate(recordings: Sequence[Recording], request: Request, _: Progress, save: _Save) -> Any:
     loads, options = request.pop("loads", []), _fields(CalibrateOptions, request)
     if not isinstance(loads, str):
-        loads = [_fields(KnownLoad, {"loads": one}, "loads") for one in loads]
+        loads = [_fields(KnownLoad, {"loads": load}, "loads") for load in loads]
     made = calibrate(_one(recordings), loads, options)
     save(made.calibration)
     return made
@@ -164,11 +164,11 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
 def _fields(options: Callable[..., Any], request: Request, key: str = "options") -> Any:
     """Return a dataclass of options from the values of a key of the request."""
     values = mapping(key, request.pop(key, {}))
-    _refuse_unknown(values, [one.name for one in fields(options)], f"field of {key}")  # type: ignore[arg-type]
+    _refuse_unknown(values, [field.name for field in fields(options)], f"field of {key}")  # type: ignore[arg-type]
     try:
         return options(**values)
     except TypeError:
-        missing = [one.name for one in fields(options) if one.name not in values]  # type: ignore[arg-type]
+        missing = [field.name for field in fields(options) if field.name not in values]  # type: ignore[arg-type]
         raise ProblemError(f"{key}: {missing[0]} is missing") from None
 
 

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import finite, flag, instance, mapping, several
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, finite, flag, instance, mapping, several
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected
@@ -190,7 +189,7 @@ def calibrate(
     if not known and (asked.each or asked.exponent is not None):
         raise helped(ProblemError("each and exponent belong to a fit"), "loads", "give")
     with collected() as warnings:
-        made = _calibrated(recording, [instance("loads", one, KnownLoad) for one in known], asked)
+        made = _calibrated(recording, [instance("loads", load, KnownLoad) for load in known], asked)
     return replace(Calibrated(made), warnings=tuple(warnings))
 
 
@@ -208,7 +207,7 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     elif options.table is not None:
         points = _points(Path(options.table), recording.array)
         calibration = Calibration.table(recording.array, *points, of=frames.unit, **how)
-    measured = [_load(frames, one) for one in known]
+    measured = [_load(frames, load) for load in known]
     if measured:
         calibration = Calibration.fit(measured, start=calibration, exponent=options.exponent, each=options.each, **how)
     assert calibration is not None  # one of the three is given

@@ -25,7 +25,7 @@ from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.open_options import sensors_of
-from taxel.recording.rest import FORCE_UNITS, of_pictures
+from taxel.recording.rest import FORCE_UNITS, of_frames
 from taxel.spikes import SpikeTrains
 from taxel.tasks.labels import GivenLabels, references
 from taxel.tasks.rest import GivenTare, TakenRest, check_tare, rest
@@ -136,11 +136,11 @@ class Detecting:
     @property
     def outcomes(self) -> list[Outcome]:
         """The outcome of each recording, as a report takes them."""
-        return [one.outcome for one in self.each]
+        return [detected.outcome for detected in self.each]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the detections and scores as plain values for JSON."""
-        result: dict[str, Any] = {"recordings": [one.to_dict() for one in self.each], "warnings": list(self.warnings)}
+        result: dict[str, Any] = {"recordings": [each.to_dict() for each in self.each], "warnings": list(self.warnings)}
         if self.score is None:
             return result
         return result | {"window_ms": self.window_ms, "score": self.score.to_dict()}
@@ -203,14 +203,16 @@ def detect(
     with collected() as warnings:
         events = [None] * len(opened) if truth is None else references(truth, opened, "truth")
         if truth is not None and not any(events):
-            raise refused("truth", f" is {truth}: names no event in {', '.join(one.title for one in opened)}")
+            raise refused(
+                "truth", f" is {truth}: names no event in {', '.join(recording.title for recording in opened)}"
+            )
         each = []
-        for one, labelled in zip(opened, events, strict=True):
-            update(f"detecting in {one.title}", 0, 0)
-            each.append(_detected(readout, one, labelled, asked))
-    outcomes = [one.outcome for one in each]
-    truths = [one.example.labels for one in outcomes if one.score is not None]
-    together = score_together([one.found for one in outcomes], truths, asked.window_ms) if truths else None
+        for recording, labelled in zip(opened, events, strict=True):
+            update(f"detecting in {recording.title}", 0, 0)
+            each.append(_detected(readout, recording, labelled, asked))
+    outcomes = [detected.outcome for detected in each]
+    truths = [outcome.example.labels for outcome in outcomes if outcome.score is not None]
+    together = score_together([outcome.found for outcome in outcomes], truths, asked.window_ms) if truths else None
     unknown = sorted({label for of in events if of is not None for label in of} - set(readout.labels))
     return Detecting(tuple(each), together, tuple(unknown), asked.window_ms, tuple(warnings))
 
@@ -259,7 +261,7 @@ def _naming(recording: str) -> Iterator[None]:
 
 def _hint(outcome: Outcome, readout: Readout | PlainRule) -> str | None:
     source, tare = recorded(outcome.example.source, hold=False), outcome.example.tare
-    if isinstance(source, Frames) and (quiet := of_pictures(source)).falls:
+    if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         return f"rest: {quiet.text(getattr(outcome.example.source, 'path', None))}"
     # The local load tracks the rest.
     floors = [readout.noise_floor] if isinstance(readout, PlainRule) and readout.quantity != "local_load" else []

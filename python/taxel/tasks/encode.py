@@ -17,6 +17,8 @@ from taxel.recording import Recording
 from taxel.spikes import SpikeTrains
 from taxel.tasks.rest import GivenTare, check_tare, given_or_by_unit
 
+__all__ = ["EncodeOptions", "Encoded", "encode", "encoder_of"]
+
 
 def encoder_of(name: str | None, values: Mapping[str, Any]) -> Encoder:
     """Return the encoder of a name with its parameters, of which `name` may be one."""
@@ -34,7 +36,7 @@ class EncodeOptions:
     parameters : mapping of str to value
     tare : Tare, path or float (s), optional
         The rest of the taxels: a tare, its file, or the seconds at rest at the beginning of the recording. Default: 0
-        of pictures in a unit of force or pressure, else none.
+        of frames in a unit of force or pressure, else none.
 
     Raises
     ------
@@ -128,6 +130,6 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
         encoder = encoder if rest is None else encoder.with_tare(rest)
         events = recording.has_events
         count = len(recording.events) if events else len(recording.frames())
-        show(f"encoding {counted(count, 'event' if events else 'picture')}", 0, 0)
+        show(f"encoding {counted(count, 'event' if events else 'frame')}", 0, 0)
         trains = encoder.encode(recording)
     return Encoded(trains, encoder, tuple(warnings))

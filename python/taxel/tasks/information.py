@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from taxel._base.arguments import instance, mapping, several, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, instance, mapping, several, text, whole
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted
 from taxel._base.progress import Progress, reporting

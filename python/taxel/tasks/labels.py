@@ -39,20 +39,22 @@ def references(
         return _mapped(source, recordings, argument)
     if source == "notes":
         noted = [_notes(recording) for recording in recordings]
-        outside = next((one for one in recordings if any(note.t is not None for note in one.notes)), None)
+        outside = next((each for each in recordings if any(note.t is not None for note in each.notes)), None)
         if outside is not None and not any(noted):
             notes = counted(sum(note.t is not None for note in outside.notes), "note")
             raise ProblemError(f"{outside.title}: has {notes}, none within {_span(outside)}")
         return noted
     table = Labels(source)
     # The sources of one file are one recording.
-    count = len({(one.path, trial_of(one.name, one.label)) for one in recordings})
+    count = len({(recording.path, _trial(recording)) for recording in recordings})
     if count > 1 and any(not row.recording for row in table.rows):
         raise refused(
             argument, f" is {source}: names no recording, and there are {count}; must have the column recording"
         )
     _check_sources(table, argument, recordings)
-    named = {one.title: table.named(one.path, trial_of(one.name, one.label), one.label) for one in recordings}
+    named = {
+        recording.title: table.named(recording.path, _trial(recording), recording.label) for recording in recordings
+    }
     unnamed = [title for title, name in named.items() if name is None]
     known = set(named.values())
     others = [name for name in table.recordings if name not in known]
@@ -71,25 +73,32 @@ def _mapped(
     if len(each) != len(recordings):
         have = counted(len(recordings), "recording")
         raise refused(argument, f" is {counted(len(each), 'mapping')}: must be one for each of {have}")
-    named = [mapping(argument, one) for one in each]
-    return [{label: column(f"{argument}[{label!r}]", t, np.int64, "us") for label, t in one.items()} for one in named]
+    named = [mapping(argument, times) for times in each]
+    return [{label: column(f"{argument}[{label!r}]", t, np.int64, "us") for label, t in of.items()} for of in named]
 
 
 def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
     """Warn of events of recordings that are not there: their names may be misspelt."""
-    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
-    known = {
-        name for path, trial, label in trials for name in (table.named(path), table.named(path, trial, label), trial)
-    }
+    known = {name for _, names in _named(table, recordings) for name in names}
     strange = [name for name in table.recordings if name not in known]
     if strange:
         count = counted(sum(row.recording in strange for row in table.rows), "event")
-        there = _few(dict.fromkeys(one.title for one in recordings))
+        there = _few(dict.fromkeys(recording.title for recording in recordings))
         warn(
             f"{table.path}: left out {count} of {_few(strange)}, which {'is' if len(strange) == 1 else 'are'} "
             f"not here; there {'is' if len(recordings) == 1 else 'are'} {there}",
             stacklevel=3,
         )
+
+
+def _trial(recording: Recording) -> str:
+    return trial_of(recording.name, recording.label)
+
+
+def _named(table: Labels, recordings: Sequence[Recording]) -> list[tuple[str, set[str | None]]]:
+    """Return the source of each recording, and the names by which the table may name it."""
+    trials = [(recording.path, _trial(recording), recording.label) for recording in recordings]
+    return [(label, {table.named(path), table.named(path, trial, label), trial}) for path, trial, label in trials]
 
 
 def _few(names: Iterable[str]) -> str:
@@ -106,8 +115,8 @@ def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> lis
     if not isinstance(source, str | os.PathLike):
         return list(recordings)
     trials: dict[Path, set[str]] = {}
-    for one in recordings:
-        trials.setdefault(one.path, set()).add(trial_of(one.name, one.label))
+    for recording in recordings:
+        trials.setdefault(recording.path, set()).add(_trial(recording))
     named: dict[Path, set[str]] = {}
     for path, every in trials.items():
         table = beside(path) if source == "notes" else Path(source)
@@ -117,13 +126,12 @@ def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> lis
                 f"{path}: left out {len(every) - len(named[path])} of its {len(every)} trials, which have no labels",
                 stacklevel=2,
             )
-    return [one for one in recordings if not named[one.path] or trial_of(one.name, one.label) in named[one.path]]
+    return [each for each in recordings if not named[each.path] or _trial(each) in named[each.path]]
 
 
 def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]) -> None:
     """Refuse labels of a source that their recording does not have."""
-    trials = [(one.path, trial_of(one.name, one.label), one.label) for one in recordings]
-    names = [(label, (table.named(path), table.named(path, trial, label), trial)) for path, trial, label in trials]
+    names = _named(table, recordings)
     for row in table.rows:
         labels = {label for label, every in names if row.recording in every}
         if row.source and labels and row.source not in labels:
@@ -162,7 +170,7 @@ def _within(table: Labels, recording: Recording, argument: str) -> dict[str, NDA
 
 def _span(recording: Recording) -> str:
     first, last = span_us(recording)
-    more = "" if recording.timed else ", whose pictures are numbered (rate_hz gives them times)"
+    more = "" if recording.timed else ", whose frames are numbered (rate_hz gives them times)"
     begin = beginning_us(np.array([first]))
     if begin:
         more = f"; it begins {begun(begin)}, {begin} us since 1970, and labels must count from 1970 too"
@@ -172,7 +180,7 @@ def _span(recording: Recording) -> str:
 def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where: str) -> dict[str, NDArray[np.int64]]:
     """Return the events that lie within a recording; say which are left out as they do not, and which may not.
 
-    A picture holds until the next one would come. A board sends nothing where nothing changes, so that the end of its
+    A frame holds until the next one would come. A board sends nothing where nothing changes, so that the end of its
     recording may lie behind its last event: an event soon after that counts, and is named.
     """
     total = sum(map(len, events.values()))
@@ -180,17 +188,17 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         return dict(events)
     first, last = span_us(recording)
     if recording.has_events:
-        held, stretch = recording.events, recording._contents.one.timing.stretch
+        held, stretch = recording.events, recording._contents.main.timing.stretch
         seen = [last, *(t for t, _ in held.markers), *(() if stretch is None else stretch()[1:])]
         # A heartbeat or a frame without events is a sign of life, too.
         end = max(seen if recording.clock is None else [*seen, *recording.clock.board_us[-1:].tolist()])
         near_us, late_us = _NEAR_US, _LATE_US
     else:
-        pictures = recording.frames().t
-        end = last + (int(np.median(np.diff(pictures))) if len(pictures) > 1 else 0)
+        frames = recording.frames().t
+        end = last + (int(np.median(np.diff(frames))) if len(frames) > 1 else 0)
         near_us, late_us = 0, 0
     inside = {label: t[(t >= first) & (t <= end + late_us)] for label, t in events.items()}
-    behind = sorted((int(one), label) for label, t in inside.items() for one in t[t > end + near_us])
+    behind = sorted((int(time), label) for label, t in inside.items() for time in t[t > end + near_us])
     if behind:
         (at, label), begin = behind[0], beginning_us(np.array([first]))
         warn(

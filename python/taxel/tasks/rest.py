@@ -10,8 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance, number
-from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import checked_path, instance, number
 from taxel._base.errors import helped, refused
 from taxel._base.messages import warn
 from taxel._base.number_text import float_of
@@ -34,8 +33,8 @@ GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
-#: Of fewer pictures the noise is not known.
-_LEAST_PICTURES = 20
+#: Of fewer frames the noise is not known.
+_LEAST_FRAMES = 20
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
@@ -81,7 +80,7 @@ class TakenRest:
 def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     """Return the rest of a recording's taxels as each detection takes it: the page's, the shell's and Python's.
 
-    It is the given one; else 0 of pictures in a unit of force or pressure; else that of the first quiet stretch of half
+    It is the given one; else 0 of frames in a unit of force or pressure; else that of the first quiet stretch of half
     a second in which nothing lies on the array, for a board's events on their held values. Labels and notes never
     count.
 
@@ -120,8 +119,8 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
         return TakenRest("unit", zero, begin_us)
     found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
     if found is not None and found.preload_at:
-        span, said = free_of_preload(recording, found)
-        warn(said, stacklevel=2)
+        span, warning = free_of_preload(recording, found)
+        warn(warning, stacklevel=2)
     else:
         span = None if found is None else found.quiet_us
     if span is None:
@@ -182,7 +181,7 @@ def seconds_of(tare: GivenTare) -> float | None:
 
 
 def given_or_by_unit(tare: GivenTare | None, recording: Recording) -> Tare | None:
-    """Return the tare that is given; without one 0 of pictures in a unit of force or pressure, else none."""
+    """Return the tare that is given; without one 0 of frames in a unit of force or pressure, else none."""
     if tare is not None:
         return given_tare(tare, recording)
     source = recorded(recording, hold=False)
@@ -203,8 +202,8 @@ def _warn_of_touch(tare: GivenTare, recording: Recording, source: Events | Frame
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
     """Return the tare of the time before a recording's first label, or before the board's start marker.
 
-    Of pictures in a unit of force or pressure it is 0, as everywhere (`taxel.recording.rest`).
-    A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 pictures come before
+    Of frames in a unit of force or pressure it is 0, as everywhere (`taxel.recording.rest`).
+    A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 frames come before
     it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
     away, the tare is of the longest time without it, before the label if there is one; a warning says so.
     """
@@ -212,12 +211,12 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
         return zero
     first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
-    tare, said = without_preload(recording, first)
-    if said:
-        warn(said, stacklevel=2)
+    tare, warning = without_preload(recording, first)
+    if warning:
+        warn(warning, stacklevel=2)
     if tare is not None:
         return tare
-    if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_PICTURES <= len(source):
+    if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_FRAMES <= len(source):
         quiet = of_quiet(source).quiet_us
         if quiet is not None:
             return Tare.take(source, start_us=quiet[0], stop_us=quiet[1], note=str(recording.path))

@@ -16,7 +16,7 @@ from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Judged, Outcome, PlainScore, Recipe, choose, judge, recipes, score
+from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
 from taxel.detect.advice import advised, fallen
 from taxel.detect.examples import checked
 from taxel.detect.floors import measured_floor
@@ -98,7 +98,7 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     opened = labelled_trials(labels, recordings)
     labelled = references(labels, opened)
     if not any(labelled):
-        titles = ", ".join(one.title for one in opened)
+        titles = ", ".join(recording.title for recording in opened)
         if labels == "notes":
             raise helped(ProblemError(f"notes: names no event in {titles}"), "labels", "give")
         raise refused("labels", f" is {_named(labels)}: names no event in {titles}")
@@ -133,16 +133,18 @@ def _examples(
     """
     rests = [part.tare for part in plan.encoder._each() if hasattr(part, "tare")]
 
-    def rest(events: Mapping[str, NDArray[np.int64]], one: Recording) -> Tare | None:
+    def rest(events: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
         if tare is not None:
-            return given_tare(tare, one)
-        if any(own is not None for own in rests):
+            return given_tare(tare, recording)
+        if any(stated is not None for stated in rests):
             return None
-        return tare_before(events, one) if rests else tare_if_any(events, one)
+        return tare_before(events, recording) if rests else tare_if_any(events, recording)
 
     return [
-        Example(one, events, rest(events, one), one.title.removesuffix(one.label), one.title)
-        for one, events in zip(opened, labelled, strict=True)
+        Example(
+            recording, events, rest(events, recording), recording.title.removesuffix(recording.label), recording.title
+        )
+        for recording, events in zip(opened, labelled, strict=True)
     ]
 
 
@@ -152,11 +154,11 @@ def _taken(examples: Sequence[Example]) -> tuple[tuple[int, int, int], ...]:
     Of those whose rest is 0 by their unit nothing.
     """
     spans = []
-    for one in examples:
-        source = recorded(one.source)
-        if one.tare is not None and one.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
+    for example in examples:
+        source = recorded(example.source)
+        if example.tare is not None and example.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
             first = int(source.t[0])
-            spans.append((one.tare.start_us - first, one.tare.stop_us - first, int(source.t[-1]) - first))
+            spans.append((example.tare.start_us - first, example.tare.stop_us - first, int(source.t[-1]) - first))
     return tuple(spans)
 
 
@@ -181,10 +183,10 @@ class _Work:
         except ProblemError as error:
             if fall and error.hint == "unfelt":
                 raise ProblemError(f"{error.args[0]}: {fall}") from None
-            names = sorted({label for one in self.examples for label in one.labels})
+            names = sorted({label for example in self.examples for label in example.labels})
             off = off_by(checked(self.examples), names, floor_of(plan.encoder))
-            said = (f"{label}: {one}" for label, one in off.items())
-            raise ProblemError("; ".join([str(error), *said])) from None
+            others = (f"{label}: {distance}" for label, distance in off.items())
+            raise ProblemError("; ".join([str(error), *others])) from None
 
     def _training(self, plan: Recipe) -> Training:
         folds, search, window_ms = self.options.folds, self.options.search, self.options.window_ms
@@ -207,33 +209,33 @@ class _Work:
         made = trained(self.examples, plan, self.update)
         outcomes = self._outcomes(made)
         a_point_s = None if search else (perf_counter() - begun) * INNER * (count + 1)
-        own = _own(outcomes, window_ms)
+        trained_on = _own(outcomes, window_ms)
         if scored is None:
-            scored = replace(own, plain=self._plain_score(plan, [outcome.example.labels for outcome in outcomes]))
-        advice = advised(made, self.examples, scored.together, own.together, a_point_s, scored.plain)
+            truths, sound = [outcome.example.labels for outcome in outcomes], checked(self.examples)
+            what = sound, list(truths[0]), [clock_of(example) for example in self.examples], floor_of(plan.encoder)
+            scored = replace(trained_on, plain=plain_score(*what, [], truths, window_ms, self.update))
+        advice = advised(made, self.examples, scored.together, trained_on.together, a_point_s, scored.plain)
         taken = _taken(self.examples) if self.options.tare is None else ()
         return Training(self.options, self.opened, made, scored, why, advice, outcomes, taken)
-
-    def _plain_score(self, plan: Recipe, truths: Sequence[Mapping[str, Any]]) -> PlainScore:
-        """Return how plain rules do on the recordings that they were tuned on."""
-        clocks = [clock_of(one) for one in self.examples]
-        rest = checked(self.examples), list(truths[0]), clocks, floor_of(plan.encoder)
-        return plain_score(*rest, [], truths, self.options.window_ms, self.update)
 
     def _outcomes(self, made: Trained) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""
         readout, outcomes = made.readout, []
-        for one, example in zip(self.opened, self.examples, strict=True):
-            self.update(f"scoring on {one.title}", 0, 0)
+        for recording, example in zip(self.opened, self.examples, strict=True):
+            self.update(f"scoring on {recording.title}", 0, 0)
             truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
-            detections, outside = run_counting(readout, one, tare=example.tare)
-            own = score(detections, truth, self.options.window_ms)
-            outcomes.append(Outcome(one.title, Example(one, truth, example.tare), detections, own, outside))
+            detections, outside = run_counting(readout, recording, tare=example.tare)
+            scored = score(detections, truth, self.options.window_ms)
+            outcomes.append(
+                Outcome(recording.title, Example(recording, truth, example.tare), detections, scored, outside)
+            )
         return outcomes
 
 
 def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
     """Return the scores of a readout on its own training data."""
-    truths = [one.example.labels for one in outcomes]
-    together = score_together([one.found for one in outcomes], truths, window_ms)
-    return Judged(tuple(one.score for one in outcomes if one.score is not None), together, "its own training data")
+    truths = [outcome.example.labels for outcome in outcomes]
+    together = score_together([outcome.found for outcome in outcomes], truths, window_ms)
+    return Judged(
+        tuple(outcome.score for outcome in outcomes if outcome.score is not None), together, "its own training data"
+    )

@@ -142,8 +142,8 @@ class Training:
         """On which data the readout was scored, for the report, which shows its detections in the training data."""
         if self.why:
             return "on its own training data"
-        one = self.scored.together
-        counts = f"{one.found} of {one.events} found, {one.missed} missed, {one.false} false"
+        score = self.scored.together
+        counts = f"{score.found} of {score.events} found, {score.missed} missed, {score.false} false"
         return f"on its own training data; held out ({self.scored.how}): {counts}"
 
     def __repr__(self) -> str:
@@ -158,19 +158,20 @@ class Training:
             "held_out": self.held_out,
             "window_ms": self.options.window_ms,
             "recordings": [
-                {"recording": one.title, "score": each.to_dict()}
-                for one, each in zip(self.recordings, self.scored.scores, strict=True)
+                {"recording": recording.title, "score": score.to_dict()}
+                for recording, score in zip(self.recordings, self.scored.scores, strict=True)
             ],
             "score": self.scored.together.to_dict(),
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
-            "helps": {label: one.helps for label, one in self.advice.items()},
-            "options": sorted({one.option for one in self.advice.values() if one.option is not None}),
+            "helps": {label: advice.helps for label, advice in self.advice.items()},
+            "options": sorted({advice.option for advice in self.advice.values() if advice.option is not None}),
             "warnings": list(self.warnings),
         }
         if self.made.alignments:
-            result["alignment"] = {label: one.to_dict() for label, one in self.made.alignments.items()}
-            for one in result["alignment"].values():
-                one["unpaired"] = [{"recording": self.recordings[k].title, "t_us": t} for k, t in one["unpaired"]]
+            result["alignment"] = {label: aligned.to_dict() for label, aligned in self.made.alignments.items()}
+            for aligned in result["alignment"].values():
+                unpaired = aligned["unpaired"]
+                aligned["unpaired"] = [{"recording": self.recordings[k].title, "t_us": t} for k, t in unpaired]
         if self.options.search:
             result["neurons"] = {label: dict(self.made.recipe.neurons[label]) for label in self.readout.labels}
         return result
@@ -192,8 +193,8 @@ class Training:
             point = self.made.recipe.neurons[label]
             chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))
             lines.append(f"{label}, chosen: {chosen}")
-        for one, each in zip(self.recordings, self.scored.scores, strict=True):
-            lines += ["", f"{one.title}:", *repr(each).split("\n")]
+        for recording, each in zip(self.recordings, self.scored.scores, strict=True):
+            lines += ["", f"{recording.title}:", *repr(each).split("\n")]
         if len(self.scored.scores) > 1:
             lines += ["", "all recordings:", *repr(self.scored.together).split("\n")]
         return lines
@@ -210,10 +211,10 @@ class Training:
         if not self.tares_us:
             return
         lengths = [to_ms(end - begin) for begin, end, _ in self.tares_us]
-        said = f"of each of {len(lengths)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long"
+        text = f"of each of {len(lengths)} recordings its own, {min(lengths):g} to {max(lengths):g} ms long"
         if len(lengths) == 1:
-            said = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
-        yield f"tare: {said}; another can be given"
+            text = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
+        yield f"tare: {text}; another can be given"
 
     def _scores(self, label: str) -> Iterator[str]:
         """Yield how the neuron and the plain rule of a label scored on the same labels."""
@@ -236,11 +237,11 @@ class Training:
             rule, neuron = (of[label].rank[0] for of in (plain.together, self.scored.together))
             yield f"{label}: the plain rule is better: {rule} missed and false, the neuron {neuron}; {_RULE_FILE}"
         for label in plain.sooner(self.scored.together):
-            mine, its = (of[label] for of in (plain.together, self.scored.together))
+            ours, theirs = (of[label] for of in (plain.together, self.scored.together))
             yield (
-                f"{label}: the plain rule is as good and knows sooner: {mine.rank[0]} missed and false, as the neuron, "
-                f"known {mine.delay.median:+.3g} ms after the label (median), the neuron {its.delay.median:+.3g} ms; "
-                f"{_RULE_FILE}"
+                f"{label}: the plain rule is as good and knows sooner: {ours.rank[0]} missed and false, as the neuron, "
+                f"known {ours.delay.median:+.3g} ms after the label (median), the neuron {theirs.delay.median:+.3g} "
+                f"ms; {_RULE_FILE}"
             )
         if plain.lacks:
             yield plain.lacks
@@ -248,34 +249,34 @@ class Training:
     def _advised(self) -> Iterator[str]:
         """Yield what may help each label of which many are missed or false."""
         for label, (helps, because, _) in self.advice.items():
-            one = self.scored.together[label]
-            many = f"{one.missed / one.events:.0%} missed, {one.false / one.events:.0%} false"
+            score = self.scored.together[label]
+            many = f"{score.missed / score.events:.0%} missed, {score.false / score.events:.0%} false"
             yield f"{label}: {many}; what may help is {helps}: {because}"
 
     def unreliable(self) -> Iterator[str]:
         """Yield the labels that the readout detects no better than one that detects nothing, and what may help."""
         for label in self.readout.labels:
-            one = self.scored.together[label]
-            if one.rank[0] < one.events:
+            score = self.scored.together[label]
+            if score.rank[0] < score.events:
                 continue
             which = "labels that it was trained on" if self.why else "held-out labels"
             yield (
-                f"{label}: do not rely on this readout: {one.found} of {one.events} {which} found, {one.false} false, "
-                "no better than to detect nothing"
+                f"{label}: do not rely on this readout: {score.found} of {score.events} {which} found, {score.false} "
+                "false, no better than to detect nothing"
                 + (f"; what may help is {self.advice[label].helps}" if label in self.advice else "")
             )
 
     def _aligned(self) -> Iterator[str]:
         """Yield by how much labels were moved to what the sensor felt, and which found no pair."""
-        for label, one in self.made.alignments.items():
-            if one.train is None:
+        for label, alignment in self.made.alignments.items():
+            if alignment.train is None:
                 yield f"{label}: no input follows the labels, so they were learnt as given"
                 continue
             yield (
-                f"{label}: labels moved to what the sensor felt: median {one.median_ms:+.3g} ms, largest "
-                f"{one.largest_ms:+.3g} ms"
+                f"{label}: labels moved to what the sensor felt: median {alignment.median_ms:+.3g} ms, largest "
+                f"{alignment.largest_ms:+.3g} ms"
             )
-            unpaired = ((self.recordings[k], t) for k, t in one.to_dict()["unpaired"])
+            unpaired = ((self.recordings[k], t) for k, t in alignment.to_dict()["unpaired"])
             places = [
                 f"{of.title} at {(t - beginning_us(recorded(of, hold=False).t)) / 1e6:.3f} s" for of, t in unpaired
             ]
@@ -286,6 +287,6 @@ class Training:
                 yield f"{label}: nothing was felt within 50 ms of {of}, not learnt: {named}"
 
 
-def _line(label: str, by: str, one: Score) -> str:
-    known = "never known" if not one.found else f"known {one.delay.median:+.3g} ms after the label (median)"
-    return f"{label}, {by}: {one.found} of {one.events} found, {one.missed} missed, {one.false} false, {known}"
+def _line(label: str, by: str, score: Score) -> str:
+    known = "never known" if not score.found else f"known {score.delay.median:+.3g} ms after the label (median)"
+    return f"{label}, {by}: {score.found} of {score.events} found, {score.missed} missed, {score.false} false, {known}"

@@ -123,15 +123,13 @@ class Registers:
         >>> Registers.preset("2 kHz").noise_floor
         10
         """
-        registers = cls.__new__(cls)
-        registers._set(_core.registers_preset(text("preset", name)), {}, array)
-        return registers
+        return cls._of(_core.registers_preset(text("preset", name)), Array._of(array))
 
     @classmethod
-    def _of(cls, held: dict[str, Any], array: Array) -> Registers:
-        """Return the set that a file or a board holds, in the registers' own units."""
+    def _of(cls, held: dict[str, Any], array: Array, **fields: float) -> Registers:
+        """Return the set that a file or a board holds, in the registers' own units, with some fields changed."""
         registers = cls.__new__(cls)
-        registers._set(held, {}, array)
+        registers._set(held, fields, array)
         return registers
 
     @classmethod
@@ -194,9 +192,7 @@ class Registers:
         >>> Registers().replace(noise_floor=7).noise_floor
         7
         """
-        registers = Registers.__new__(Registers)
-        registers._set(self._held, fields, self.array)
-        return registers
+        return self._of(self._held, self.array, **fields)
 
     def with_preset(self, name: str) -> Registers:
         """Return a set with the values of one of `PRESETS`, with as many lines as the array has.
@@ -266,8 +262,8 @@ class Registers:
         >>> now.commands_to(now.replace(noise_floor=7))
         [Command(register=5, value=4130560)]
         """
-        other = instance("target", target, Registers)
-        commands = _core.registers_commands(self._json(), other._json(), self.array._parts())
+        wanted = instance("target", target, Registers)
+        commands = _core.registers_commands(self._json(), wanted._json(), self.array._parts())
         return [Command(register, value) for register, value in commands]
 
     def _json(self) -> str:

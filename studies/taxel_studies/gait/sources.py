@@ -353,7 +353,7 @@ def cuts(folder: Path, name: str, placed: str) -> tuple[Cut, ...]:
 
 
 def _boxed(trial: Trial) -> Trial:
-    """Return a footfall without the plate around it: the pictures of all people together have to fit in memory."""
+    """Return a footfall without the plate around it: the frames of all people together have to fit in memory."""
     loaded = np.any(trial.frames.values, axis=0)
     rows, columns = np.flatnonzero(np.any(loaded, axis=1)), np.flatnonzero(np.any(loaded, axis=0))
     y, x = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

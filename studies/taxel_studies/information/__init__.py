@@ -1,6 +1,6 @@
 """Chapter 5's question on other people's recordings: how many bits do touches hold, and which simpler measurements do.
 
-Footfalls on a plate, grasps of a robot's hand, postures on a mat; each compared with chance, with pictures and with
+Footfalls on a plate, grasps of a robot's hand, postures on a mat; each compared with chance, with frames and with
 trivial measurements.
 """
 
@@ -20,7 +20,7 @@ WHERE = "beside thesis 5.5 and 5.6"
 PROTOCOL = (
     "Bits of a classifier's answers, corrected by Panzeri and Treves; linear discriminants, smoothing and ridge "
     "chosen inside the folds. Plate: who walked (trials left out) and how fast (people left out); footfalls are "
-    "aligned on contact, the middle of the heel in one column, a picture of rest before each (the plate records "
+    "aligned on contact, the middle of the heel in one column, a frame of rest before each (the plate records "
     "none); change events with a floor of 25 counts, phases drawn. Hand: which object, by slice, as the source "
     "gives no times; changes since the first slice, as that one names the object by itself. Mat: which of four "
     "postures, whole poses with all their variants left out; it has no time, so only the number of taxels counts. "

@@ -37,7 +37,7 @@ _ROWS, _COLUMNS = 44, 49
 
 
 def footfalls(folder: Path, ask: str, most: int = 0) -> list[LabelledTrial]:
-    """Return the footfalls as labelled trials: heels in the middle, a picture of rest before each.
+    """Return the footfalls as labelled trials: heels in the middle, a frame of rest before each.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def footfalls(folder: Path, ask: str, most: int = 0) -> list[LabelledTrial]:
 
 
 def _placed(trial: Trial) -> tuple[Frames, int]:
-    """Return the pictures with the first touched place in the middle column, after one of rest."""
+    """Return the frames with the first touched place in the middle column, after one of rest."""
     frames = trial.frames
     contact = int(trial.truth["contact"][0])
     first = frames.values[int(np.searchsorted(frames.t, contact))]
@@ -160,7 +160,7 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
             )
         beside = [f"chance {one['zero']['level']:.2f} (labels shuffled, 95 % below)"]
         beside += [f"{c['name']} {c['bits']:.2f}" for c in one["controls"] if "bits" in c]
-        beside += [f"pictures at {f['period_ms']:g} ms {f['bits']:.2f}" for f in one["frames"][:1]]
+        beside += [f"frames at {f['period_ms']:g} ms {f['bits']:.2f}" for f in one["frames"][:1]]
         beside += [f"{name} {c['bits']:.2f}" for name, c in one["classifiers"].items()]
         beside += [f"{q['taxels']} taxels {q['kind']} {q['bits']:.2f}" for q in one["taxels"]]
         low, high = one["full"]["interval"]

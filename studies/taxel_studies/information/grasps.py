@@ -28,7 +28,7 @@ _RIDGE = 1.0
 
 
 def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
-    """Estimate the bits of pictures and events since the first slice, of that slice, and of the number of slices."""
+    """Estimate the bits of frames and events since the first slice, of that slice, and of the number of slices."""
     values, labels, order = [], [], []
     count: dict[str, int] = {}
     for trial in icub.trials(folder):
@@ -58,7 +58,7 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
 
     result["first"] = bits(held[:, 0] - held[:, 0].mean(0))
     result["length"] = bits((lengths - lengths.mean())[:, None])
-    result["pictures"] = [bits(since[:, :s]) for s in params["slices"]]
+    result["frames"] = [bits(since[:, :s]) for s in params["slices"]]
     result["events"] = [bits(events[:, :s]) for s in params["slices"]]
     flat = events[:, : params["slices"][-1]].reshape(len(y), -1)
     gram, features = flat @ flat.T, max(1, int(flat.any(0).sum()))
@@ -124,7 +124,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "probably the sensor's drift from session to session: so only changes since that slice are asked",
         )
     ]
-    before = {"pictures": {1: 1.85, 4: 2.91, 7: 3.12}, "events": {1: 1.16, 4: 2.36, 7: 2.62}}
+    before = {"frames": {1: 1.85, 4: 2.91, 7: 3.12}, "events": {1: 1.16, 4: 2.36, 7: 2.62}}
     for name, values in before.items():
         ours = {s: b["bits"] for s, b in zip(one["slices"], one[name], strict=True) if s in values}
         judged.append(
@@ -145,7 +145,7 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
     one = summary["object"]
     rows = [
         [f"to slice {s}", f"{a['bits']:.2f}", f"{b['bits']:.2f}", f"[{b['interval'][0]:.2f} {b['interval'][1]:.2f}]"]
-        for s, a, b in zip(one["slices"], one["pictures"], one["events"], strict=True)
+        for s, a, b in zip(one["slices"], one["frames"], one["events"], strict=True)
     ]
     note = (
         f"{one['trials']} grasps of {one['classes']} objects; chance {one['zero']['level']:.2f} (labels shuffled, 95 % "
@@ -153,7 +153,7 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
         f"late grasps by early ones {100 * one['drift']['since']['late by early']:.0f} % right, random halves "
         f"{100 * one['drift']['since']['halves']:.0f} %"
     )
-    return [Table("hand, object: bits", ["changes since the first slice", "pictures", "events", "95 %"], rows, note)]
+    return [Table("hand, object: bits", ["changes since the first slice", "frames", "events", "95 %"], rows, note)]
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
@@ -162,7 +162,7 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
     one = summary["object"]
     figure = Figure(figsize=(6, 4), layout="constrained")
     ax = figure.subplots()
-    for name in ("pictures", "events"):
+    for name in ("frames", "events"):
         ax.plot(one["slices"], [b["bits"] for b in one[name]], marker="o", label=f"{name} since the first slice")
     ax.axhline(one["first"]["bits"], color="C3", ls=":", label="the first slice itself (a warning)")
     ax.axhline(one["length"]["bits"], color="0.6", ls=":", label="number of slices alone")

@@ -126,6 +126,8 @@ def made() -> None:
     plate = taxel.Array(3, 4, (7.62, 5.08), exists, "plate")
     for ending in ("npz", "h5", "mcap", "csv"):
         taxel.convert(Frames(values, [0, 1000, 2500, 4000], unit="kPa", array=plate), HERE / f"frames.{ending}")
+    taxel.convert(HERE / "frames.mcap", HERE / "again.npz")
+    taxel.convert(HERE / "again.npz", HERE / "again.mcap", compression="zstd")
     insole = taxel.Array(1, 3, name="insole", places=taxel.Places([0.0, 10.0, 4.0], [0.0, 2.0, 8.0], None, "mm"))
     taxel.convert(Frames(values[:, :1, :3], [0, 1000, 2500, 4000], unit="N", array=insole), HERE / "insole.npz")
     millimetre = Frames(values[:, :2, :2], [0, 1, 2, 3], unit="N", array=taxel.Array(2, 2, 1.0, name="fine"))

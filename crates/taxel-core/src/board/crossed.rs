@@ -18,7 +18,7 @@ pub struct Crossed {
     registers: Registers,
     scan: Scan,
     /// Voltage of each reading, in the middle of its tick, because the counter shows whole ticks.
-    own_v: Vec<f64>,
+    alone_v: Vec<f64>,
     conductance_us: Vec<f64>,
     ticks: Vec<f64>,
 }
@@ -33,7 +33,7 @@ impl Crossed {
         chain.check()?;
         let scan = Scan::new(timed(&chain.converter, registers, array), array.rows.into(), array.columns.into())?;
         Ok(Self {
-            own_v: voltages(registers),
+            alone_v: voltages(registers),
             conductance_us: vec![0.0; array.len()],
             ticks: vec![0.0; array.len()],
             registers: *registers,
@@ -77,13 +77,13 @@ impl Crossed {
             *self = Self::new(self.chain.clone(), registers, &self.array)?;
         }
         let lines = &self.chain.readout;
-        let own = |value: u16| self.own_v[usize::from(value).min(self.own_v.len() - 1)];
+        let alone_v = |value: u16| self.alone_v[usize::from(value).min(self.alone_v.len() - 1)];
         for (conductance, &value) in self.conductance_us.iter_mut().zip(&*ticks) {
-            *conductance = lines.conductance_us_alone(own(value)).max(0.0);
+            *conductance = lines.conductance_us_alone(alone_v(value)).max(0.0);
         }
         let mut volts = lines.volts(self.array.rows.into(), self.array.columns.into(), &self.conductance_us, stop)?;
         for ((volts, &conductance), &value) in volts.iter_mut().zip(&self.conductance_us).zip(&*ticks) {
-            *volts += own(value) - lines.volts_alone(conductance);
+            *volts += alone_v(value) - lines.volts_alone(conductance);
         }
         self.scan.frame(&volts, &mut self.ticks);
         let ramp = registers.ramp;
@@ -163,8 +163,8 @@ mod tests {
         let got = read(resting, &registers, &[frame]);
         // 64 taxels of 24 uS on 50 ohm: they lose 7 % of their reading above rest.
         let volts = |tick: f64| Ramp::rc(150.0).volts(tick);
-        let (own, conductance) = (volts(140.5), 64.0 * 1e-6 * (volts(140.5) / 1.3 - 1.0) / 47e-3);
-        let wanted = Ramp::rc(150.0).ticks(1.3 + (own - 1.3) / (1.0 + 50.0 * conductance));
+        let (alone_v, conductance) = (volts(140.5), 64.0 * 1e-6 * (volts(140.5) / 1.3 - 1.0) / 47e-3);
+        let wanted = Ramp::rc(150.0).ticks(1.3 + (alone_v - 1.3) / (1.0 + 50.0 * conductance));
         assert!((0..64).all(|y| got[64 * y + 5] == wanted as u16), "{} {wanted}", got[5]);
         assert!(got.iter().enumerate().all(|(k, &t)| k % 64 == 5 || t == 49));
     }

@@ -64,8 +64,8 @@ impl Adaptive {
 
     /// The converter with a ramp of another length.
     fn with(&self, ramp: u32) -> Converter {
-        let Converter { step_us, line_us, steps, ramp: own, .. } = self.converter;
-        let longer_us = (f64::from(ramp) - f64::from(own)) / TICKS_A_US;
+        let Converter { step_us, line_us, steps, ramp: before, .. } = self.converter;
+        let longer_us = (f64::from(ramp) - f64::from(before)) / TICKS_A_US;
         Converter {
             ramp,
             step_us: step_us + longer_us,

@@ -94,8 +94,8 @@ impl Converter {
             fast *= 1.0 + 2e-6;
         }
         let carried = if over_v == 0.0 { 0.0 } else { over_v * slow / (slow - fast) };
-        let own = if fast == 0.0 { 0.0 } else { input_v - line_v - carried };
-        Input { line_v, carried, slow, own, fast }
+        let settling = if fast == 0.0 { 0.0 } else { input_v - line_v - carried };
+        Input { line_v, carried, slow, settling, fast }
     }
 
     /// Where the ramp, `from` ticks ahead of its beginning, passes an input, ticks; the ramp's time at most.
@@ -199,7 +199,7 @@ struct Input {
     line_v: f64,
     carried: f64,
     slow: f64,
-    own: f64,
+    settling: f64,
     fast: f64,
 }
 
@@ -209,8 +209,8 @@ impl Input {
         if self.carried != 0.0 {
             volts += self.carried * decay(since_us, self.slow);
         }
-        if self.own != 0.0 {
-            volts += self.own * decay(since_us, self.fast);
+        if self.settling != 0.0 {
+            volts += self.settling * decay(since_us, self.fast);
         }
         volts
     }
@@ -218,7 +218,7 @@ impl Input {
     /// The largest slope that it can have from then on, V/us.
     fn steepest(&self, since_us: f64) -> f64 {
         let of = |size: f64, tau: f64| if size == 0.0 { 0.0 } else { size.abs() * decay(since_us, tau) / tau };
-        of(self.carried, self.slow) + of(self.own, self.fast)
+        of(self.carried, self.slow) + of(self.settling, self.fast)
     }
 }
 

@@ -90,15 +90,15 @@ wide! {
         let n = matrix.rows;
         for j in 0..n {
             let factors = &mut lower[j * n..(j + 1) * n];
-            let own = j / LANES;
-            for (factor, row) in factors[..j].iter_mut().zip(&matrix.lanes[own * n..]) {
+            let pivot_block = j / LANES;
+            for (factor, row) in factors[..j].iter_mut().zip(&matrix.lanes[pivot_block * n..]) {
                 *factor = row[j % LANES];
             }
             // The first block that is processed holds the pivot.
-            for block in own..matrix.lanes.len() / n {
+            for block in pivot_block..matrix.lanes.len() / n {
                 let (above, rest) = matrix.lanes[block * n..].split_at_mut(j);
                 rest[0] = less(rest[0], &factors[..j], above);
-                if block == own {
+                if block == pivot_block {
                     let pivot = rest[0][j % LANES];
                     if !(pivot > 0.0 && pivot.is_finite()) {
                         return false;

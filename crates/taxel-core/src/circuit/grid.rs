@@ -144,15 +144,15 @@ impl Grid {
         for (k, share) in share.iter_mut().enumerate() {
             let more = weights[k] - held(k);
             let drives = more * of_sources[k] - drive_v / (1.0 + r * by_column[k]);
-            let (mut own, mut of_rest) = (0.0, 0.0);
+            let (mut of_line, mut of_rest) = (0.0, 0.0);
             if more != 0.0 {
                 for i in 0..n {
-                    own += turned.at(k, i) * solved.at(i, k);
+                    of_line += turned.at(k, i) * solved.at(i, k);
                     of_rest += turned.at(k, i) * solved.at(i, m);
                 }
             }
             let again = self.sense_ohm * more;
-            *share = (drives - again * of_rest) / (1.0 + again * own);
+            *share = (drives - again * of_rest) / (1.0 + again * of_line);
         }
         let mut currents = vec![0.0; n * m];
         for (i, row) in currents.chunks_exact_mut(m.max(1)).enumerate() {

@@ -52,15 +52,15 @@ impl Limit {
             [least, _] if current < least - 1e-12 * least.abs() => End::Least,
             _ => End::Within,
         };
-        let within = |(row, own): (usize, &[f64])| own.iter().all(|&current| past(row, current) == End::Within);
+        let within = |(row, of_row): (usize, &[f64])| of_row.iter().all(|&current| past(row, current) == End::Within);
         if currents.chunks_exact(columns.max(1)).enumerate().all(within) {
             return Ok(());
         }
         let response = response()?;
         for column in 0..columns {
-            let own: Vec<f64> = (0..rows).map(|row| currents[row * columns + column]).collect();
+            let given: Vec<f64> = (0..rows).map(|row| currents[row * columns + column]).collect();
             let mut ends = vec![End::Within; rows];
-            let mut now = own.clone();
+            let mut now = given.clone();
             let mut moved = vec![0.0; rows];
             for round in 0.. {
                 let wanted = |row: usize| match (ends[row], moved[row]) {
@@ -85,17 +85,18 @@ impl Limit {
                 let mut matrix = Matrix::zeros(at.len(), at.len());
                 let mut right = Matrix::zeros(at.len(), 1);
                 for (i, &row) in at.iter().enumerate() {
-                    for (j, &other) in at.iter().enumerate() {
-                        *matrix.at_mut(i, j) = response[row * rows + other];
+                    for (j, &limited) in at.iter().enumerate() {
+                        *matrix.at_mut(i, j) = response[row * rows + limited];
                     }
                     *matrix.at_mut(i, i) += between.recip();
-                    *right.at_mut(i, 0) = limits[row][usize::from(ends[row] == End::Most)] - own[row];
+                    *right.at_mut(i, 0) = limits[row][usize::from(ends[row] == End::Most)] - given[row];
                 }
                 matrix.factor()?.solve(&mut right);
                 moved.fill(0.0);
                 at.iter().enumerate().for_each(|(i, &row)| moved[row] = right.at(i, 0));
                 for (row, now) in now.iter_mut().enumerate() {
-                    *now = own[row] + at.iter().map(|&other| response[row * rows + other] * moved[other]).sum::<f64>();
+                    *now = given[row]
+                        + at.iter().map(|&limited| response[row * rows + limited] * moved[limited]).sum::<f64>();
                 }
             }
             (0..rows).for_each(|row| currents[row * columns + column] = now[row]);

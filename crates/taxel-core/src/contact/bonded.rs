@@ -107,8 +107,8 @@ impl Bonded {
         for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
             stop.check()?;
             for (y, x) in (-far..=far).flat_map(|y| (-far..=far).map(move |x| (y * n - row, x * n - column))) {
-                let own = (y..y + n).flat_map(|y| (x..x + n).map(move |x| (y, x)));
-                spread.push((own.map(|(y, x)| on(&through, y, x)).sum::<f64>() / (n * n) as f64) as f32);
+                let cells = (y..y + n).flat_map(|y| (x..x + n).map(move |x| (y, x)));
+                spread.push((cells.map(|(y, x)| on(&through, y, x)).sum::<f64>() / (n * n) as f64) as f32);
             }
         }
         Ok(Self {
@@ -322,11 +322,11 @@ impl Bonded {
         self.waves.convolve(&self.base, stop)?;
         for (y, row) in out.chunks_exact_mut(columns).enumerate() {
             for (x, stress) in row.iter_mut().enumerate() {
-                let own = (0..n).flat_map(|down| {
+                let cells = (0..n).flat_map(|down| {
                     let from = (y * n + down + self.margin) * self.wide + x * n + self.margin;
                     &self.waves.plane[from..from + n]
                 });
-                *stress = (own.sum::<f64>() / (n * n) as f64) as f32;
+                *stress = (cells.sum::<f64>() / (n * n) as f64) as f32;
             }
         }
         Ok(())

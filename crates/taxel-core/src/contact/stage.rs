@@ -1,6 +1,6 @@
 //! Acts played one after the other into the frames that the board reads.
 
-use super::{Act, Contact, Motion, Narrow, Pictures, Taxels};
+use super::{Act, Contact, FrameSequence, Motion, Narrow, Taxels};
 use crate::spikes::us;
 use crate::{Array, Error, Result, Stop};
 
@@ -70,12 +70,12 @@ impl Prepared {
                 };
                 Ok(Self { part: Part { frames, what }, contacts, narrow })
             }
-            Act::Pictures(pictures) => {
+            Act::Frames(sequence) => {
                 let size = array.len();
-                let count = pictures.count(size, frame_us)?;
-                let frames = (count as f64 * pictures.period_us / frame_us).ceil() as usize;
-                let contacts = pictures.touched(count, size);
-                let part = Part { frames, what: What::Pictures { pictures: pictures.clone(), count } };
+                let count = sequence.count(size, frame_us)?;
+                let frames = (count as f64 * sequence.period_us / frame_us).ceil() as usize;
+                let contacts = sequence.touched(count, size);
+                let part = Part { frames, what: What::Frames { sequence: sequence.clone(), count } };
                 Ok(Self { part, contacts, narrow: None })
             }
         }
@@ -93,7 +93,7 @@ enum What {
     Silence,
     Columns(Box<Columns>),
     Layer(Box<Layer>),
-    Pictures { pictures: Pictures, count: usize },
+    Frames { sequence: FrameSequence, count: usize },
 }
 
 impl Stage {
@@ -154,7 +154,7 @@ impl Stage {
         self.parts.iter().map(|p| p.frames).sum()
     }
 
-    /// Force at each frame's start, N; 0 under pictures, whose force is not known.
+    /// Force at each frame's start, N; 0 under a sequence of frames, whose force is not known.
     ///
     /// # Errors
     ///
@@ -169,7 +169,7 @@ impl Stage {
             match &part.what {
                 What::Columns(ball) => force.extend((0..part.frames).map(|k| ball.track.force_n[GROUPS * k])),
                 What::Layer(layer) => force.extend((0..part.frames).map(|k| layer.motion.force_n(GROUPS * k))),
-                What::Silence | What::Pictures { .. } => force.resize(force.len() + part.frames, 0.0),
+                What::Silence | What::Frames { .. } => force.resize(force.len() + part.frames, 0.0),
             }
         }
         Ok(force)
@@ -195,12 +195,12 @@ impl Stage {
             What::Silence => {}
             What::Columns(ball) => ball.show(self.frame, self.frame_us, &self.taxels, &mut self.clean),
             What::Layer(layer) => layer.show(self.frame, self.frame_us, &self.taxels, &mut self.clean, stop)?,
-            What::Pictures { pictures, count } => {
-                let place = self.frame as f64 * self.frame_us / pictures.period_us;
+            What::Frames { sequence, count } => {
+                let place = self.frame as f64 * self.frame_us / sequence.period_us;
                 let (k, share) = ((place as usize).min(*count - 1), place.fract() as f32);
                 let size = self.clean.len();
-                let now = &pictures.values[k * size..(k + 1) * size];
-                let next = if k + 1 < *count { &pictures.values[(k + 1) * size..(k + 2) * size] } else { now };
+                let now = &sequence.values[k * size..(k + 1) * size];
+                let next = if k + 1 < *count { &sequence.values[(k + 1) * size..(k + 2) * size] } else { now };
                 let top = f32::from(self.taxels.ramp());
                 for (index, clean) in self.clean.iter_mut().enumerate() {
                     let rest = self.taxels.ticks(index, 0.0);
@@ -284,10 +284,10 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_reached_in_straight_lines() {
+    fn the_frames_of_a_sequence_are_reached_in_straight_lines() {
         let mut values = vec![0.0; 3 * 4096];
         values[4096 + 70] = 1.0;
-        let act = Act::Pictures(Pictures { values, period_us: 1920.0 });
+        let act = Act::Frames(FrameSequence { values, period_us: 1920.0 });
         let mut stage = stage(&quiet(), &[act]);
         let mut seen = vec![];
         let mut ticks = vec![0; 4096];
@@ -309,9 +309,12 @@ mod tests {
         let text =
             |acts: &[Act]| Stage::new(&array, taxels.clone(), FRAME_US, acts, Stop::never()).unwrap_err().to_string();
         assert!(text(&[Act::Silence { ms: 1.0 }, Act::Silence { ms: f64::NAN }]).contains("act 1"));
-        assert!(text(&[Act::Pictures(Pictures { values: vec![0.0; 5], period_us: 2e3 })]).contains("whole pictures"));
-        assert!(text(&[Act::Pictures(Pictures { values: vec![2.0; 4096], period_us: 2e3 })]).contains("share"));
-        assert!(text(&[Act::Pictures(Pictures { values: vec![0.0; 4096], period_us: 1.0 })]).contains("a frame"));
+        assert!(text(&[Act::Frames(FrameSequence { values: vec![0.0; 5], period_us: 2e3 })]).contains("whole frames"));
+        assert!(text(&[Act::Frames(FrameSequence { values: vec![2.0; 4096], period_us: 2e3 })]).contains("share"));
+        assert!(
+            text(&[Act::Frames(FrameSequence { values: vec![0.0; 4096], period_us: 1.0 })])
+                .contains("a frame of the board")
+        );
         let few = Taxels::new(&quiet(), 7, 150, 0).unwrap();
         assert!(Stage::new(&array, few, FRAME_US, &[], Stop::never()).is_err());
     }

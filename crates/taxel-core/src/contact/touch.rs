@@ -18,8 +18,8 @@ pub enum TouchKind {
     Roll,
     /// Set down, sliding, and lifted.
     Slide,
-    /// Pictures laid over the array.
-    Pictures,
+    /// Frames laid over the array.
+    Frames,
 }
 
 /// One touch: from the moment when force leaves zero to that when it returns there.

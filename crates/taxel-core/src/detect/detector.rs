@@ -4,7 +4,7 @@ use crate::detect::{Detection, FrameTime, PlainRule, Readout, ReadoutStream, fil
 use crate::encode::{Tare, Zeroing};
 use crate::{Array, EventsView, FramesView, Result, Stop, problem};
 
-/// The time that a recording is continued after its last event or picture, us: longer than any input can keep a
+/// The time that a recording is continued after its last event or frame, us: longer than any input can keep a
 /// potential rising (the slowest neuron of Table 6.2 peaks after 190 ms).
 pub(super) const SILENCE_US: i64 = 1_000_000;
 
@@ -122,9 +122,9 @@ impl Detector {
         Ok((found, stream.outside()))
     }
 
-    /// The detections of a whole recording of pictures, continued for a second with the last picture, and how many of
+    /// The detections of a whole recording of frames, continued for a second with the last frame, and how many of
     /// them have an input outside its range in training. Frames last `frame_us`, or by default the median distance
-    /// between pictures. Nothing is detected before `begin` us.
+    /// between frames. Nothing is detected before `begin` us.
     ///
     /// # Errors
     ///
@@ -150,14 +150,14 @@ impl Detector {
     }
 }
 
-/// The median distance between pictures, us.
+/// The median distance between frames, us.
 pub(super) fn usual_distance(t: &[i64]) -> Result<f64> {
     let mut apart: Vec<u64> = t.windows(2).map(|w| w[1].abs_diff(w[0])).collect();
     if t.is_empty() {
-        return Err(problem!("there are no pictures: nothing can be detected"));
+        return Err(problem!("there are no frames: nothing can be detected"));
     }
     if apart.is_empty() {
-        return Err(problem!("one picture does not say how long a frame lasts: give frame_us"));
+        return Err(problem!("one frame does not say how long it lasts: give frame_us"));
     }
     let middle = apart.len() / 2;
     Ok(*apart.select_nth_unstable(middle).1 as f64)

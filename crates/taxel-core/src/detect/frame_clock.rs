@@ -1,4 +1,4 @@
-//! The frames of a board, or of pictures: the number of a time's frame, and the end of that frame, which is the earliest
+//! The frames of a board, or of an input of frames: the number of a time's frame, and the end of that frame, which is the earliest
 //! time at which the host can know of an event in it.
 
 use crate::wire::STAMP_US;
@@ -38,15 +38,15 @@ impl From<f64> for FrameTime {
 pub struct FrameClock {
     period_ns: i128,
     stamp_ns: i128,
-    /// The last picture, if the input is pictures; without pictures the board's frames start at time 0.
-    picture: Option<Picture>,
+    /// The last frame of an input of frames; with events the board's frames start at time 0.
+    last: Option<InputFrame>,
 }
 
-/// A picture, which is a frame of its own.
+/// A frame of the input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Picture {
+struct InputFrame {
     start_ns: i128,
-    /// The number of pictures before it.
+    /// The number of frames before it.
     number: i64,
 }
 
@@ -62,13 +62,13 @@ impl FrameClock {
             return Err(problem!("frame_us"; " is {period_us}: must be from 1 to 3600000000 us"));
         }
         let stamp_ns = i128::from(stamp_us) * 1000;
-        Ok(Self { period_ns: (period_us * 1000.0).round() as i128, stamp_ns, picture: None })
+        Ok(Self { period_ns: (period_us * 1000.0).round() as i128, stamp_ns, last: None })
     }
 
-    /// Aligns frames with the picture at `t` us, which is the start of its frame, from now on.
-    pub fn picture(&mut self, t: i64) {
-        let number = self.picture.map_or(0, |last| last.number + 1);
-        self.picture = Some(Picture { start_ns: i128::from(t) * 1000, number });
+    /// Starts a frame of the input at `t` us, with which frames are aligned from now on.
+    pub fn start_frame(&mut self, t: i64) {
+        let number = self.last.map_or(0, |last| last.number + 1);
+        self.last = Some(InputFrame { start_ns: i128::from(t) * 1000, number });
     }
 
     /// The end of the frame to which the time `t` ms belongs, us, rounded up.
@@ -76,8 +76,8 @@ impl FrameClock {
     pub fn end_of(&self, t: f64) -> i64 {
         // In whole ns, because rounding must not move a time that equals a stamp into the frame before.
         let t = (t * 1e6).round() as i128;
-        let end = match self.picture {
-            Some(Picture { start_ns, .. }) => {
+        let end = match self.last {
+            Some(InputFrame { start_ns, .. }) => {
                 start_ns + ((t - start_ns).div_euclid(self.period_ns) + 1) * self.period_ns
             }
             None => (self.board_frame(t) + 1) * self.period_ns,
@@ -85,16 +85,16 @@ impl FrameClock {
         whole_us(end)
     }
 
-    /// The number of the frame to which the time `t` us belongs; with pictures, of the last picture.
+    /// The number of the frame to which the time `t` us belongs; of an input of frames, that of its last frame.
     #[must_use]
     pub fn number_of(&self, t: i64) -> i64 {
-        self.picture.map_or_else(|| self.board_frame(i128::from(t) * 1000) as i64, |last| last.number)
+        self.last.map_or_else(|| self.board_frame(i128::from(t) * 1000) as i64, |last| last.number)
     }
 
     /// The number of the first frame that may still change if no input before `t` us follows.
     #[must_use]
     pub fn open_at(&self, t: i64) -> i64 {
-        match self.picture {
+        match self.last {
             Some(last) => last.number + i64::from(i128::from(t) * 1000 > last.start_ns),
             None => self.number_of(t),
         }
@@ -103,13 +103,13 @@ impl FrameClock {
     /// Whether the frame that holds at `at` us is complete if no input before `t` us follows.
     #[must_use]
     pub fn is_over(&self, at: i64, t: i64) -> bool {
-        if self.picture.is_some() { at < t } else { self.number_of(at) < self.number_of(t) }
+        if self.last.is_some() { at < t } else { self.number_of(at) < self.number_of(t) }
     }
 
-    /// The end of the frame with this number, us, rounded up; of pictures, that of the last one.
+    /// The end of the frame with this number, us, rounded up; of an input of frames, that of the last one.
     #[must_use]
     pub fn end_of_number(&self, number: i64) -> i64 {
-        whole_us(match self.picture {
+        whole_us(match self.last {
             Some(last) => last.start_ns + self.period_ns,
             None => (i128::from(number) + 1) * self.period_ns,
         })
@@ -173,9 +173,9 @@ mod tests {
     }
 
     #[test]
-    fn pictures_start_their_frames() {
+    fn frames_are_aligned_with_those_of_the_input() {
         let mut clock = FrameClock::new(2000.0).unwrap();
-        clock.picture(7_000);
+        clock.start_frame(7_000);
         assert_eq!([7.0, 8.999, 9.0, 13.5].map(|t| clock.end_of(t)), [9_000, 9_000, 11_000, 15_000]);
     }
 

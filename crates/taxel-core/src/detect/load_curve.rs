@@ -7,7 +7,7 @@ use crate::encode::{Quantity, Tare};
 use crate::spikes::us;
 use crate::{EventsView, FramesView, Result, Spike, Stop, problem};
 
-/// The number of events, or of pictures, between two checks of [`Stop`].
+/// The number of events, or of frames, between two checks of [`Stop`].
 const PIECE: usize = 16_384;
 
 /// How long after the silence that follows a recording a quantity is computed, us: so far its frames or age may reach.
@@ -17,8 +17,8 @@ const LONGEST_REACH_US: i64 = 10_000_000;
 pub struct LoadCurve {
     quantity: Quantity,
     changes: Vec<Spike>,
-    /// The time of each picture, us; none for events.
-    pictures: Vec<i64>,
+    /// The time of each frame, us; none for events.
+    frame_times: Vec<i64>,
     clock: FrameClock,
     period_us: f64,
     /// The time of the last input, us.
@@ -51,10 +51,10 @@ impl LoadCurve {
         }
         let last = events.t.iter().copied().chain(events.markers.iter().map(|marker| marker.t)).max().unwrap_or(0);
         stream.advance(last + SILENCE_US + LONGEST_REACH_US, &mut changes);
-        Ok(Self { quantity, changes, pictures: vec![], clock, period_us: frames.period_us, last })
+        Ok(Self { quantity, changes, frame_times: vec![], clock, period_us: frames.period_us, last })
     }
 
-    /// The quantity in a recording of pictures, which last `frame_us`, or by default their median distance.
+    /// The quantity in a recording of frames, which last `frame_us`, or by default their median distance.
     ///
     /// # Errors
     ///
@@ -72,14 +72,14 @@ impl LoadCurve {
         let clock = FrameClock::new(period_us)?;
         frames.check()?;
         let mut changes = vec![];
-        for (k, (t, picture)) in frames.iter().enumerate() {
+        for (k, (t, frame)) in frames.iter().enumerate() {
             if k % PIECE == 0 {
                 stop.check()?;
             }
-            stream.push_frame(t, picture, &mut changes)?;
+            stream.push_frame(t, frame, &mut changes)?;
         }
         let last = frames.t.last().copied().unwrap_or(0);
-        Ok(Self { quantity, changes, pictures: frames.t.to_vec(), clock, period_us, last })
+        Ok(Self { quantity, changes, frame_times: frames.t.to_vec(), clock, period_us, last })
     }
 
     /// The quantity's changes: their times, ms, and what it is after each.
@@ -119,9 +119,9 @@ impl LoadCurve {
         let reach = (limits.frames as f64 * self.period_us).ceil() as i64 + limits.age_us.unwrap_or(0);
         let end = self.last + SILENCE_US + reach;
         let mut changes = changes.take_while(|change| us(change.t) < end as f64).peekable();
-        for &t in &self.pictures {
+        for &t in &self.frame_times {
             rule.advance(t, &clock, &mut out);
-            clock.picture(t);
+            clock.start_frame(t);
             while let Some(&change) = changes.next_if(|change| us(change.t).round() as i64 == t) {
                 rule.change(change, false, &clock, &mut out);
             }

@@ -24,7 +24,7 @@ const LATEST_AGE_MS: f64 = 60_000.0;
 /// The sensor is loaded from the first of `frames` frames in a row in which the quantity is at least the threshold, to
 /// the first of `frames` frames in a row in which it is below `release` times the threshold. A detection's `t` is the
 /// time of the first of these frames; it is `known` when the last one is complete. A frame's quantity is that after its
-/// last event; its time is the stamp with which the quantity passed the threshold. Each picture is a frame.
+/// last event; its time is the stamp with which the quantity passed the threshold. A frame of the input is one frame.
 ///
 /// With an age it decides once a touch. A touch begins with the first frame in which the area is 2 taxels or more, and
 /// ends with the first in which it is less. The label is that of the quantity in the frame that holds at the age after

@@ -28,7 +28,7 @@ const PIECE: usize = 65_536;
 /// Beyond this distance from 0, a time in ms no longer resolves whole us in a neuron.
 const FARTHEST_US: i64 = 1 << 52;
 
-/// A readout or a plain rule as a stream: events or pictures in, detections out.
+/// A readout or a plain rule as a stream: events or frames in, detections out.
 ///
 /// A crossing becomes a detection once no earlier input can follow: after a later event, or after the caller advanced
 /// time by [`ReadoutStream::advance`]. Detections depend neither on how the input is divided nor on when time is
@@ -115,18 +115,18 @@ impl ReadoutStream {
         self.settle(events.t[events.len() - 1].max(latest), out)
     }
 
-    /// Processes the next picture, row by row, at `t` us and appends the detections that are final now to `out`.
+    /// Processes the next frame, row by row, at `t` us and appends the detections that are final now to `out`.
     ///
     /// # Errors
     ///
-    /// `Problem` if the picture has another size or is not in order of time, if the encoder reads events only, or if
+    /// `Problem` if the frame has another size or is not in order of time, if the encoder reads events only, or if
     /// the time is beyond 2^52 us.
     pub fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
         self.zero_before(t);
         self.encoder.push_frame(t, values, &mut self.emitted)?;
         self.settle(t, out)?;
-        self.clock.picture(t);
+        self.clock.start_frame(t);
         Ok(())
     }
 
@@ -210,21 +210,21 @@ impl ReadoutStream {
         Ok(out)
     }
 
-    /// Processes a recording of pictures, checking `stop` between them.
+    /// Processes a recording of frames, checking `stop` between them.
     ///
     /// # Errors
     ///
-    /// Those of [`push_frame`](Self::push_frame); `Problem` if the pictures are of another array; `Interrupted` if
+    /// Those of [`push_frame`](Self::push_frame); `Problem` if the frames are of another array; `Interrupted` if
     /// asked to stop.
     pub fn push_frames(&mut self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<Vec<Detection>> {
         self.check_shape(frames.array)?;
         frames.check()?;
         let mut out = Vec::new();
-        for (k, (t, picture)) in frames.iter().enumerate() {
+        for (k, (t, frame)) in frames.iter().enumerate() {
             if k % 256 == 0 {
                 stop.check()?;
             }
-            self.push_frame(t, picture, &mut out)?;
+            self.push_frame(t, frame, &mut out)?;
         }
         Ok(out)
     }

@@ -1,4 +1,4 @@
-//! Channels in blocks, over which the compiler vectorises loops, and the prefetch of the next picture.
+//! Channels in blocks, over which the compiler vectorises loops, and the prefetch of the next frame.
 
 use crate::vectors::fetch;
 
@@ -18,22 +18,22 @@ pub(super) fn in_blocks(values: &[f32]) -> &[Block] {
     values.as_chunks().0
 }
 
-/// The next picture, if it follows in memory. It is prefetched a block at a time while the current picture is read or
+/// The next frame, if it follows in memory. It is prefetched a block at a time while the current frame is read or
 /// encoded: a processor has few line fill buffers, and would drop more prefetches at once.
-pub(super) struct NextPicture {
+pub(super) struct NextFrame {
     at: *const Block,
     left: usize,
 }
 
-impl NextPicture {
-    /// No prefetch, because the address of the next picture is not known.
+impl NextFrame {
+    /// No prefetch, because the address of the next frame is not known.
     pub(super) fn unknown() -> Self {
         Self { at: std::ptr::null(), left: 0 }
     }
 
-    /// The picture that follows this one in memory.
-    pub(super) fn after(picture: &[f32]) -> Self {
-        Self { at: picture.as_ptr_range().end.cast(), left: blocks(picture.len()) }
+    /// The frame that follows this one in memory.
+    pub(super) fn after(frame: &[f32]) -> Self {
+        Self { at: frame.as_ptr_range().end.cast(), left: blocks(frame.len()) }
     }
 
     /// Prefetches a block; returns whether there was one left.

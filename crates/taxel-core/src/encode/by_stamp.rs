@@ -1,9 +1,9 @@
-//! A stream of what is computed from the loaded taxels once per stamp, after its last event, or once per picture.
+//! A stream of what is computed from the loaded taxels once per stamp, after its last event, or once per frame.
 //!
 //! Reading: what changes without events, as a rest that is tracked does, is computed between stamps too: 10 ms after the
 //! last one, and from 80 ms on after each further eighth of the time since it.
 
-use super::blocks::{BLOCK, Block, NextPicture, blocks, in_blocks};
+use super::blocks::{BLOCK, Block, NextFrame, blocks, in_blocks};
 use super::channels::Channels;
 use super::loaded::Loaded;
 use super::sampled::Source;
@@ -31,11 +31,11 @@ pub(super) trait Measure: Clone + Send + 'static {
     /// Sets the rest of a place from now on.
     fn set_rest(&mut self, _place: usize, _rest: f64) {}
 
-    /// Ends the stamp, or the picture, at `t` us: emits its spikes, given the loaded taxels and all current values.
+    /// Ends the stamp, or the frame, at `t` us: emits its spikes, given the loaded taxels and all current values.
     fn emit(&mut self, t: i64, loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>);
 }
 
-/// Passes a measure the loaded taxels and the current values of all places, by stamp or by picture.
+/// Passes a measure the loaded taxels and the current values of all places, by stamp or by frame.
 #[derive(Clone)]
 pub(super) struct ByStamp<M> {
     measure: M,
@@ -152,7 +152,7 @@ impl<M: Measure> Stream for ByStamp<M> {
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
         self.source.frame(t)?;
-        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut NextPicture::after(values))?;
+        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut NextFrame::after(values))?;
         for (block, values) in in_blocks(self.held.values()).iter().enumerate() {
             if std::mem::take(&mut self.changed[block]) {
                 self.loaded.take_block(block, values);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextPicture};
+use super::blocks::{BLOCK, Block, NextFrame};
 use super::encoding::Encoding;
 use super::sampled::{Rule, Sampled};
 use super::stream::Stream;
@@ -89,7 +89,7 @@ impl Rule for Changes {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
         let floor = self.floor;
         for (block, (new, last)) in held.iter().zip(&mut self.last).enumerate().filter(|(b, _)| changed[*b]) {
             next.fetch();

@@ -1,7 +1,7 @@
-//! The existing taxels of an array as an encoder's channels, which of them a picture changes, and which events are
+//! The existing taxels of an array as an encoder's channels, which of them a frame changes, and which events are
 //! valid.
 
-use super::blocks::{BLOCK, Block, NextPicture};
+use super::blocks::{BLOCK, Block, NextFrame};
 use crate::held::Held;
 use crate::vectors::wide;
 use crate::{Array, Error, EventsView, Result, problem};
@@ -10,8 +10,8 @@ use crate::{Array, Error, EventsView, Result, problem};
 pub(super) const FARTHEST: u64 = 1 << 60;
 
 wide! {
-    /// Copies the blocks of a picture that differ from the stored ones.
-    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool], next: &mut NextPicture) -> Result<()> {
+    /// Copies the blocks of a frame that differ from the stored ones.
+    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool], next: &mut NextFrame) -> Result<()> {
         /// All exponent bits: infinite or not a number.
         const NOT_FINITE: u32 = 0x7f80_0000;
         for ((new, held), changed) in new.iter().zip(held).zip(changed) {
@@ -34,7 +34,7 @@ wide! {
     }
 }
 
-/// The error for a picture that holds a value that is not finite; NaN is one that is missing.
+/// The error for a frame that holds a value that is not finite; NaN is one that is missing.
 pub(super) fn not_finite(t: i64, value: f32) -> Error {
     let filled = if value.is_nan() { "; Frames.held fills the missing ones with the last value before" } else { "" };
     problem!("frame at {t} us holds {value}: values must be finite{filled}")
@@ -46,7 +46,7 @@ pub(super) struct Channels {
     rows: u16,
     columns: u16,
     name: String,
-    /// The place of each channel in a picture; `None` if every place is a channel.
+    /// The place of each channel in a frame; `None` if every place is a channel.
     places: Option<Vec<u32>>,
     /// The channel of each place, [`NONE`] if no taxel exists there; `None` if every place is a channel.
     of_place: Option<Vec<u32>>,
@@ -90,14 +90,14 @@ impl Channels {
         }
     }
 
-    /// Copies a picture into blocks and marks those that changed.
+    /// Copies a frame into blocks and marks those that changed.
     pub(super) fn load(
         &self,
         t: i64,
         values: &[f32],
         held: &mut Held<f32>,
         changed: &mut [bool],
-        next: &mut NextPicture,
+        next: &mut NextFrame,
     ) -> Result<()> {
         let held = held.values_mut().as_chunks_mut().0;
         if values.len() != self.grid() {

@@ -18,7 +18,7 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextPicture};
+use super::blocks::{BLOCK, Block, NextFrame};
 use super::encoding::Encoding;
 use super::power::power;
 use super::sampled::{Rule, Sampled};
@@ -310,7 +310,7 @@ impl Rule for Afferents {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
         /// Number of entries that are always written, needed or not: a branch on the count would cost more.
         const AT_ONCE: usize = 4;
         let (mut near, mut n) = (std::mem::take(&mut self.near), 0);
@@ -367,14 +367,14 @@ mod tests {
     use super::*;
 
     /// Reference for the tests: equations 5.1 to 5.5 for every afferent at every sample.
-    fn plainly(parameters: &Fa1, pictures: &[Block]) -> Vec<Spike> {
+    fn plainly(parameters: &Fa1, frames: &[Block]) -> Vec<Spike> {
         let afferents = Afferents::new(parameters);
         let Afferents { alpha, jump, decay, theta_0, .. } = afferents;
         let (mut base, mut rho, mut theta) = ([0.0; BLOCK], [0.0; BLOCK], [theta_0; BLOCK]);
-        power(&pictures[0], alpha, &mut base);
+        power(&frames[0], alpha, &mut base);
         let mut out = vec![];
-        for (t, picture) in (1..).zip(&pictures[1..]) {
-            power(picture, alpha, &mut rho);
+        for (t, frame) in (1..).zip(&frames[1..]) {
+            power(frame, alpha, &mut rho);
             for lane in 0..BLOCK {
                 let u = rho[lane] - base[lane];
                 let signed = f32::from(i8::from(u > theta[lane]) - i8::from(u < -theta[lane]));
@@ -412,7 +412,7 @@ mod tests {
             };
             let offset = rng.random_range(-1.0..2.0);
             let mut held: [f64; BLOCK] = std::array::from_fn(|_| offset);
-            let pictures: Vec<Block> = (0..300)
+            let frames: Vec<Block> = (0..300)
                 .map(|_| {
                     for held in &mut held {
                         if rng.random_bool(0.3) {
@@ -424,12 +424,12 @@ mod tests {
                 .collect();
             let mut afferents = Afferents::new(&parameters);
             let mut out = vec![];
-            afferents.begin(0, &pictures[..1], &mut out);
-            for (t, picture) in (1..).zip(pictures[1..].chunks(1)) {
-                let changed = picture != &pictures[t as usize - 1..t as usize];
-                afferents.sample(t, picture, &[changed], &mut NextPicture::unknown(), &mut out);
+            afferents.begin(0, &frames[..1], &mut out);
+            for (t, frame) in (1..).zip(frames[1..].chunks(1)) {
+                let changed = frame != &frames[t as usize - 1..t as usize];
+                afferents.sample(t, frame, &[changed], &mut NextFrame::unknown(), &mut out);
             }
-            assert!(out == plainly(&parameters, &pictures), "round {round}: {parameters:?}");
+            assert!(out == plainly(&parameters, &frames), "round {round}: {parameters:?}");
         }
     }
 }

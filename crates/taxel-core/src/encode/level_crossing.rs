@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextPicture, blocks};
+use super::blocks::{BLOCK, Block, NextFrame, blocks};
 use super::bracket::{Bracket, check_levels};
 use super::channels::Channels;
 use super::encoding::Encoding;
@@ -348,7 +348,7 @@ impl Rule for Crossings {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextFrame, out: &mut Vec<Spike>) {
         let Some(mut window) = self.window.take() else { return self.cross(t, held, changed, out) };
         let everything = vec![true; held.len()];
         let first = window.first_full(t);

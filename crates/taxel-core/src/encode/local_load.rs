@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{Block, NextPicture};
+use super::blocks::{Block, NextFrame};
 use super::by_stamp::{ByStamp, Measure};
 use super::encoding::Encoding;
 use super::loaded::{Loaded, given};
@@ -120,7 +120,7 @@ impl LocalLoad {
         Ok(quantities(&spikes_of_events(&mut stream, events, stop)?.0))
     }
 
-    /// The quantities of each picture, picture by picture, in the order of [`quantities`](Self::quantities).
+    /// The quantities of each frame, frame by frame, in the order of [`quantities`](Self::quantities).
     ///
     /// # Errors
     ///
@@ -131,7 +131,7 @@ impl LocalLoad {
         Ok(quantities(&spikes_of_frames(&mut stream, frames, stop)?.0))
     }
 
-    /// The largest local sum alone, of an array's pictures: the quantity of plain rules.
+    /// The largest local sum alone, of an array's frames: the quantity of plain rules.
     ///
     /// # Errors
     ///
@@ -205,15 +205,15 @@ impl Encoding for LocalLoad {
     }
 }
 
-/// The largest local sum of each picture: [`LocalLoad`]'s quantity "largest".
+/// The largest local sum of each frame: [`LocalLoad`]'s quantity "largest".
 #[derive(Clone)]
 pub struct LargestSum(LocalSums);
 
 impl LargestSum {
-    /// Reads the next picture, row by row, at `t` us, which must not be earlier than the last; returns its largest sum.
-    pub fn take(&mut self, t: i64, picture: &[f32]) -> f64 {
+    /// Reads the next frame, row by row, at `t` us, which must not be earlier than the last; returns its largest sum.
+    pub fn take(&mut self, t: i64, frame: &[f32]) -> f64 {
         let mut largest = 0.0;
-        self.0.take(t, Values::Picture(picture), |sums| largest = sums.largest[0]);
+        self.0.take(t, Values::Frame(frame), |sums| largest = sums.largest[0]);
         largest
     }
 
@@ -257,7 +257,7 @@ impl Measure for Levels {
     fn emit(&mut self, t: i64, _loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {
         let Self { sums, largest, levels } = self;
         largest.clear();
-        sums.take(t, Values::Picture(held.as_flattened()), |Sums { largest: [up, down], .. }| {
+        sums.take(t, Values::Frame(held.as_flattened()), |Sums { largest: [up, down], .. }| {
             let present = if largest.is_empty() { &[up][..] } else { &[up, down][..] };
             largest.extend_from_slice(present);
         });
@@ -327,7 +327,7 @@ impl Rule for Load {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], _changed: &[bool], _next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], _changed: &[bool], _next: &mut NextFrame, out: &mut Vec<Spike>) {
         self.take(t, held, out);
     }
 

@@ -46,7 +46,7 @@ struct Run {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Values<'a> {
     Taxels(&'a [f32]),
-    Picture(&'a [f32]),
+    Frame(&'a [f32]),
 }
 
 impl Grid {
@@ -93,7 +93,7 @@ impl Grid {
         for run in &self.runs {
             let new = match values {
                 Values::Taxels(values) => &values[run.channel..],
-                Values::Picture(values) => &values[run.place..],
+                Values::Frame(values) => &values[run.place..],
             };
             cells[run.cell..][..run.len].copy_from_slice(&new[..run.len]);
         }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{Block, NextPicture};
+use super::blocks::{Block, NextFrame};
 use super::encoding::Encoding;
 use super::loaded::{Loaded, Sums};
 use super::periods::micros;
@@ -357,7 +357,7 @@ impl Rule for Passing {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextFrame, out: &mut Vec<Spike>) {
         let changes = changed.contains(&true);
         if !changes && !self.at_every_sample() {
             return;

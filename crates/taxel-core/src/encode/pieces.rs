@@ -34,7 +34,7 @@ impl Pieces {
         self.piece(&out, events.t.first().copied(), events.t.iter().max().map(|&t| ms(t)))
     }
 
-    /// Encodes the next pictures.
+    /// Encodes the next frames.
     ///
     /// # Errors
     ///
@@ -52,8 +52,8 @@ impl Pieces {
         }
         frames.check()?;
         let mut out = vec![];
-        for (t, picture) in frames.iter() {
-            self.stream.push_frame(t, picture, &mut out)?;
+        for (t, frame) in frames.iter() {
+            self.stream.push_frame(t, frame, &mut out)?;
         }
         self.piece(&out, frames.t.first().copied(), frames.t.last().map(|&t| ms(t)))
     }

@@ -8,7 +8,7 @@
 //! within a sample is found by linear interpolation of `u` as well, and the threshold's rise decays from that time.
 //! Therefore rates do not depend on the sampling period as long as it is short compared with the filter.
 
-use super::blocks::{BLOCK, Block, NextPicture, blocks};
+use super::blocks::{BLOCK, Block, NextFrame, blocks};
 use super::sampled::Rule;
 use crate::Spike;
 use crate::spikes::ms;
@@ -210,7 +210,7 @@ impl<F: Filter> Rule for ByTaxel<F> {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
             next.fetch();
             let x = |lane: usize| share(self.scale, values[lane]);
@@ -245,16 +245,16 @@ mod tests {
     use crate::encode::slow::Slow;
 
     /// Reference for the tests: computes each channel alone, at every sample, whether it changed or not.
-    fn plainly<F: Filter>(filter: &F, firing: Firing, pictures: &[Vec<f64>]) -> Vec<Spike> {
+    fn plainly<F: Filter>(filter: &F, firing: Firing, frames: &[Vec<f64>]) -> Vec<Spike> {
         let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms } = firing;
         let mut out = vec![];
-        for channel in 0..pictures[0].len() {
-            let (mut state, u) = filter.settled(&[pictures[0][channel]; BLOCK]);
+        for channel in 0..frames[0].len() {
+            let (mut state, u) = filter.settled(&[frames[0][channel]; BLOCK]);
             let (mut u, mut wait) = (u[0], 0.0);
             let mut raised = f64::max(u - threshold, 0.0);
-            for (t, picture) in (1..).zip(&pictures[1..]) {
+            for (t, frame) in (1..).zip(&frames[1..]) {
                 let (below, waited) = (threshold + raised - u, wait);
-                u = filter.step::<true>(&mut state, 0, picture[channel], u, &mut 0);
+                u = filter.step::<true>(&mut state, 0, frame[channel], u, &mut 0);
                 raised *= (-period_ms / recovery_ms).exp();
                 raised = if raised < RECOVERED { 0.0 } else { raised };
                 wait = f64::max(wait - period_ms, 0.0);
@@ -279,7 +279,7 @@ mod tests {
         let (noise, changing) = (10_f64.powf(rng.random_range(-6.0..2.5)), rng.random_range(0.0..1.0));
         let mut held: Vec<f64> = (0..channels).map(|_| rng.random_range(-10.0..160.0)).collect();
         let (mut left, mut moving) = (0, true);
-        let pictures: Vec<Vec<Block>> = (0..800)
+        let frames: Vec<Vec<Block>> = (0..800)
             .map(|_| {
                 // Starts a new stretch, in which all, some or none of the channels move.
                 if left == 0 {
@@ -297,16 +297,16 @@ mod tests {
             .collect();
         let mut rule = ByTaxel::new(filter.clone(), firing, range, channels);
         let (mut out, mut left_out) = (vec![], 0);
-        rule.begin(0, &pictures[0], &mut out);
-        for (t, pair) in (1..).zip(pictures.windows(2)) {
+        rule.begin(0, &frames[0], &mut out);
+        for (t, pair) in (1..).zip(frames.windows(2)) {
             let changed: Vec<bool> = pair[0].iter().zip(&pair[1]).map(|(a, b)| a != b).collect();
             left_out += (0..changed.len()).filter(|&block| !changed[block] && rule.afferents.is_still(block)).count();
-            rule.sample(t, &pair[1], &changed, &mut NextPicture::unknown(), &mut out);
+            rule.sample(t, &pair[1], &changed, &mut NextFrame::unknown(), &mut out);
         }
-        let shares = |picture: &Vec<Block>| -> Vec<f64> {
-            picture.as_flattened()[..channels].iter().map(|&value| share(rule.scale, value)).collect()
+        let shares = |frame: &Vec<Block>| -> Vec<f64> {
+            frame.as_flattened()[..channels].iter().map(|&value| share(rule.scale, value)).collect()
         };
-        let wanted = plainly(filter, firing, &pictures.iter().map(shares).collect::<Vec<_>>());
+        let wanted = plainly(filter, firing, &frames.iter().map(shares).collect::<Vec<_>>());
         assert!(out == wanted, "{firing:?}: {} spikes, by themselves {}", out.len(), wanted.len());
         [out.len(), left_out]
     }

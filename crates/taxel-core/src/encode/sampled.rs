@@ -1,9 +1,9 @@
-//! Encoders of pressure: they read each picture, or current intensities sampled at a fixed period.
+//! Encoders of pressure: they read each frame, or current intensities sampled at a fixed period.
 //!
 //! A [`Rule`] implements one encoder and does not depend on events or pieces; [`Sampled`] passes it the samples and
 //! marks the blocks that did not change since the last sample, which a rule can skip.
 
-use super::blocks::{BLOCK, Block, NextPicture, blocks, in_blocks};
+use super::blocks::{BLOCK, Block, NextFrame, blocks, in_blocks};
 use super::channels::{Channels, FARTHEST};
 use super::encoding::Encoding;
 use super::periods::micros;
@@ -26,9 +26,9 @@ pub(super) trait Rule: Send + Clone + 'static {
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
 
     /// Processes a later sample; only blocks that `changed` differ from the last one. `pass` was called up to `t`.
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>);
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>);
 
-    /// Whether a block takes so long to compute that the rule prefetches parts of the `next` picture between blocks.
+    /// Whether a block takes so long to compute that the rule prefetches parts of the `next` frame between blocks.
     const ASKS: bool = false;
 
     /// Emits the spikes that are due before `t` (exclusive) while the last sample holds.
@@ -60,7 +60,7 @@ wide! {
         t: i64,
         held: &[Block],
         changed: &[bool],
-        next: &mut NextPicture,
+        next: &mut NextFrame,
         out: &mut Vec<Spike>,
     ) {
         rule.pass(t, out);
@@ -161,8 +161,8 @@ struct Above {
     rest: Rest<f64>,
     /// The current value of each place.
     held: Held<f32>,
-    /// A picture of the values above rest.
-    picture: Vec<f32>,
+    /// A frame of the values above rest.
+    frame: Vec<f32>,
 }
 
 impl Above {
@@ -199,7 +199,7 @@ impl<R: Rule> Sampled<R> {
     pub(super) fn above(mut self, tare: Option<&Tare>, array: &Array) -> Result<Self> {
         if let Some(tare) = tare {
             let (rest, n) = (tare.rest_of(array)?, array.len());
-            self.above = Some(Above { rest, held: Held::all(n, 0.0), picture: vec![0.0; n] });
+            self.above = Some(Above { rest, held: Held::all(n, 0.0), frame: vec![0.0; n] });
         }
         Ok(self)
     }
@@ -210,7 +210,7 @@ impl<R: Rule> Sampled<R> {
         self
     }
 
-    fn sample(&mut self, t: i64, mut next: NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, mut next: NextFrame, out: &mut Vec<Spike>) {
         let held = in_blocks(self.held.values());
         if self.begun {
             take_sample(&mut self.rule, t, held, &self.changed, &mut next, out);
@@ -231,7 +231,7 @@ impl<R: Rule> Sampled<R> {
                 self.next = self.next.saturating_add_unsigned(left.saturating_mul(self.period.unsigned_abs()));
                 return;
             }
-            self.sample(self.next, NextPicture::unknown(), out);
+            self.sample(self.next, NextFrame::unknown(), out);
             self.next += self.period;
         }
     }
@@ -333,16 +333,16 @@ impl<R: Rule> Stream for Sampled<R> {
             return Err(problem!("frame at {t} us, {since} ms after the last: must come every {period} ms")
                 .helped_by("period_ms", Hint::Give));
         }
-        let (now, later) = (NextPicture::after(values), NextPicture::unknown());
+        let (now, later) = (NextFrame::after(values), NextFrame::unknown());
         let (mut now, later) = if R::ASKS { (later, now) } else { (now, later) };
         let values = match &mut self.above {
-            Some(above) if values.len() == above.picture.len() => {
+            Some(above) if values.len() == above.frame.len() => {
                 above.held.values_mut().copy_from_slice(values);
                 for (place, &read) in values.iter().enumerate() {
                     // Infinite values and NaN stay, so that they are refused below.
-                    above.picture[place] = if read.is_finite() { above.of(place) } else { read };
+                    above.frame[place] = if read.is_finite() { above.of(place) } else { read };
                 }
-                &above.picture
+                &above.frame
             }
             _ => values,
         };

@@ -4,7 +4,7 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextPicture, blocks};
+use super::blocks::{BLOCK, Block, NextFrame, blocks};
 use super::channels::Channels;
 use super::encoding::Encoding;
 use super::fa1::{self, Decay, Fa1};
@@ -275,7 +275,7 @@ impl<R: Rule> Type<R> {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
         self.take(held, changed);
         let from = out.len();
         self.rule.sample(t, &self.held, &self.changed, next, out);
@@ -337,7 +337,7 @@ impl Rule for Afferents {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
         let from = out.len();
         self.sa1.sample(t, held, changed, next, out);
         self.fa1.sample(t, held, changed, next, out);

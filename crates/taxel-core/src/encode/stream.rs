@@ -40,11 +40,11 @@ pub trait Stream: Send {
         None
     }
 
-    /// Encodes the next picture, row by row, at `t` us.
+    /// Encodes the next frame, row by row, at `t` us.
     ///
     /// # Errors
     ///
-    /// `Problem` if the picture has another size, contains NaN or is out of order, or if the stream was begun with
+    /// `Problem` if the frame has another size, contains NaN or is out of order, or if the stream was begun with
     /// events.
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()>;
 
@@ -92,7 +92,7 @@ pub(super) fn spikes_of_events(
     Ok((out, end))
 }
 
-/// All spikes of a whole recording of pictures, and the end of their window, ms.
+/// All spikes of a whole recording of frames, and the end of their window, ms.
 pub(super) fn spikes_of_frames(
     stream: &mut dyn Stream,
     frames: FramesView<'_>,
@@ -100,11 +100,11 @@ pub(super) fn spikes_of_frames(
 ) -> Result<(Vec<Spike>, Option<f64>)> {
     frames.check()?;
     let mut out = vec![];
-    for (k, (t, picture)) in frames.iter().enumerate() {
+    for (k, (t, frame)) in frames.iter().enumerate() {
         if k % 64 == 0 {
             stop.check()?;
         }
-        stream.push_frame(t, picture, &mut out)?;
+        stream.push_frame(t, frame, &mut out)?;
     }
     let end = stream.finish(&mut out);
     Ok((out, end))

@@ -102,7 +102,7 @@ impl Tare {
         tare.finish(stop.unwrap_or_default(), note)
     }
 
-    /// Computes a tare from pictures, from `start` to `stop` us, or from all of them.
+    /// Computes a tare from frames, from `start` to `stop` us, or from all of them.
     ///
     /// # Errors
     ///
@@ -111,8 +111,8 @@ impl Tare {
         frames.check()?;
         let stop = stop.or(frames.t.last().copied());
         let mut tare = TareBuilder::new(frames.array, start);
-        for (t, picture) in frames.iter().filter(|&(t, _)| stop.is_some_and(|stop| t < stop)) {
-            tare.push_frame(t, picture)?;
+        for (t, frame) in frames.iter().filter(|&(t, _)| stop.is_some_and(|stop| t < stop)) {
+            tare.push_frame(t, frame)?;
         }
         tare.finish(stop.unwrap_or_default(), note)
     }
@@ -168,7 +168,7 @@ impl Zeroing {
     }
 }
 
-/// Computes a tare from events or pictures as they arrive.
+/// Computes a tare from events or frames as they arrive.
 pub struct TareBuilder {
     array: Array,
     start: Option<i64>,
@@ -256,11 +256,11 @@ impl TareBuilder {
         Ok(())
     }
 
-    /// Adds the next picture, at `t` us.
+    /// Adds the next frame, at `t` us.
     ///
     /// # Errors
     ///
-    /// `Problem` if the picture has another size, contains NaN or is out of order.
+    /// `Problem` if the frame has another size, contains NaN or is out of order.
     pub fn push_frame(&mut self, t: i64, values: &[f32]) -> Result<()> {
         if values.len() != self.integrals.len() {
             return Err(problem!("frame at {t} us: {} values, must be {}", values.len(), self.integrals.len()));

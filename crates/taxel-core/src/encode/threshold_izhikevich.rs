@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextPicture, blocks};
+use super::blocks::{BLOCK, Block, NextFrame, blocks};
 use super::bracket::{Bracket, check_levels};
 use super::channels::Channels;
 use super::encoding::Encoding;
@@ -339,7 +339,7 @@ impl Rule for Pairs {
     const ASKS: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextPicture, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
             next.fetch();
             if changed[block] && self.bracket.left(block, values) {

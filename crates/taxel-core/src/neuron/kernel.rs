@@ -105,9 +105,9 @@ impl Shape {
     /// Adds an input of weight `weight` and of this value (1 of an unsigned spike) that arrived `age` ms ago, 0 or more.
     #[inline]
     pub fn add(&self, state: &mut KernelSum, weight: f64, value: f64, age: f64) {
-        let one = self.after(self.input(), age);
-        state.a += weight * (value * one.a);
-        state.b += weight * (value * one.b);
+        let unit = self.after(self.input(), age);
+        state.a += weight * (value * unit.a);
+        state.b += weight * (value * unit.b);
     }
 
     /// The kernel `age` ms after the input; 0 up to and including the input's own time.

@@ -43,8 +43,8 @@ pub struct DatagramInfo {
 pub struct SenderDecoder {
     array: Array,
     version: u8,
-    one: Decoder,
-    two: v2::Decoder,
+    version_1: Decoder,
+    version_2: v2::Decoder,
     /// Added to times of version 1; known once the first event after a change was received.
     offset: Option<i64>,
     /// The latest time, and the host's clock when it was received.
@@ -61,16 +61,16 @@ pub struct SenderDecoder {
 }
 
 impl SenderDecoder {
-    /// A decoder of a sender that uses `version` at first; `one` decodes what is of version 1, and has the array.
+    /// A decoder of a sender that uses `version` at first; `version_1` decodes what is of version 1, and has the array.
     #[must_use]
-    pub fn new(one: Decoder, version: u8) -> Self {
-        let array = one.array().clone();
-        let two = v2::Decoder::new(array.clone());
+    pub fn new(version_1: Decoder, version: u8) -> Self {
+        let array = version_1.array().clone();
+        let version_2 = v2::Decoder::new(array.clone());
         Self {
             array,
             version,
-            one,
-            two,
+            version_1,
+            version_2,
             offset: Some(0),
             latest: None,
             whole_since: None,
@@ -92,26 +92,20 @@ impl SenderDecoder {
 
     /// Sets each taxel's current value, by index, as [`Decoder::begin_with`] and [`v2::Decoder::begin_with`] do.
     pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>> + Clone) {
-        self.one.begin_with(held.clone());
-        self.two.begin_with(held);
-    }
-
-    /// The decoder of version 1.
-    #[must_use]
-    pub fn one(&self) -> &Decoder {
-        &self.one
+        self.version_1.begin_with(held.clone());
+        self.version_2.begin_with(held);
     }
 
     /// The decoder of version 2.
     #[must_use]
-    pub fn two(&self) -> &v2::Decoder {
-        &self.two
+    pub fn version_2(&self) -> &v2::Decoder {
+        &self.version_2
     }
 
     /// The counts of version 1.
     #[must_use]
     pub fn counts(&self) -> &Counts {
-        self.one.counts()
+        self.version_1.counts()
     }
 
     /// Number of bytes of version 1 that were refused because the sender uses version 2.
@@ -152,7 +146,7 @@ impl SenderDecoder {
 
     /// Notes that a recording begins, as [`v2::Decoder::begin_recording`] does.
     pub fn begin_recording(&mut self) {
-        self.two.begin_recording();
+        self.version_2.begin_recording();
     }
 
     /// Notes that the host has set the board to this version of the wire.
@@ -175,7 +169,7 @@ impl SenderDecoder {
             if self.version == 1 {
                 self.change(2, out);
             }
-            if let Outcome::Intact { until, missing, reset } = self.two.push(datagram, arrived, out) {
+            if let Outcome::Intact { until, missing, reset } = self.version_2.push(datagram, arrived, out) {
                 self.whole_since = None;
                 (info.until, info.missing, info.reset) = (until, missing, reset);
             }
@@ -186,14 +180,15 @@ impl SenderDecoder {
                 self.change(1, out);
             }
             self.empty += u64::from(datagram.is_empty());
-            self.repeated += u64::from(self.recent.repeats(datagram, arrived, &self.array, self.one.has_values()));
+            self.repeated +=
+                u64::from(self.recent.repeats(datagram, arrived, &self.array, self.version_1.has_values()));
             let rows = out.len();
             let markers = out.markers.len();
-            let before = self.one.times();
-            self.one.push_into(datagram, arrived, out);
-            self.one.end_of_datagram_into(out);
+            let before = self.version_1.times();
+            self.version_1.push_into(datagram, arrived, out);
+            self.version_1.end_of_datagram_into(out);
             self.carry(rows, markers, arrived, out);
-            if let (Some((_, last)), Some(arrived)) = (self.one.times(), arrived) {
+            if let (Some((_, last)), Some(arrived)) = (self.version_1.times(), arrived) {
                 let offset = self.offset.unwrap_or(0);
                 let (newest, first) = (before.map(|(newest, _)| newest + offset), out.t.get(rows).copied());
                 self.ahead.note(newest, first.unwrap_or(last + offset), last + offset, arrived);
@@ -204,7 +199,7 @@ impl SenderDecoder {
             let latest = self.latest.map_or(t, |(latest, _)| latest.max(t));
             self.latest = Some((latest, arrived));
         }
-        info.now = if self.version == 2 { Some(self.two.latest()) } else { self.latest.map(|(t, _)| t) };
+        info.now = if self.version == 2 { Some(self.version_2.latest()) } else { self.latest.map(|(t, _)| t) };
         info.version = self.version;
         info.changed = self.version != before;
         info
@@ -213,7 +208,7 @@ impl SenderDecoder {
     /// Ends the stream: appends the events that still waited.
     pub fn finish_into(&mut self, out: &mut Events) {
         let (rows, markers) = (out.len(), out.markers.len());
-        self.one.finish_into(out);
+        self.version_1.finish_into(out);
         self.carry(rows, markers, None, out);
         self.order.note(&out.t[rows..], false);
     }
@@ -232,13 +227,13 @@ impl SenderDecoder {
     }
 
     fn change(&mut self, version: u8, out: &mut Events) {
-        self.one.end_of_datagram_into(out);
+        self.version_1.end_of_datagram_into(out);
         (self.version, self.whole_since) = (version, None);
         self.changes += 1;
         if version == 1 {
             self.offset = None;
         } else if let Some((latest, then)) = self.latest {
-            self.two.go_on_from(latest, then);
+            self.version_2.go_on_from(latest, then);
         }
     }
 

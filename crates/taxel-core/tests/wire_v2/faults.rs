@@ -85,7 +85,7 @@ fn each_intact_datagram_is_decoded_once_whatever_the_network_does() {
 }
 
 #[test]
-fn repeated_states_repair_the_picture_after_a_loss() {
+fn repeated_states_repair_the_values_after_a_loss() {
     let mut random = StdRng::seed_from_u64(3);
     let array = Array::new(16, 16, 1.0, "small").unwrap();
     let registers = Registers { wire_version: 2, lines: 16, noise_floor: 0, ..Registers::default() };
@@ -115,11 +115,11 @@ fn repeated_states_repair_the_picture_after_a_loss() {
         assert!(counts.missing > 0 && counts.repaired > 0 && counts.states > 256);
         assert_eq!(counts.repaired, (0..events.len()).filter(|&k| events.is_repaired(k)).count() as u64);
         // The events alone, including repaired ones, must lead to the same values.
-        let mut picture = vec![0_u16; 256];
+        let mut frame = vec![0_u16; 256];
         for (_, x, y, _, value) in rows(&events) {
-            picture[array.index(x, y)] = value;
+            frame[array.index(x, y)] = value;
         }
-        assert_eq!(picture, expected);
+        assert_eq!(frame, expected);
         let status = decoder.status().expect("totals are sent");
         assert!(status.datagrams > 0 && status.events <= board.counts().changes);
     }

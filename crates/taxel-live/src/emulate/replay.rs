@@ -1,4 +1,4 @@
-//! Replays a recording: its events with their values, or its pictures by the board's rules.
+//! Replays a recording: its events with their values, or its frames by the board's rules.
 
 use taxel_core::{Array, EventsView, Stop, problem};
 
@@ -10,11 +10,11 @@ use crate::Result;
 enum What {
     /// Taxel and value of each event.
     Events(Vec<(u32, u16)>),
-    /// Ticks, picture after picture.
-    Pictures(Vec<u16>),
+    /// Ticks, frame after frame.
+    Frames(Vec<u16>),
 }
 
-/// Replays a recording to a board: each frame contains what had arrived by its start, by the recording's clock times a
+/// Replays a recording to a board: each frame of the board contains what had arrived by its start, by the recording's clock times a
 /// speed.
 #[derive(Debug)]
 pub struct Replay {
@@ -56,20 +56,18 @@ impl Replay {
         Self::new(times, What::Events(played), held, frame_us, speed)
     }
 
-    /// Replays pictures of ticks, one after the other in `values`, at `times` us; each holds until the next.
+    /// Replays frames of ticks, one after the other in `values`, at `times` us; each holds until the next.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` if there is not one time per picture, in order, or the speed is not above 0.
-    pub fn pictures(array: &Array, times: Vec<i64>, values: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
+    /// `Core(Problem)` if there is not one time per frame, in order, or the speed is not above 0.
+    pub fn frames(array: &Array, times: Vec<i64>, values: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
         if values.len() != times.len() * array.len() || !times.is_sorted() {
             let (n, taxels) = (times.len(), array.len());
-            return Err(
-                problem!("{} values for {n} pictures of {taxels} taxels, in order of time", values.len()).into()
-            );
+            return Err(problem!("{} values for {n} frames of {taxels} taxels, in order of time", values.len()).into());
         }
         let held = values.get(..array.len()).map_or_else(|| vec![0; array.len()], <[u16]>::to_vec);
-        Self::new(times, What::Pictures(values), held, frame_us, speed)
+        Self::new(times, What::Frames(values), held, frame_us, speed)
     }
 
     fn new(mut times: Vec<i64>, what: What, held: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
@@ -97,7 +95,7 @@ impl Touch for Replay {
                         let (taxel, value) = events[self.next];
                         self.held[taxel as usize] = value;
                     }
-                    What::Pictures(values) => {
+                    What::Frames(values) => {
                         let taxels = self.held.len();
                         self.held.copy_from_slice(&values[self.next * taxels..(self.next + 1) * taxels]);
                     }

@@ -1,4 +1,4 @@
-//! Copies for other computers: datagrams as they arrived, the low-rate picture, detections.
+//! Copies for other computers: datagrams as they arrived, the low-rate frame, detections.
 //!
 //! The decoding thread gathers datagrams into parcels and queues them if there is room; it never waits. Parcels that do
 //! not fit are counted in those that follow.
@@ -12,7 +12,7 @@ use serde_json::json;
 use super::shared::Shared;
 use super::sink::OutputDetection;
 use crate::capture::{Batch, Packer};
-use crate::recording::{PICTURE_EVERY, now_ns};
+use crate::recording::{LOW_RATE_EVERY, now_ns};
 
 /// Longest time for which a parcel gathers datagrams.
 pub(super) const GATHER: Duration = Duration::from_millis(5);
@@ -28,7 +28,7 @@ pub enum Copied {
     /// Datagrams.
     Parcel(Vec<u8>),
     /// The taxels' values, as JSON.
-    Picture(Vec<u8>),
+    Frame(Vec<u8>),
     /// A detection: a line of JSON.
     Detection(Vec<u8>),
 }
@@ -38,7 +38,7 @@ pub struct Copies {
     shared: Arc<Shared>,
     parcels: channel::Receiver<Vec<u8>>,
     detections: channel::Receiver<OutputDetection>,
-    pictured: Instant,
+    sent_frame: Instant,
     decoded: u64,
 }
 
@@ -48,13 +48,13 @@ impl Copies {
         parcels: channel::Receiver<Vec<u8>>,
         detections: channel::Receiver<OutputDetection>,
     ) -> Self {
-        Self { shared, parcels, detections, pictured: Instant::now(), decoded: 0 }
+        Self { shared, parcels, detections, sent_frame: Instant::now(), decoded: 0 }
     }
 
     /// The next copy; `None` after `timeout` without one.
     pub fn next(&mut self, timeout: Duration) -> Option<Copied> {
-        if let Some(picture) = self.picture() {
-            return Some(picture);
+        if let Some(frame) = self.frame() {
+            return Some(frame);
         }
         channel::select! {
             recv(self.parcels) -> parcel => parcel.ok().map(Copied::Parcel),
@@ -69,25 +69,25 @@ impl Copies {
         self.shared.has_ended() && self.parcels.is_empty() && self.detections.is_empty()
     }
 
-    /// A picture, if it is due and events have arrived since the last one.
-    fn picture(&mut self) -> Option<Copied> {
-        if self.pictured.elapsed() < PICTURE_EVERY {
+    /// A frame, if it is due and events have arrived since the last one.
+    fn frame(&mut self) -> Option<Copied> {
+        if self.sent_frame.elapsed() < LOW_RATE_EVERY {
             return None;
         }
-        self.pictured = Instant::now();
+        self.sent_frame = Instant::now();
         let published = self.shared.published();
         if published.counters.decoding.decoded == self.decoded {
             return None;
         }
         self.decoded = published.counters.decoding.decoded;
         let array = &self.shared.options.array;
-        let picture = json!({
+        let frame = json!({
             "t_us": published.counters.board.board_us,
             "rows": array.rows,
             "columns": array.columns,
-            "ticks": published.picture,
+            "ticks": published.frame,
         });
-        Some(Copied::Picture(picture.to_string().into_bytes()))
+        Some(Copied::Frame(frame.to_string().into_bytes()))
     }
 }
 

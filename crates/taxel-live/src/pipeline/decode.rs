@@ -214,7 +214,7 @@ impl DecodeStage {
     pub(super) fn publish(&self, counters: &mut Counters) {
         counters.decoding.decoded = self.decoded;
         counters.decoding.wire = *self.decoder.counts();
-        counters.decoding.wire_v2 = self.decoder.two().counts();
+        counters.decoding.wire_v2 = self.decoder.version_2().counts();
         counters.decoding.wire_version = self.decoder.version();
         counters.decoding.wire_refused = self.decoder.refused();
         counters.decoding.wire_changes = self.decoder.changes();

@@ -1,4 +1,4 @@
-//! Copies for viewers and other computers, and the published picture: none of them can slow the pipeline.
+//! Copies for viewers and other computers, and the published frame: none of them can slow the pipeline.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use super::copies::{Copier, GATHER, copier};
 use super::shared::Shared;
 use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::capture::Batch;
-use crate::recording::PICTURE_EVERY;
+use crate::recording::LOW_RATE_EVERY;
 
 pub(super) struct Observers {
     shared: Arc<Shared>,
@@ -19,12 +19,12 @@ pub(super) struct Observers {
     copiers: Vec<Copier>,
     /// Number of datagrams that were received before the next one.
     received: u64,
-    pictured: Instant,
+    published_frame: Instant,
 }
 
 impl Observers {
     pub(super) fn new(shared: Arc<Shared>) -> Self {
-        Self { shared, viewers: vec![], copiers: vec![], received: 0, pictured: Instant::now() }
+        Self { shared, viewers: vec![], copiers: vec![], received: 0, published_frame: Instant::now() }
     }
 
     /// Adds a viewer of the events, if it is still connected.
@@ -80,13 +80,13 @@ impl Observers {
         self.viewers.retain_mut(|queue| queue.tick(held));
     }
 
-    /// Publishes the picture if it is due; returns whether it was.
-    pub(super) fn picture(&mut self, held: &Held) -> bool {
-        if self.pictured.elapsed() < PICTURE_EVERY {
+    /// Publishes the low-rate frame if it is due; returns whether it was.
+    pub(super) fn frame(&mut self, held: &Held) -> bool {
+        if self.published_frame.elapsed() < LOW_RATE_EVERY {
             return false;
         }
-        self.pictured = Instant::now();
-        self.shared.published().picture.iter_mut().zip(held.picture()).for_each(|(shown, value)| *shown = value);
+        self.published_frame = Instant::now();
+        self.shared.published().frame.iter_mut().zip(held.frame()).for_each(|(shown, value)| *shown = value);
         true
     }
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use crate::recording::PICTURE_EVERY;
+use crate::recording::LOW_RATE_EVERY;
 
 /// Interval at which pictures are buffered until it is known whether they are recorded: the largest rate in a
 /// recording.
@@ -76,7 +76,7 @@ impl PictureBuffer {
             BufferedPicture { at_ns, t_us, held: memory.unwrap_or_default(), state: PictureState::Undecided };
         let asked = self.awaited.len();
         self.awaited.retain(|&t| t > t_us);
-        let tenth = self.wanted.is_none_or(|wanted| now.saturating_duration_since(wanted) >= PICTURE_EVERY);
+        let tenth = self.wanted.is_none_or(|wanted| now.saturating_duration_since(wanted) >= LOW_RATE_EVERY);
         if tenth || self.awaited.len() < asked {
             picture.want();
         }

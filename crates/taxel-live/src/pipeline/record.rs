@@ -177,7 +177,7 @@ impl RecordStage {
         let new = decoded != self.considered;
         self.considered = decoded;
         if let (true, Some(t_us)) = (new, self.shared.published().counters.board.board_us) {
-            self.picture_buffer.push(now, now_ns(), t_us, held.picture());
+            self.picture_buffer.push(now, now_ns(), t_us, held.frame());
         }
         times.into_iter().for_each(|t| self.picture_buffer.around(t));
         let columns = self.shared.options.array.columns;

@@ -27,14 +27,14 @@ use crate::{Error, Result};
 /// Interval at which a wait for a reply checks whether the decoding thread has ended.
 const ANSWER_EVERY: Duration = Duration::from_millis(50);
 
-/// The values that the threads publish: counts, the picture, the tare.
+/// The values that the threads publish: counts, the low-rate frame, the tare.
 #[derive(Debug, Default)]
 pub(super) struct Published {
     pub(super) counters: Counters,
     pub(super) decode_latency: Latencies,
     pub(super) report_latency: Latencies,
     pub(super) markers: Vec<Marker>,
-    pub(super) picture: Vec<u16>,
+    pub(super) frame: Vec<u16>,
     pub(super) tare: Option<Tare>,
     /// The readout's rest of each taxel, by taxel index; empty if its encoder uses no tare, or has none yet.
     pub(super) rest: Vec<Option<f64>>,

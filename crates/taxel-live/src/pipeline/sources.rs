@@ -228,7 +228,7 @@ impl<Board> Others<Board> {
             let part = Part { host, name: name.clone() };
             let stream = match kind {
                 SourceKind::Board(address, array, registers) => {
-                    let own = LiveOptions {
+                    let of_board = LiveOptions {
                         registers: *registers,
                         record: options.record.clone(),
                         compression: options.compression.clone(),
@@ -238,7 +238,7 @@ impl<Board> Others<Board> {
                         gro: options.gro,
                         ..LiveOptions::new((**array).clone())
                     };
-                    let board = begin(*address, own, part)?;
+                    let board = begin(*address, of_board, part)?;
                     others.boards.push((name.clone(), board));
                     continue;
                 }

@@ -127,7 +127,7 @@ impl Stages {
         self.receive.reuse(batch);
         self.observers.tick(self.decode.held());
         self.record.pictures(self.decode.decoded(), self.decode.held(), false)?;
-        if self.observers.picture(self.decode.held()) {
+        if self.observers.frame(self.decode.held()) {
             self.record.progress()?;
         }
         if self.shared.requested.swap(false, Ordering::Acquire) {

@@ -1,7 +1,7 @@
-//! Copies of the events for viewers: in pieces, twice as often as pictures while a viewer is connected.
+//! Copies of the events for viewers: in pieces, twice as often as frames while a viewer is connected.
 //!
 //! The decoding thread fills a piece of bounded size and queues it if there is room; it never waits. Events that do not
-//! fit are counted, and the next piece begins with the taxels' values, so that a picture is correct again within 0.1 s.
+//! fit are counted, and the next piece begins with the taxels' values, so that what is shown is correct again within 0.1 s.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -77,7 +77,7 @@ impl ViewerEvents {
         self.pieces.try_recv().ok()
     }
 
-    /// Sets whether a viewer is connected: pieces are then frequent enough for sixty pictures a second, otherwise for
+    /// Sets whether a viewer is connected: pieces are then frequent enough for sixty frames a second, otherwise for
     /// ten.
     pub fn set_watched(&self, watched: bool) {
         self.watched.store(watched, Ordering::Relaxed);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_viewer_that_does_not_read_loses_events_and_not_the_picture() {
+    fn a_viewer_that_does_not_read_loses_events_and_not_the_values() {
         let array = Array::thesis();
         let mut held = Held::unknown(array.len());
         let (mut queue, viewer) = viewer_queue(&array, &held, None, 0);

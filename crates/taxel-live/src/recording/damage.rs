@@ -26,7 +26,7 @@ impl Found {
     #[must_use]
     pub fn of(sender: &SenderDecoder, origin_us: i64) -> Self {
         let (mut causes, missing) =
-            damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.two().counts());
+            damage(sender.counts(), sender.ahead().jumps, sender.repeated(), &sender.version_2().counts());
         causes.extend([(REFUSED.to_owned(), sender.refused()), (EMPTY.to_owned(), sender.empty())]);
         add_order(&mut causes, sender.order().far(), sender.order().overtaken());
         let doubtful_after_us = sender.ahead().after.map(|t| t + origin_us);

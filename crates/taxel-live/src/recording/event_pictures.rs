@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use taxel_core::held::HeldOverTime;
 use taxel_core::{EventsView, Result};
 
-use super::PICTURE_EVERY;
+use super::LOW_RATE_EVERY;
 
 /// Interval between pictures while there are events, us.
-const EVERY_US: i64 = PICTURE_EVERY.as_micros() as i64;
+const EVERY_US: i64 = LOW_RATE_EVERY.as_micros() as i64;
 
 /// Interval between pictures around a time of interest (a detection, a note, a marker), us.
 const NEAR_US: i64 = 10_000;

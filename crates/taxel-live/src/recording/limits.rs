@@ -36,8 +36,8 @@ pub(super) const TIME_US: i64 = 1 << 52;
 
 /// Largest unpacked size of all chunks of a file of `length` bytes together, of which `memory` bytes may be read.
 ///
-/// Pictures of a board at rest compress by a factor of a few hundred; a factor of a thousand indicates a decompression
-/// bomb, unless all of it fits into the memory: large pictures without a touch compress by a factor of ten thousand.
+/// Frames of a board at rest compress by a factor of a few hundred; a factor of a thousand indicates a decompression
+/// bomb, unless all of it fits into the memory: large frames without a touch compress by a factor of ten thousand.
 pub(super) fn unpacked(length: u64, memory: u64) -> u64 {
     length.saturating_mul(1000).saturating_add(1 << 28).max(memory)
 }

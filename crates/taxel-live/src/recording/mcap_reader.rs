@@ -19,7 +19,7 @@ use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Events, Stop, problem};
 
 use super::stream::Sampling;
-use super::{BoardChange, Change, Condition, Counts, Ending, Found, Header, Pictures, Rebuilt, Samples, Topic, limits};
+use super::{BoardChange, Change, Condition, Counts, Ending, Found, Frames, Header, Rebuilt, Samples, Topic, limits};
 use crate::clock::leaves;
 use crate::regular_file::open_regular;
 use crate::{Error, Result};
@@ -83,9 +83,9 @@ impl Unread {
 
 /// The topic of what a source sends.
 fn data_of(source: &Header) -> Topic {
-    match (&source.stream, &source.pictures) {
+    match (&source.stream, &source.frames) {
         (Some(_), _) => Topic::Samples,
-        (_, Some(_)) => Topic::Pictures,
+        (_, Some(_)) => Topic::Frames,
         _ => Topic::Datagrams,
     }
 }
@@ -215,13 +215,11 @@ impl Reader {
         limits::in_memory(&self.blocks.path, what, size as u64, self.memory)
     }
 
-    /// Whether the summary lists no datagram, line or picture of a source.
+    /// Whether the summary lists no datagram, line or frame of a source.
     fn is_silent(&self, source: usize) -> bool {
         let header = &self.header.sources[source - 1];
         let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
-        totals.is_some_and(|totals| {
-            totals.get(&data_of(header).channel_name(source, &header.name)).is_none_or(|&n| n == 0)
-        })
+        totals.is_some_and(|totals| data_of(header).total(totals, source, &header.name).is_none_or(|n| n == 0))
     }
 
     /// The source's header.
@@ -250,8 +248,7 @@ impl Reader {
         let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
         // Another program may have written the file anew without some messages, and a summary that fits: the recorder's own
         // counts say how many there were, the last ones before the end how many at least.
-        let total =
-            |topic: Topic| totals.and_then(|totals| totals.get(&topic.channel_name(self.source, name)).copied());
+        let total = |topic: Topic| totals.and_then(|totals| topic.total(totals, self.source, name));
         let recorded = |topic: Topic| match &self.ending {
             Some(Ending::Finished { counts }) if topic == data => Some(counts.recorded),
             Some(Ending::Finished { counts }) => counts.messages.get(&topic).copied(),
@@ -410,7 +407,7 @@ impl Reader {
         Ok(unread)
     }
 
-    /// Collects everything except the datagrams' bytes and the pictures; also returns what was not read.
+    /// Collects everything except the datagrams' bytes and the frames; also returns what was not read.
     ///
     /// # Errors
     ///
@@ -468,21 +465,21 @@ impl Reader {
         Ok(sampling.finish())
     }
 
-    /// All pictures of a source of pictures.
+    /// All frames of a source of frames.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` if the source is another; `Core` (format) if there are more than can be read; otherwise as
     /// [`Reader::messages`].
-    pub fn pictures(&self, stop: Stop<'_>) -> Result<Pictures> {
-        let Header { name, array, pictures, .. } = self.header();
-        if pictures.is_none() {
-            return Err(problem!("source {name}: holds no pictures").into());
+    pub fn frames(&self, stop: Stop<'_>) -> Result<Frames> {
+        let Header { name, array, frames, .. } = self.header();
+        if frames.is_none() {
+            return Err(problem!("source {name}: holds no frames").into());
         }
-        let mut all = Pictures::default();
+        let mut all = Frames::default();
         self.messages(stop, |message| {
-            if message.topic == Topic::Pictures {
-                self.fits("pictures", 4 * (all.values.len() + array.len()) + 8 * all.t.len())?;
+            if message.topic == Topic::Frames {
+                self.fits("frames", 4 * (all.values.len() + array.len()) + 8 * all.t.len())?;
                 all.push(message.data, array.rows, array.columns);
             }
             Ok(())
@@ -532,7 +529,7 @@ impl Reader {
         decoded.events.t.iter_mut().for_each(|t| *t += header.decoding.origin_us);
         decoded.events.markers.iter_mut().for_each(|m| m.t += header.decoding.origin_us);
         decoded.counts = *sender.counts();
-        decoded.version_2 = sender.two().counts();
+        decoded.version_2 = sender.version_2().counts();
         decoded.found = Found::of(&sender, header.decoding.origin_us);
         Ok(decoded)
     }

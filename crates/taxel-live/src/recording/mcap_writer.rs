@@ -20,8 +20,8 @@ use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
+use super::frames::{Encoding, write_message};
 use super::grey_picture::GreyScale;
-use super::pictures::{Encoding, write_message};
 use super::{BoardChange, Compression, Counts, Header, OutputFile, Stream, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
@@ -171,22 +171,22 @@ impl Track {
         }
     }
 
-    /// Writes pictures, each with its time in the file (ns), its time by the board's clock (us) and the values of all
+    /// Writes frames, each with its time in the file (ns), its time by the board's clock (us) and the values of all
     /// taxels; `first` is the number of the first of them.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` where the columns do not fit each other or the array; else as [`Track::datagram`].
-    pub fn pictures(&self, first: u64, at_ns: &[i64], t_us: &[i64], values: &[f32], encoding: Encoding) -> Result<()> {
+    pub fn frames(&self, first: u64, at_ns: &[i64], t_us: &[i64], values: &[f32], encoding: Encoding) -> Result<()> {
         if at_ns.len() != t_us.len() || values.len() != t_us.len() * self.taxels {
             let (n, taxels) = (values.len(), self.taxels);
-            return Err(problem!("{} pictures of {taxels} taxels: {n} values", t_us.len()).into());
+            return Err(problem!("{} frames of {taxels} taxels: {n} values", t_us.len()).into());
         }
         let mut message = vec![];
-        let pictures = values.chunks_exact(self.taxels).zip(at_ns.iter().zip(t_us)).zip(first..);
-        for ((picture, (&at_ns, &t_us)), number) in pictures {
-            write_message(&mut message, &self.name, t_us, self.columns, picture, encoding);
-            self.queue.push(self.source, Topic::Pictures, (at_ns, number), &message, BULK_BYTES)?;
+        let frames = values.chunks_exact(self.taxels).zip(at_ns.iter().zip(t_us)).zip(first..);
+        for ((frame, (&at_ns, &t_us)), number) in frames {
+            write_message(&mut message, &self.name, t_us, self.columns, frame, encoding);
+            self.queue.push(self.source, Topic::Frames, (at_ns, number), &message, BULK_BYTES)?;
         }
         Ok(())
     }

@@ -97,7 +97,7 @@ impl Stream {
     }
 }
 
-/// Whether a number is a value that pictures hold, which have 32 bits, or NaN, a missing one; infinity is none.
+/// Whether a number is a value that frames hold, which have 32 bits, or NaN, a missing one; infinity is none.
 fn is_held(value: f64) -> bool {
     value.is_nan() || value.abs() <= f64::from(f32::MAX)
 }
@@ -433,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_of_a_file_that_no_picture_holds_makes_its_line_strange() {
+    fn a_value_of_a_file_that_no_frame_holds_makes_its_line_strange() {
         let stream = stream(&["a"]);
         let mut sampling = Sampling::new(&stream);
         for (k, data) in [r#"{"values":{"a":1e39}}"#, r#"{"values":{"a":-1e300}}"#].into_iter().enumerate() {

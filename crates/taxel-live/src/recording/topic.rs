@@ -1,5 +1,7 @@
 //! The channels of a recording, with their schemas.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 /// A channel of a recording. Its number is the same in every file, so that a file is readable even if its first chunk,
@@ -28,9 +30,12 @@ pub enum Topic {
     Board = 9,
     /// Lines of numbers of a source that is not a board.
     Samples = 10,
-    /// Pictures of the whole array at full rate.
-    Pictures = 11,
+    /// Frames at full rate.
+    Frames = 11,
 }
+
+/// Names of channels in files of earlier commits, which are still read; old keys of JSON are aliases of their fields.
+const OLD_NAMES: [(Topic, &str); 1] = [(Topic::Frames, "/pictures")];
 
 /// Difference of the channel numbers of one source from those of the source before it in the file.
 const NEXT_SOURCE: u16 = 16;
@@ -48,7 +53,7 @@ impl Topic {
         Self::Held,
         Self::Board,
         Self::Samples,
-        Self::Pictures,
+        Self::Frames,
     ];
 
     /// The channel's name in a file.
@@ -65,7 +70,7 @@ impl Topic {
             Self::Held => "/held",
             Self::Board => "/board",
             Self::Samples => "/samples",
-            Self::Pictures => "/pictures",
+            Self::Frames => "/frames",
         }
     }
 
@@ -73,7 +78,7 @@ impl Topic {
     pub(super) fn encoding(self) -> &'static str {
         match self {
             Self::Datagrams => "taxel.wire.v1",
-            Self::Pictures => "protobuf",
+            Self::Frames => "protobuf",
             _ => "json",
         }
     }
@@ -84,7 +89,7 @@ impl Topic {
         let (name, text) = match self {
             Self::Datagrams => return None,
             // A `FileDescriptorSet` of protobuf: foxglove/RawImage.proto and the time stamp that it uses.
-            Self::Pictures => return Some(("foxglove.RawImage", "protobuf", include_bytes!("schemas/RawImage.bin"))),
+            Self::Frames => return Some(("foxglove.RawImage", "protobuf", include_bytes!("schemas/RawImage.bin"))),
             Self::Registers => ("taxel.Registers", include_str!("schemas/Registers.json")),
             Self::Markers => ("taxel.Marker", include_str!("schemas/Marker.json")),
             Self::Notes => ("foxglove.Log", include_str!("schemas/Log.json")),
@@ -98,9 +103,9 @@ impl Topic {
         Some((name, "jsonschema", text.as_bytes()))
     }
 
-    /// Whether the channel holds what a source sends: datagrams, lines or pictures.
+    /// Whether the channel holds what a source sends: datagrams, lines or frames.
     pub(super) fn is_data(self) -> bool {
-        matches!(self, Self::Datagrams | Self::Samples | Self::Pictures)
+        matches!(self, Self::Datagrams | Self::Samples | Self::Frames)
     }
 
     /// How a verdict names messages of the channel that a file has lost: the cause, and what one of them is; none where
@@ -109,7 +114,7 @@ impl Topic {
         Some(match self {
             Self::Datagrams => ("lost_in_file", "datagram"),
             Self::Samples => ("lost_in_file", "line"),
-            Self::Pictures => ("lost_in_file", "picture"),
+            Self::Frames => ("lost_in_file", "frame"),
             Self::Registers => ("registers_lost_in_file", "register setting"),
             Self::Markers => ("markers_lost_in_file", "marker"),
             Self::Notes => ("notes_lost_in_file", "note"),
@@ -126,17 +131,28 @@ impl Topic {
         u16::try_from(source).unwrap_or(u16::MAX).saturating_mul(NEXT_SOURCE).saturating_add(self as u16)
     }
 
-    /// The name of the channel in a file; for the first source it is the topic's name alone, but for pictures.
+    /// The name of the channel in a file; for the first source it is the topic's name alone, but for frames.
     pub(super) fn channel_name(self, source: usize, named: &str) -> String {
-        if self == Self::Pictures {
+        if self == Self::Frames {
             return format!("{}/{named}", self.name());
         }
         if source == 0 { self.name().to_owned() } else { format!("/{named}{}", self.name()) }
     }
 
+    /// The names of the channel in files: today's first, then those of earlier commits.
+    fn channel_names(self, source: usize, named: &str) -> impl Iterator<Item = String> {
+        let old = OLD_NAMES.into_iter().filter(move |(topic, _)| *topic == self);
+        std::iter::once(self.channel_name(source, named)).chain(old.map(move |(_, old)| format!("{old}/{named}")))
+    }
+
     /// The topic of a channel with this name, if the channel belongs to the source.
     pub(super) fn of_name(name: &str, source: usize, named: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|t| t.channel_name(source, named) == name)
+        Self::ALL.into_iter().find(|topic| topic.channel_names(source, named).any(|of_topic| of_topic == name))
+    }
+
+    /// The number of messages of the channel, of those of all channels by name.
+    pub(super) fn total(self, totals: &BTreeMap<String, u64>, source: usize, named: &str) -> Option<u64> {
+        self.channel_names(source, named).find_map(|name| totals.get(&name).copied())
     }
 
     /// The topic of a channel with this number in a file of ours, if the channel belongs to the source.

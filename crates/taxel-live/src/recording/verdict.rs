@@ -186,7 +186,7 @@ pub struct Condition {
     pub unknown: bool,
     /// Number of messages that the file holds a second time, as far as they are known.
     pub repeated: u64,
-    /// Number of datagrams, lines or pictures in the file.
+    /// Number of datagrams, lines or frames in the file.
     pub messages: u64,
     /// Arrival numbers that the file lacks between its first and last datagram.
     pub skipped_numbers: u64,
@@ -344,7 +344,7 @@ impl Verdict {
     /// The verdict where times also step back there.
     pub(crate) fn stepped(mut self, steps: Vec<StepBack>) -> Self {
         if !steps.is_empty() {
-            self.change(|own| own.steps_back.extend(steps));
+            self.change(|verdict| verdict.steps_back.extend(steps));
         }
         self
     }
@@ -380,7 +380,7 @@ impl Verdict {
     pub(crate) fn doubtful(mut self, after: Option<i64>) -> Self {
         if after.is_some() {
             self.status = self.status.max(Status::Damaged);
-            self.change(|own| own.doubtful_after_us = own.doubtful_after_us.into_iter().chain(after).min());
+            self.change(|verdict| verdict.doubtful_after_us = verdict.doubtful_after_us.into_iter().chain(after).min());
         }
         self
     }
@@ -453,11 +453,11 @@ impl Verdict {
             let name = if taken(&name) { unique.unwrap_or_default() } else { name };
             named.push((name, part));
         }
-        whole.change(|own| {
+        whole.change(|verdict| {
             // The earliest of those that there are.
-            own.doubtful_after_us = named.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
-            own.steps_back = named.iter().flat_map(|(_, part)| part.steps_back.clone()).collect();
-            own.parts = named;
+            verdict.doubtful_after_us = named.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
+            verdict.steps_back = named.iter().flat_map(|(_, part)| part.steps_back.clone()).collect();
+            verdict.parts = named;
         });
         whole
     }
@@ -465,10 +465,10 @@ impl Verdict {
     /// The verdict on the recording whose times are later by so many us.
     fn later(mut self, us: i64) -> Self {
         if us != 0 && (self.doubtful_after_us.is_some() || !self.steps_back.is_empty()) {
-            self.change(|own| {
-                own.steps_back.iter_mut().for_each(|step| step.after_us = step.after_us.saturating_add(us));
-                own.parts.iter_mut().for_each(|(_, part)| *part = std::mem::take(part).later(us));
-                own.doubtful_after_us = own.doubtful_after_us.map(|after| after.saturating_add(us));
+            self.change(|verdict| {
+                verdict.steps_back.iter_mut().for_each(|step| step.after_us = step.after_us.saturating_add(us));
+                verdict.parts.iter_mut().for_each(|(_, part)| *part = std::mem::take(part).later(us));
+                verdict.doubtful_after_us = verdict.doubtful_after_us.map(|after| after.saturating_add(us));
             });
         }
         self
@@ -476,20 +476,20 @@ impl Verdict {
 
     /// Changes the parts, the steps back and the time after which times are doubtful, and what the text says of them.
     fn change(&mut self, change: impl FnOnce(&mut Self)) {
-        let own = self.text.strip_suffix(&self.end()).unwrap_or(&self.text).trim_end_matches("; ").to_owned();
+        let before = self.text.strip_suffix(&self.end()).unwrap_or(&self.text).trim_end_matches("; ").to_owned();
         change(self);
-        let between = if own.is_empty() || own.ends_with(": ") { "" } else { "; " };
-        self.text = format!("{own}{between}{}", self.end());
+        let between = if before.is_empty() || before.ends_with(": ") { "" } else { "; " };
+        self.text = format!("{before}{between}{}", self.end());
     }
 
     /// What the text ends with: the texts of all parts, and the steps back and the time after which times are doubtful unless a
     /// part says them.
     fn end(&self) -> String {
         let stated = self.parts.iter().filter_map(|(_, part)| part.doubtful_after_us).min();
-        let own = self.doubtful_after_us.filter(|_| self.doubtful_after_us != stated);
+        let doubtful = self.doubtful_after_us.filter(|_| self.doubtful_after_us != stated);
         let parts = self.parts.iter().map(|(name, part)| format!("{name}: {}", part.text));
         let all = self.parts.is_empty() && self.damaged.contains_key(JUMPED_BEFORE);
-        let doubt = own.map(|after| match all {
+        let doubt = doubtful.map(|after| match all {
             true => "all times are doubtful".to_owned(),
             false => format!("times after {after} us are doubtful"),
         });

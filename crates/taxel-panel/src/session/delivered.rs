@@ -1,4 +1,4 @@
-//! What a client has received already, so that a picture contains only what it lacks.
+//! What a client has received already, so that a frame contains only what it lacks.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ const REST_EVERY: Duration = Duration::from_millis(500);
 
 /// See the module.
 pub(super) struct Delivered {
-    /// The next picture replaces all columns of time that the client has.
+    /// The next frame replaces all columns of time that the client has.
     restart: bool,
     /// First column of time that the client lacks.
     from: i64,
@@ -38,7 +38,7 @@ impl Delivered {
         self.restart
     }
 
-    /// First column of time that the next picture contains.
+    /// First column of time that the next frame contains.
     pub(super) fn from(&self) -> i64 {
         if self.restart { i64::MIN } else { self.from }
     }
@@ -48,15 +48,15 @@ impl Delivered {
         self.rest = None;
     }
 
-    /// Whether the next picture contains the rest, of which this is the number. While the view `moves` another picture follows;
+    /// Whether the next frame contains the rest, of which this is the number. While the view `moves` another frame follows;
     /// one that stands may be the last, so it has its own rest.
     pub(super) fn needs_rest(&self, rests: u64, moves: bool) -> bool {
         let due = |at: Instant| !moves || at.elapsed() >= REST_EVERY;
         self.restart || self.rest.is_none_or(|(known, at)| known != rests && due(at))
     }
 
-    /// Notes a picture up to column `last`, of columns of `column_us`; `rests` where it contains the rest.
-    pub(super) fn picture(&mut self, last: i64, column_us: i64, rests: Option<u64>) {
+    /// Notes a frame up to column `last`, of columns of `column_us`; `rests` where it contains the rest.
+    pub(super) fn frame(&mut self, last: i64, column_us: i64, rests: Option<u64>) {
         if let Some(rests) = rests {
             self.rest = Some((rests, Instant::now()));
         }

@@ -7,8 +7,8 @@ use taxel_live::Result;
 use taxel_live::locked::lock;
 
 use crate::encoded_spikes::EncodedSpikes;
+use crate::frame::{self, About};
 use crate::live_source::LiveSource;
-use crate::picture::{self, About};
 use crate::player::{Player, ViewOptions};
 use crate::refusal::{Answer, Refusal};
 use crate::taxel_history::TaxelHistory;
@@ -29,12 +29,12 @@ pub(super) struct Following {
 }
 
 impl Following {
-    /// Drops the history and the narrow columns, which restart with the next picture.
+    /// Drops the history and the narrow columns, which restart with the next frame.
     pub(super) fn restart(&mut self) {
         (self.history, self.narrow) = (None, None);
     }
 
-    /// Drops the history, which restarts with the next picture.
+    /// Drops the history, which restarts with the next frame.
     pub(super) fn restart_history(&mut self) {
         self.history = None;
     }
@@ -82,8 +82,8 @@ impl Following {
         Ok(())
     }
 
-    /// Picture of the shared state, its last column, and the number of its rest where it contains it.
-    pub(super) fn picture(
+    /// Frame of the shared state, its last column, and the number of its rest where it contains it.
+    pub(super) fn frame(
         &mut self,
         live: &LiveSource,
         about: About,
@@ -102,7 +102,7 @@ impl Following {
         let narrow = self.narrow.as_deref_mut();
         // The state may have moved on since the narrow columns were decoded: those in between are sent again.
         let decoded = narrow.as_ref().map_or(i64::MAX, |narrow| column_of(narrow.t(), about.column_us));
-        let (bytes, last) = picture::of_state(&mut state, narrow, columns, history, spikes, about);
+        let (bytes, last) = frame::of_state(&mut state, narrow, columns, history, spikes, about);
         (bytes, last.min(decoded), rests)
     }
 }

@@ -1,4 +1,4 @@
-//! Requests of a client that take long: they are carried out beside the pictures, a bounded number at a time.
+//! Requests of a client that take long: they are carried out beside the frames, a bounded number at a time.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};

@@ -12,6 +12,7 @@ use super::following::Following;
 use super::playback::Playback;
 use crate::encoded_spikes::EncodedSpikes;
 use crate::folder::size;
+use crate::frame::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::hub::Hub;
 use crate::indexed::Shown;
 use crate::keyframe_index::KeyframeIndex;
@@ -19,7 +20,6 @@ use crate::label_requests;
 use crate::live_source::LiveSource;
 use crate::messages::{Message, ViewState};
 use crate::opening;
-use crate::picture::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::player::{Player, ViewOptions};
 use crate::refusal::{Answer, Refusal};
 use crate::request::Taxel;
@@ -53,7 +53,7 @@ pub(super) struct Viewport {
     window_us: Option<i64>,
     following: Following,
     delivered: Delivered,
-    /// A new picture can be shown.
+    /// A new frame can be shown.
     dirty: bool,
     /// Texts for the user that no message has had yet.
     warnings: Vec<String>,
@@ -154,7 +154,7 @@ impl Viewport {
         }
     }
 
-    // ------------------------------------------------------------------------------------------ pictures
+    // ------------------------------------------------------------------------------------------ frames
 
     /// Moves a playing view on; returns whether it has arrived to the end of its recording.
     pub(super) async fn play_on(&mut self) -> bool {
@@ -193,8 +193,8 @@ impl Viewport {
         }
     }
 
-    /// The next picture; `None` where there is nothing to show.
-    pub(super) fn picture(&mut self, flags: u16, number: u32) -> Option<Vec<u8>> {
+    /// The next frame; `None` where there is nothing to show.
+    pub(super) fn frame(&mut self, flags: u16, number: u32) -> Option<Vec<u8>> {
         if let (Position::Following, Some(live)) = (&self.position, &self.live) {
             self.delivered.note_source_restarts(lock(&live.state).restarts());
         }
@@ -215,16 +215,16 @@ impl Viewport {
         };
         let needs_rest = |rests: u64| self.delivered.needs_rest(rests, moves != 0);
         let (bytes, last, rests) = match &mut self.position {
-            Position::Following => self.following.picture(self.live.as_ref()?, about, needs_rest),
+            Position::Following => self.following.frame(self.live.as_ref()?, about, needs_rest),
             Position::At(place) => {
                 let Place { player, window } = &mut **place.as_mut()?;
                 let rests = Some(player.state().rests()).filter(|rests| needs_rest(*rests));
                 let about = About { with_rest: rests.is_some(), ..about };
-                let (bytes, last) = picture::of_player(player, window.as_mut(), about);
+                let (bytes, last) = frame::of_player(player, window.as_mut(), about);
                 (bytes, last, rests)
             }
         };
-        self.delivered.picture(last, self.options.column_us, rests);
+        self.delivered.frame(last, self.options.column_us, rests);
         Some(bytes)
     }
 
@@ -313,7 +313,7 @@ impl Viewport {
         Ok(())
     }
 
-    /// The next picture shows everything anew.
+    /// The next frame shows everything anew.
     fn restart(&mut self) {
         self.dirty = true;
         self.delivered.invalidate();
@@ -512,8 +512,8 @@ impl Viewport {
 
 /// Refuses an encoder that does not encode what an index holds.
 fn encodes(index: &Arc<dyn KeyframeIndex>, encoder: &Encoder) -> taxel_live::Result<()> {
-    match index.pictures() {
-        Some(pictures) => EncodedSpikes::of_pictures(encoder, &pictures, COLUMN_US, None)?.check(),
+    match index.frames() {
+        Some(frames) => EncodedSpikes::of_frames(encoder, &frames, COLUMN_US, None)?.check(),
         None => Ok(encoder.stream(index.array()).map(drop)?),
     }
 }

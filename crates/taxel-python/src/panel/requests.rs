@@ -13,10 +13,10 @@ use taxel_core::rest::Value;
 use taxel_core::wire::Command;
 use taxel_live::recording::{Note, Remarks};
 use taxel_panel::{
-    Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, LabelConflict, LabelEdit,
-    LabelRequests, LabelRow, LabelTable, Opening, PictureFile, PictureIndex, PicturePlace, PictureRest, PictureSource,
-    PicturesRead, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers, RestSource, TrainingRequests,
-    TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
+    Activity, BoardLines, BoardRequests, Cut, Detected, EditOutcome, FileRequests, FrameFile, FrameIndex, FramePlace,
+    FrameRest, FrameSource, FramesRead, LabelConflict, LabelEdit, LabelRequests, LabelRow, LabelTable, Opening,
+    PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers, RestSource, TrainingRequests, TrainingResult,
+    UnhealthyTaxels, UserPreset, UserPresets,
 };
 
 use crate::convert::{ArrayParts, array, from_array, slice, to_array};
@@ -107,21 +107,19 @@ impl FileRequests for PythonHandler {
     fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile> {
         let whole = opening == Opening::Whole;
         self.call(|handler| {
-            let (events, pictures): (Option<PathBuf>, Option<PicturesIn<'_>>) =
+            let (events, frames): (Option<PathBuf>, Option<ReadFramesIn<'_>>) =
                 handler.call_method1("read", (path, trial, whole))?.extract()?;
-            match (events, pictures) {
-                (_, Some(pictures)) => {
-                    Ok(ReadFile::Pictures(PicturesRead(Box::new(to_index(handler.py(), pictures)?))))
-                }
+            match (events, frames) {
+                (_, Some(frames)) => Ok(ReadFile::Frames(FramesRead(Box::new(to_index(handler.py(), frames)?)))),
                 (Some(path), None) => Ok(ReadFile::Events(path)),
-                (None, None) => Err(ProblemError::new_err("read: neither events nor pictures")),
+                (None, None) => Err(ProblemError::new_err("read: neither events nor frames")),
             }
         })
     }
 
-    fn health_of_pictures(&self, path: &Path, trial: Option<&str>) -> Reply<UnhealthyTaxels> {
+    fn health_of_frames(&self, path: &Path, trial: Option<&str>) -> Reply<UnhealthyTaxels> {
         let (dead, stuck, noisy, untested) =
-            self.call(|handler| handler.call_method1("health_of_pictures", (path, trial))?.extract())?;
+            self.call(|handler| handler.call_method1("health_of_frames", (path, trial))?.extract())?;
         Ok(UnhealthyTaxels { dead, stuck, noisy, untested })
     }
 
@@ -257,24 +255,24 @@ fn to_table((rows, (missing, returned, new)): TableParts) -> LabelTable {
     }
 }
 
-/// A source of pictures: name, first column, rows, columns, times (us), values, rest.
+/// A source of frames: name, first column, rows, columns, times (us), values, rest.
 type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>, RestIn<'py>);
 
 /// The rest of a source: where it is known from, that of each cell (NaN where unknown), ticks by the unit, whether values
 /// fall from it, the cells that flicker, and where something lay then (for people).
 type RestIn<'py> = (String, PyReadonlyArray1<'py, f64>, f64, f64, bool, Vec<usize>, String);
 
-/// Pictures as Python has read them: the array of all sources, the sources; unit, time from one picture to the next if they
+/// Frames as Python has read them: the array of all sources, the sources; unit, time from one frame to the next if they
 /// are numbered (us), notes (time, text, source) and detections (label, time, known) as JSON, the verdict, the trial and all
 /// trials of the file, how long the rest of the file takes (s).
-type PicturesIn<'py> =
+type ReadFramesIn<'py> =
     (ArrayParts, Vec<SourceIn<'py>>, String, Option<i64>, String, String, Option<String>, Vec<String>, Option<f64>);
 
-/// Notes (time, text, source) and detections (label, time, known) of pictures.
+/// Notes (time, text, source) and detections (label, time, known) of frames.
 type RemarksIn = (Vec<(Option<i64>, String, String)>, Vec<(String, i64, i64)>);
 
-fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> {
-    let (array, sources, unit, picture_us, remarks, verdict, trial, trials, left_s) = pictures;
+fn to_index(py: Python<'_>, frames: ReadFramesIn<'_>) -> PyResult<FrameIndex> {
+    let (array, sources, unit, number_us, remarks, verdict, trial, trials, left_s) = frames;
     let array = to_array(array)?;
     let (notes, detections): RemarksIn = parsed("remarks", &remarks)?;
     let (notes, note_sources) =
@@ -287,7 +285,7 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
             .collect(),
         ..Remarks::default()
     };
-    let file = PictureFile { unit, picture_us, remarks, note_sources, verdict, trial, trials, left_s };
+    let file = FrameFile { unit, number_us, remarks, note_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
     for (
         name,
@@ -307,7 +305,7 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
             return Err(ProblemError::new_err(format!("source {name}: does not fit the array")));
         }
         let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
-        let rest = PictureRest {
+        let rest = FrameRest {
             source: RestSource::named(rest)
                 .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {rest:?} is none")))?,
             values: rests.iter().map(known).collect(),
@@ -317,10 +315,10 @@ fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> 
             flickering: flickering.clone(),
             preload_at: preload_at.clone(),
         };
-        let place = PicturePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
-        placed.push(PictureSource { place, t: t.to_vec(), values, rest });
+        let place = FramePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
+        placed.push(FrameSource { place, t: t.to_vec(), values, rest });
     }
-    enter(py, |_| Ok::<_, taxel_core::Error>(PictureIndex::new(array, file, placed)))
+    enter(py, |_| Ok::<_, taxel_core::Error>(FrameIndex::new(array, file, placed)))
 }
 
 /// A value of a preset, as a table in TOML has it.

@@ -16,8 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import path as checked_path
-from taxel._base.arguments import shown, text
+from taxel._base.arguments import checked_path, shown, text
 from taxel._base.documents import read_json, read_toml
 from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
@@ -93,7 +92,7 @@ def chosen(source: Events | Frames, labels: Sequence[str] = ()) -> tuple[str, st
     many = array.taxels > _MOST_CHANNELS
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
         if unit in of:
-            return of[unit], f"pictures in {source.unit}"
+            return of[unit], f"frames in {source.unit}"
     if grids is not None and many and not known:
         # The levels of `_ANY`, 22 trains a taxel, take minutes.
         return grids, what
@@ -151,12 +150,12 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     rest = values.get("other")
     if rest is not None and not isinstance(rest, Mapping):
         rest = listed[text("recipe: other", rest, listed)]
-    owns = {label: _own(values, text("label", label)) for label in labels}
+    named = {label: _own(values, text("label", label)) for label in labels}
     last = {label: _own(values, _plain(label).rpartition("_")[2]) for label in labels}
     neurons = {}
     for label in labels:
-        alone = sum(last[label] in (owns[kind], last[kind]) for kind in labels) == 1
-        neuron = listed.get(label, listed.get(owns[label] or (last[label] if alone else None), rest))
+        alone = sum(last[label] in (named[kind], last[kind]) for kind in labels) == 1
+        neuron = listed.get(label, listed.get(named[label] or (last[label] if alone else None), rest))
         if neuron is None:
             raise ProblemError(
                 f"recipe: it is for {' and '.join(listed)}, not for {shown(label)}: leave that label out, or choose "

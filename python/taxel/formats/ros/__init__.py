@@ -1,4 +1,4 @@
-"""ROS bags: which topics hold numbers, and the pictures of chosen ones; by the library rosbags, without ROS.
+"""ROS bags: which topics hold numbers, and the frames of chosen ones; by the library rosbags, without ROS.
 
 A bag is a ``.bag`` of ROS 1, a ``.db3`` or ``.mcap`` of ROS 2, or a folder with ``metadata.yaml`` and its files.
 """

@@ -1,4 +1,4 @@
-"""Numbers in a message: found by the path of a field, and as the pictures of an image."""
+"""Numbers in a message: found by the path of a field, and as the frames of an image."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of chosen topics of a ROS bag, with the times of their messages.
+"""Frames of chosen topics of a ROS bag, with the times of their messages.
 
 One odd message does not decide for all: most of them say which length is read, and whether stamps count.
 """
@@ -56,7 +56,7 @@ class Chosen:
 
 @dataclass(frozen=True, eq=False)
 class Read:
-    """Hold the pictures of a field.
+    """Hold the frames of a field.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Read:
 
 
 def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: str | None = None) -> list[Read]:
-    """Return the pictures of each chosen field, from one pass through the bag.
+    """Return the frames of each chosen field, from one pass through the bag.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ class _Held:
             return np.empty(0)
 
     def read(self, kind: str, unread: tuple[str, ...]) -> Read:
-        """Return the pictures of the messages."""
+        """Return the frames of the messages."""
         if not self.values:
             raise FormatError(f"{self.place}: holds no message")
         if self.trouble and not any(value.size for value in self.values):
@@ -205,7 +205,7 @@ class _Held:
         bag = np.array(self.bag_ns, np.int64)[fits]
         stamps = [stamp for stamp, fit in zip(self.stamps_ns, fits, strict=True) if fit]
         order = np.argsort(bag, kind="stable")  # files of a bag may overlap
-        bag, pictures = bag[order], self._pictures(np.flatnonzero(fits)[order], array)
+        bag, frames = bag[order], self._frames(np.flatnonzero(fits)[order], array)
         has_stamps = None not in stamps
         t, by_the_bag = _times(np.array(stamps, np.int64)[order], bag) if has_stamps else (bag, 0)
         if np.abs(t).max() // 1000 > TIME_US:
@@ -215,7 +215,7 @@ class _Held:
             self.field or "",
             kind,
             array,
-            pictures,
+            frames,
             "counts" if all(is_whole for is_whole, fit in zip(self.are_whole, fits, strict=True) if fit) else "as sent",
             t // 1000,
             has_stamps,
@@ -224,8 +224,8 @@ class _Held:
             unread,
         )
 
-    def _pictures(self, chosen: NDArray[np.int64], array: Array) -> NDArray[np.float32]:
-        """Return the numbers of messages as pictures; those that are read in their order are moved, not copied."""
+    def _frames(self, chosen: NDArray[np.int64], array: Array) -> NDArray[np.float32]:
+        """Return the numbers of messages as frames; those that are read in their order are moved, not copied."""
         begins = np.concatenate([[0], np.cumsum([value.size for value in self.values])])
         numbers, size = self.numbers.column("numbers"), array.rows * array.columns
         if (np.diff(chosen) > 0).all():
@@ -255,7 +255,7 @@ class _Held:
 
 
 def _fits(numbers: _Shape, array: Array) -> bool:
-    """Return whether a message's numbers are a picture of an array: as many, and an image of its rows and columns."""
+    """Return whether a message's numbers are a frame of an array: as many, and an image of its rows and columns."""
     return numbers.shape == array.shape if numbers.ndim == 2 else numbers.size == array.rows * array.columns
 
 

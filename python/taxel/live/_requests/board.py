@@ -15,8 +15,6 @@ from taxel.device import Cable
 from taxel.live._requests.reasons import reasons
 from taxel.wire import Command
 
-__all__ = ["BoardRequests"]
-
 #: SIOCGIFADDR of Linux (netdevice(7)).
 _ADDRESS_OF = 0x8915
 

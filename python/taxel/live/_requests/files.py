@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel.array import Array
 from taxel.live._requests.reasons import reasons
-from taxel.live._shown_files import Opening, ReadPictures, ShownFiles
+from taxel.live._shown_files import Opening, ReadFrames, ShownFiles
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.health import TaxelStatistics, Touches, judged
-
-__all__ = ["FileRequests"]
 
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
@@ -68,7 +66,7 @@ class FileRequests:
         with reasons():
             return [file.name for file in folder.iterdir() if self._opening.is_recording(file)]
 
-    def read(self, path: Path, trial: str | None, whole: bool) -> tuple[Path | None, ReadPictures | None]:
+    def read(self, path: Path, trial: str | None, whole: bool) -> tuple[Path | None, ReadFrames | None]:
         """Read a recording that is no file of a board's events.
 
         Parameters
@@ -84,13 +82,13 @@ class FileRequests:
         path or None
             Of events, a .mcap that holds them, until the panel ends.
         tuple or None
-            Pictures, as the compiled part reads them.
+            Frames, as the compiled part reads them.
         """
         with reasons():
             return self._files.read(path, trial, whole=whole)
 
-    def health_of_pictures(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
-        """Return the taxels of a recording of pictures that are dead, stuck, noisy, and how many cannot be judged."""
+    def health_of_frames(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
+        """Return the taxels of a recording of frames that are dead, stuck, noisy, and how many cannot be judged."""
         with reasons():
             return self._files.health(path, trial)
 

@@ -11,8 +11,6 @@ from taxel.live._label_table import LabelTables, TableRead
 from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening
 
-__all__ = ["LabelRequests"]
-
 #: A label, its time (us), source and trial ("": all), the time of the note that it replaces, and that by the host (ns);
 #: "" removes that note.
 _LabelRow = tuple[str, int, str, str, int | None, int | None]

@@ -12,8 +12,6 @@ from taxel._base.documents import read_toml
 from taxel._base.files import whole_file
 from taxel.live._requests.reasons import reasons
 
-__all__ = ["PresetRequests"]
-
 
 def _path() -> Path:
     """Return the file of the user's own presets: taxel/presets.toml in the folder of user settings."""

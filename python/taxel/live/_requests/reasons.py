@@ -7,8 +7,6 @@ from collections.abc import Iterator
 
 from taxel._core import ProblemError
 
-__all__ = ["reasons"]
-
 
 @contextlib.contextmanager
 def reasons() -> Iterator[None]:

@@ -18,8 +18,6 @@ from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.tasks import detect
 
-__all__ = ["TrainingRequests"]
-
 #: Code with which a task ends that was stopped.
 _INTERRUPTED = 130
 

@@ -114,11 +114,11 @@ impl Influence<'_> {
 
 wide! {
     fn turn(grid: Influence<'_>, cells: &[Cell], runs: &[Run], wanted: &[f64], pressure: &mut [f64], pushed: &mut [f64]) -> (f64, f64) {
-        let own = grid.table[grid.table.len() / 2];
+        let self_influence = grid.table[grid.table.len() / 2];
         let (mut moved, mut largest) = (0.0_f64, 0.0_f64);
         for k in 0..cells.len() {
             let before = pressure[k];
-            let after = (before - RELAXATION * (pushed[k] - wanted[k]) / own).max(0.0);
+            let after = (before - RELAXATION * (pushed[k] - wanted[k]) / self_influence).max(0.0);
             if after != before {
                 pressure[k] = after;
                 grid.push(pushed, runs, cells[k], after - before);

@@ -8,7 +8,7 @@ use crate::detect::TrainedNeuron;
 use crate::neuron::{AfterSpike, Neuron, Time};
 use crate::{Events, Intensities, SpikeKind};
 
-/// An encoder that turns each event into a signed spike of its taxel's train at its stamp, and a picture into a spike
+/// An encoder that turns each event into a signed spike of its taxel's train at its stamp, and a frame into a spike
 /// of each loaded taxel.
 #[derive(Clone)]
 struct Plain {
@@ -197,7 +197,7 @@ fn a_late_event_counts_as_coming_now() {
 }
 
 #[test]
-fn pictures_are_known_at_the_end_of_their_own_frames() {
+fn a_detection_in_a_frame_of_the_input_is_known_at_its_end() {
     let neuron = Neuron { tau: 2.0, ..Neuron::default() };
     let (mut t, mut values) = (vec![], vec![]);
     for k in 0..200 {

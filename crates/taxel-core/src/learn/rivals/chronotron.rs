@@ -30,7 +30,7 @@ pub struct ILearning {}
 /// The defaults of its source, and of public code where the source could not be read.
 pub(super) const SOURCE: Source = Source {
     name: "chronotron",
-    own: &["rule", "tau_q", "gamma_r"],
+    of_rule: &["rule", "tau_q", "gamma_r"],
     ranges: &[ELearning::RANGES],
     defaults: || json!({ "tau": 15.0, "tau_s": null, "after_spike": null, "tau_q": null, "gamma_r": null }),
     arrange: |given| {

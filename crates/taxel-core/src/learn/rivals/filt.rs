@@ -23,7 +23,7 @@ pub struct Filt {
 /// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "filt",
-    own: &["tau_q"],
+    of_rule: &["tau_q"],
     ranges: &[Filt::RANGES],
     defaults: || {
         json!({

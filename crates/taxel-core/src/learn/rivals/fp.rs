@@ -23,7 +23,7 @@ pub struct Fp {
 /// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "fp",
-    own: &["window_ms"],
+    of_rule: &["window_ms"],
     ranges: &[Fp::RANGES],
     defaults: || json!({ "after_spike": "reset" }),
     arrange: |_| Ok(()),

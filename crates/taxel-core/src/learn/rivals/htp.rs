@@ -25,7 +25,7 @@ pub struct Htp {
 /// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "htp",
-    own: &["window_ms"],
+    of_rule: &["window_ms"],
     ranges: &[Htp::RANGES],
     defaults: || json!({ "after_spike": "reset" }),
     arrange: |_| Ok(()),

@@ -16,7 +16,7 @@ pub struct Inst {}
 /// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "inst",
-    own: &[],
+    of_rule: &[],
     ranges: &[],
     defaults: || {
         json!({

@@ -23,7 +23,7 @@ pub struct Psd {
 /// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "psd",
-    own: &["tau_1", "tau_2"],
+    of_rule: &["tau_1", "tau_2"],
     ranges: &[Psd::RANGES],
     defaults: || {
         json!({

@@ -24,7 +24,7 @@ pub struct Resume {
 /// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "resume",
-    own: &["a", "amplitude", "tau_w"],
+    of_rule: &["a", "amplitude", "tau_w"],
     ranges: &[Resume::RANGES],
     defaults: || json!({ "after_spike": "membrane", "a": 0.0, "amplitude": 1.0, "tau_w": null }),
     arrange: |_| Ok(()),

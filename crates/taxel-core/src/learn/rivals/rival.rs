@@ -46,7 +46,7 @@ impl Source {
                 given.extend(defaults);
             }
         }
-        let names = NEURON.iter().chain(&TRAINING).chain(self.own);
+        let names = NEURON.iter().chain(&TRAINING).chain(self.of_rule);
         let required = names.copied().filter(|name| !given.contains_key(*name)).collect();
         (given, required)
     }
@@ -94,7 +94,7 @@ impl Rival {
         let take = |all: &Map<String, Value>, names: &[&str]| -> Value {
             names.iter().filter_map(|name| all.get(*name).map(|value| ((*name).to_owned(), value.clone()))).collect()
         };
-        let rule = all.remove("constants").unwrap_or_else(|| json!({ name: take(&all, source.own) }));
+        let rule = all.remove("constants").unwrap_or_else(|| json!({ name: take(&all, source.of_rule) }));
         let current = all.remove("current").unwrap_or_else(|| json!({ "exponential": take(&all, &["tau_s"]) }));
         let mut neuron = take(&all, &["tau", "theta_0", "after_spike", "step_ms"]);
         neuron["refractory"] = all.remove("refractory").unwrap_or(json!(0.0));

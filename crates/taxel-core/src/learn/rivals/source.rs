@@ -10,7 +10,7 @@ pub struct Source {
     /// The name of the rule.
     pub(super) name: &'static str,
     /// The parameters that are the rule's own.
-    pub(super) own: &'static [&'static str],
+    pub(super) of_rule: &'static [&'static str],
     /// Their ranges.
     pub(super) ranges: &'static [&'static [Parameter]],
     /// The published defaults; a parameter without a default here or among those of all rules is required.

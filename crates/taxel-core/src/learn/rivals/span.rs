@@ -22,7 +22,7 @@ pub struct Span {
 /// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "span",
-    own: &["tau_a"],
+    of_rule: &["tau_a"],
     ranges: &[Span::RANGES],
     defaults: || json!({ "after_spike": "membrane" }),
     arrange: |_| Ok(()),

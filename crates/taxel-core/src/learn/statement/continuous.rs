@@ -65,7 +65,7 @@ impl SilentTimes {
     /// by more than `tolerance`.
     pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
         let mut found = Vec::new();
-        let one = self.shape.input();
+        let unit = self.shape.input();
         for (pattern, strip) in self.strips.iter().enumerate() {
             let (mut state, mut next) = (KernelSum::default(), 0);
             let mut worst: Option<Peak> = None;
@@ -75,8 +75,8 @@ impl SilentTimes {
                 next = node.inputs as usize;
                 if !inputs.is_empty() {
                     let sum: f64 = inputs.iter().map(|i| weights[i.train as usize] * f64::from(i.value)).sum();
-                    state.a += sum * one.a;
-                    state.b += sum * one.b;
+                    state.a += sum * unit.a;
+                    state.b += sum * unit.b;
                 }
                 let bound = positive(state.b) + positive(state.a) * node.reach;
                 if bound - node.least <= tolerance {

@@ -136,9 +136,9 @@ impl SilentRows {
             let acts_at = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
             if acts_at < points as f64 && !lost(neuron, targets, t, grid.time(acts_at)) {
                 let age = grid.between(place, GridTime::at(acts_at)).max(0.0);
-                let mut one = KernelSum::default();
-                self.shape.add(&mut one, 1.0, f64::from(value), age);
-                inputs.push(GridInput { point: acts_at as u32, train, a: one.a, b: one.b });
+                let mut unit = KernelSum::default();
+                self.shape.add(&mut unit, 1.0, f64::from(value), age);
+                inputs.push(GridInput { point: acts_at as u32, train, a: unit.a, b: unit.b });
             }
         }
         inputs.sort_by_key(|i| i.point);

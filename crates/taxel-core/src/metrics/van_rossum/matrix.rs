@@ -89,8 +89,8 @@ impl Train {
     /// squares that their difference has lost its digits.
     #[inline]
     fn far(&self, other: &Self) -> Option<f64> {
-        let own = self.square + other.square;
-        let square = own - 2.0 * self.entries.product(&self.sums, &other.queries);
-        (square > NEAR * own).then_some(square)
+        let squares = self.square + other.square;
+        let square = squares - 2.0 * self.entries.product(&self.sums, &other.queries);
+        (square > NEAR * squares).then_some(square)
     }
 }

@@ -35,7 +35,7 @@ struct Input {
     train: u32,
     t: f64,
     /// The state that the input, with a weight of 1, has reached at the point.
-    one: KernelSum,
+    unit_state: KernelSum,
 }
 
 impl Lanes {
@@ -55,31 +55,31 @@ impl Lanes {
         let receives = now.map(|now| self.receives(now));
         for input in inputs {
             let weights = &block[input.train as usize];
-            let one = input.one;
+            let unit_state = input.unit_state;
             match (loses_none, &receives) {
-                (true, _) if one.b == 0.0 => {
+                (true, _) if unit_state.b == 0.0 => {
                     for l in 0..LANES {
-                        a[l] += weights[l].into() * one.a;
+                        a[l] += weights[l].into() * unit_state.a;
                     }
                 }
                 (true, _) => {
                     for l in 0..LANES {
                         let w: f64 = weights[l].into();
-                        a[l] += w * one.a;
-                        b[l] += w * one.b;
+                        a[l] += w * unit_state.a;
+                        b[l] += w * unit_state.b;
                     }
                 }
-                (false, Some(receives)) if one.b == 0.0 => {
+                (false, Some(receives)) if unit_state.b == 0.0 => {
                     for l in 0..LANES {
-                        a[l] += weights[l].into() * one.a * receives[l];
+                        a[l] += weights[l].into() * unit_state.a * receives[l];
                     }
                 }
                 (false, receives) => {
                     let receives = receives.unwrap_or_else(|| self.receives(input.t));
                     for l in 0..LANES {
                         let w = weights[l].into() * receives[l];
-                        a[l] += w * one.a;
-                        b[l] += w * one.b;
+                        a[l] += w * unit_state.a;
+                        b[l] += w * unit_state.b;
                     }
                 }
             }
@@ -104,10 +104,10 @@ impl Script {
             let mut arriving = vec![];
             while let Some(spike) = rest.next_if(|s| grid.place(s.t).from() <= point) {
                 let age = grid.between(grid.place(spike.t), GridTime::at(point));
-                let mut one = KernelSum::default();
-                shape.add(&mut one, 1.0, f64::from(spike.value), age.max(0.0));
+                let mut unit_state = KernelSum::default();
+                shape.add(&mut unit_state, 1.0, f64::from(spike.value), age.max(0.0));
                 let to = if age > 0.0 { &mut inputs } else { &mut arriving };
-                to.push(Input { train: spike.train, t: spike.t, one });
+                to.push(Input { train: spike.train, t: spike.t, unit_state });
             }
             let aged_end = inputs.len();
             inputs.append(&mut arriving);

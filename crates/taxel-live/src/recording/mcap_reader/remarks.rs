@@ -41,8 +41,6 @@ pub struct Remarks {
     pub sum: u32,
     /// Number of messages of each channel.
     pub messages: BTreeMap<Topic, u64>,
-    /// Number of pictures.
-    pub pictures: u64,
     /// Resets of the board, and changes of its version of the wire.
     pub board: Vec<BoardChange>,
     /// Number of lines of a stream.
@@ -103,7 +101,7 @@ impl Numbers {
 }
 
 impl Remarks {
-    /// Adds a message; datagrams and pictures are only counted.
+    /// Adds a message; datagrams and frames are only counted.
     pub fn add(&mut self, message: &Message<'_>) {
         *self.messages.entry(message.topic).or_default() += 1;
         if message.topic.is_data() {
@@ -117,7 +115,7 @@ impl Remarks {
                 self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
                 self.numbers.add(message.number);
             }
-            Topic::Pressure | Topic::Pictures => self.pictures += 1,
+            Topic::Pressure | Topic::Frames => {}
             // The checksum of a message that does not parse is valid, so another program wrote the message; it is
             // ignored.
             Topic::Registers => {

@@ -63,14 +63,14 @@ impl ChunkWriter {
                     Some((name, encoding, text)) => writer.mcap.add_schema(name, encoding, text)?,
                 };
                 // The header is stored a second time in a channel record, which a chunk's checksum protects.
-                let first = k == 0 && matches!(topic, Topic::Datagrams | Topic::Pictures);
+                let first = k == 0 && matches!(topic, Topic::Datagrams | Topic::Frames);
                 let mut more = if first { opening.clone() } else { BTreeMap::new() };
-                if let Some(pictures) = source.pictures.as_ref().filter(|_| topic == Topic::Pictures) {
+                if let Some(frames) = source.frames.as_ref().filter(|_| topic == Topic::Frames) {
                     let about = [
-                        ("unit", pictures.unit.clone()),
+                        ("unit", frames.unit.clone()),
                         ("array", json!(source.array).to_string()),
                         ("source", source.name.clone()),
-                        ("clock", pictures.clock.to_string()),
+                        ("clock", frames.clock.to_string()),
                     ];
                     more.extend(about.map(|(key, value)| (key.to_owned(), value)));
                 }

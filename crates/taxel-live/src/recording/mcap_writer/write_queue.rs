@@ -72,7 +72,7 @@ pub(super) struct Pending {
 /// What was written of a source.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Written {
-    /// Number of datagrams, lines and pictures.
+    /// Number of datagrams, lines and frames.
     pub(super) data: u64,
     /// Arrival number of the first of them.
     first: Option<u64>,

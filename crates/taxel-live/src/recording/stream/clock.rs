@@ -103,10 +103,10 @@ enum Step {
 impl State {
     /// How a stamp, us, follows.
     #[allow(clippy::cast_precision_loss)]
-    fn step(&self, own: f64, at_ns: i64, unit_us: f64) -> Step {
+    fn step(&self, stamp_us: f64, at_ns: i64, unit_us: f64) -> Step {
         let Some((last, last_ns)) = self.last else { return Step::Fits(0.0) };
         let passed = at_ns.saturating_sub(last_ns) as f64 * 1e-3;
-        let t = own + self.added;
+        let t = stamp_us + self.added;
         let lacks = passed - (t - last);
         let turn = TURN * unit_us;
         let turns = (lacks / turn).round();
@@ -126,8 +126,8 @@ impl State {
     }
 
     /// Whether a stamp follows as if the one between were damaged.
-    fn fits(&self, own: f64, at_ns: i64, unit_us: f64) -> bool {
-        self.last.is_some() && matches!(self.step(own, at_ns, unit_us), Step::Fits(_))
+    fn fits(&self, stamp_us: f64, at_ns: i64, unit_us: f64) -> bool {
+        self.last.is_some() && matches!(self.step(stamp_us, at_ns, unit_us), Step::Fits(_))
     }
 }
 
@@ -141,22 +141,22 @@ impl StreamClock {
     /// Converts a stamp to a time, us; none if it is no time.
     #[allow(clippy::cast_possible_truncation)]
     pub fn time(&mut self, stamp: f64, at_ns: i64) -> Option<i64> {
-        let own = stamp * self.unit_us;
-        if own.is_nan() || own.abs() > FARTHEST_US {
+        let stamp_us = stamp * self.unit_us;
+        if stamp_us.is_nan() || stamp_us.abs() > FARTHEST_US {
             return None;
         }
-        let mut step = self.state.step(own, at_ns, self.unit_us);
+        let mut step = self.state.step(stamp_us, at_ns, self.unit_us);
         let unlike = !matches!(step, Step::Fits(turns) if turns == 0.0);
         if let Some((state, anew)) = self.before.take()
             && unlike
-            && state.fits(own, at_ns, self.unit_us)
+            && state.fits(stamp_us, at_ns, self.unit_us)
         {
             // The stamp between was damaged, whatever it looked like.
             if anew {
                 self.resets -= 1;
                 self.jumped(state.last);
             }
-            step = state.step(own, at_ns, self.unit_us);
+            step = state.step(stamp_us, at_ns, self.unit_us);
             self.state = state;
         }
         let state = self.state;
@@ -165,7 +165,7 @@ impl StreamClock {
             Step::Fits(turns) => self.state.added += turns,
             Step::Back => {
                 self.back += 1;
-                self.doubt(own + state.added - 1.0);
+                self.doubt(stamp_us + state.added - 1.0);
             }
             Step::Anew(lacks) => {
                 self.before = Some((state, true));
@@ -178,7 +178,7 @@ impl StreamClock {
             }
         }
         self.state.whole &= stamp.fract() == 0.0 && (0.0..TURN).contains(&stamp);
-        let t = own + self.state.added;
+        let t = stamp_us + self.state.added;
         self.compare(state.last, (t, at_ns), anew);
         self.state.last = Some((t, at_ns));
         Some(t.round() as i64)

@@ -7,7 +7,7 @@ use taxel_core::wire::{Command, Registers};
 
 use super::*;
 use crate::encoded_spikes::EncodedSpikes;
-use crate::picture::{About, of_player};
+use crate::frame::{About, of_player};
 use crate::player::{Player, ViewOptions};
 use crate::time_columns::SPAN;
 use taxel_live::recording::{Writer, WriterOptions};
@@ -90,7 +90,7 @@ fn decode_all(index: &Arc<RecordingIndex>) -> Vec<Change> {
     changes
 }
 
-/// Raster and curves of a picture, and of which columns they are.
+/// Raster and curves of a frame, and of which columns they are.
 fn shown(player: &mut Player, us: i64) -> (std::ops::Range<i64>, Vec<u8>, Vec<u8>) {
     let about = About { flags: 0, number: 0, from: i64::MIN, with_rest: false, watched: Some(WATCHED), column_us: us };
     let (bytes, _) = of_player(player, None, about);

@@ -51,18 +51,18 @@ impl DualActiveSet {
             let block: Vec<usize> = block.iter().copied().filter(|&slot| self.place[slot].is_none()).collect();
             let stride = self.factor.padded();
             let mut g = vec![0.0; stride * block.len()];
-            let mut own = vec![0.0; block.len() * block.len()];
+            let mut inner_products = vec![0.0; block.len() * block.len()];
             for (k, &slot) in block.iter().enumerate() {
                 let row = &self.gram[slot * self.gram_stride..][..self.gram_stride];
                 for (value, &slot) in g[k * stride..].iter_mut().zip(&self.active) {
                     *value = row[slot];
                 }
-                for (value, &slot) in own[k * block.len()..].iter_mut().zip(&block) {
+                for (value, &slot) in inner_products[k * block.len()..].iter_mut().zip(&block) {
                     *value = row[slot];
                 }
             }
             let limits: Vec<f64> = block.iter().map(|&slot| self.rows[slot].limit).collect();
-            for k in self.factor.append(&mut g, stride, &mut own, &limits, DOUBTFUL, self.lower.len()) {
+            for k in self.factor.append(&mut g, stride, &mut inner_products, &limits, DOUBTFUL, self.lower.len()) {
                 self.place[block[k]] = Some(self.active.len());
                 self.active.push(block[k]);
             }

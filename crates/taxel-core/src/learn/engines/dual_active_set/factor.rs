@@ -65,13 +65,13 @@ impl Factor {
     /// Appends rows, except those whose squared pivot is at most `least`, up to `most` rows in all; returns which were
     /// appended.
     ///
-    /// `g` has a column of `stride` numbers for each new row: its products with the rows in the factor, then 0. `own`
+    /// `g` has a column of `stride` numbers for each new row: its products with the rows in the factor, then 0. `inner_products`
     /// has the products of the new rows with each other.
     pub(super) fn append(
         &mut self,
         g: &mut [f64],
         stride: usize,
-        own: &mut [f64],
+        inner_products: &mut [f64],
         limits: &[f64],
         least: f64,
         most: usize,
@@ -83,8 +83,8 @@ impl Factor {
             forward_many(&self.l, self.stride, &self.inverse, m, g, stride);
             let mut products_of_d = vec![0.0; rows * rows];
             products(g, g, stride, &mut products_of_d, rows);
-            for (own, d) in own.iter_mut().zip(&products_of_d) {
-                *own -= d;
+            for (product, d) in inner_products.iter_mut().zip(&products_of_d) {
+                *product -= d;
             }
             for (limit, d) in limits.iter_mut().zip(g.chunks_exact(stride)) {
                 *limit -= dot(&d[..m], &self.limits);
@@ -92,17 +92,17 @@ impl Factor {
         }
         let mut taken: Vec<usize> = Vec::with_capacity(rows);
         for k in 0..rows {
-            let pivot = own[k * rows + k];
+            let pivot = inner_products[k * rows + k];
             if pivot <= least || self.len() >= most {
                 continue;
             }
             let pivot = pivot.sqrt();
-            own[k * rows + k] = pivot;
+            inner_products[k * rows + k] = pivot;
             let limit = limits[k] / pivot;
             self.inverse.push(1.0 / pivot);
             self.limits.push(limit);
             taken.push(k);
-            let (before, after) = own.split_at_mut((k + 1) * rows);
+            let (before, after) = inner_products.split_at_mut((k + 1) * rows);
             let column = &mut before[k * rows + k + 1..];
             for d in &mut *column {
                 *d /= pivot;
@@ -124,7 +124,7 @@ impl Factor {
         }
         for (j, (column, &other)) in self.l.chunks_exact_mut(self.stride).skip(m).zip(&taken).enumerate() {
             for (to, &k) in column[m + j..width].iter_mut().zip(&taken[j..]) {
-                *to = own[other * rows + k];
+                *to = inner_products[other * rows + k];
             }
             column[self.inverse.len()..width].fill(0.0);
         }

@@ -1,4 +1,4 @@
-//! Sources of pictures: the whole array at each time, as messages that any viewer of MCAP files shows.
+//! Sources of frames: the whole array at each time, as messages that any viewer of MCAP files shows.
 //!
 //! A message is a `foxglove.RawImage` in protobuf: `16UC1` where all values are whole and from 0 to 65 535, else `32FC1`,
 //! in which NaN is a missing value. Its time stamp is the board's time, exact to the us.
@@ -6,12 +6,12 @@
 use serde::{Deserialize, Serialize};
 use taxel_core::problem;
 
-/// Properties of a source of pictures, beside its array.
+/// Properties of a source of frames, beside its array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PictureSource {
+pub struct FrameSource {
     /// Unit of the values.
     pub unit: String,
-    /// Whether the pictures have times; else they are numbered, one a us.
+    /// Whether the frames have times; else they are numbered, one a us.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
     pub clock: bool,
     /// The names of the columns, if each is a quantity of its own.
@@ -26,10 +26,10 @@ fn yes() -> bool {
     true
 }
 
-impl PictureSource {
+impl FrameSource {
     pub(super) fn check(&self, name: &str, columns: u16) -> taxel_core::Result<()> {
         if self.unit.is_empty() {
-            return Err(problem!("source {name}: the unit of its pictures is empty"));
+            return Err(problem!("source {name}: the unit of its frames is empty"));
         }
         if !self.columns.is_empty() && self.columns.len() != usize::from(columns) {
             let n = self.columns.len();
@@ -39,18 +39,18 @@ impl PictureSource {
     }
 }
 
-/// The pictures of a source, one after the other.
+/// The frames of a source, one after the other.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Pictures {
-    /// Time of each picture, us.
+pub struct Frames {
+    /// Time of each frame, us.
     pub t: Vec<i64>,
-    /// The values of all pictures, each row by row.
+    /// The values of all frames, each row by row.
     pub values: Vec<f32>,
-    /// Number of messages that are no picture of the source's array.
+    /// Number of messages that are no frame of the source's array.
     pub bad: u64,
 }
 
-/// How the values of a picture are encoded.
+/// How the values of a frame are encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// `16UC1`: whole numbers from 0 to 65 535.
@@ -122,7 +122,7 @@ fn fixed(field: u64, value: usize, out: &mut Vec<u8>) {
     out.extend_from_slice(&u32::try_from(value).unwrap_or(u32::MAX).to_le_bytes());
 }
 
-/// Writes the message of a picture of `columns` columns into `out`, which is cleared.
+/// Writes the message of a frame of `columns` columns into `out`, which is cleared.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub(super) fn write_message(
     out: &mut Vec<u8>,
@@ -234,8 +234,8 @@ impl<'a> RawImage<'a> {
     }
 }
 
-impl Pictures {
-    /// Adds the picture of a message; one that does not fit an array of `rows` x `columns` is counted.
+impl Frames {
+    /// Adds the frame of a message; one that does not fit an array of `rows` x `columns` is counted.
     pub(super) fn push(&mut self, message: &[u8], rows: u16, columns: u16) {
         if self.read(message, rows, columns).is_none() {
             self.bad += 1;
@@ -284,7 +284,7 @@ mod tests {
         for (values, encoding) in cases {
             assert_eq!(Encoding::of(values), encoding, "{values:?}");
             for t in [0, 1, -1, 1_234_567, -4_503_599_627_370_496, 4_503_599_627_370_496] {
-                let (mut message, mut back) = (vec![], Pictures::default());
+                let (mut message, mut back) = (vec![], Frames::default());
                 write_message(&mut message, "left", t, 2, values, encoding);
                 back.push(&message, 2, 2);
                 let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
@@ -294,18 +294,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_picture_of_the_array_is_counted() {
+    fn what_is_no_frame_of_the_array_is_counted() {
         let mut message = vec![];
         write_message(&mut message, "left", 5, 2, &[1.0; 4], Encoding::Whole);
-        let mut pictures = Pictures::default();
+        let mut frames = Frames::default();
         for cut in 0..message.len() {
             // The source's name comes last, and no part of it is needed.
             if !(message.len() - 6..message.len()).contains(&cut) {
-                pictures.push(&message[..cut], 2, 2);
+                frames.push(&message[..cut], 2, 2);
             }
         }
-        pictures.push(&message, 4, 1);
-        assert_eq!(pictures.t.len(), 0);
-        assert_eq!(pictures.bad as usize, message.len() - 6 + 1);
+        frames.push(&message, 4, 1);
+        assert_eq!(frames.t.len(), 0);
+        assert_eq!(frames.bad as usize, message.len() - 6 + 1);
     }
 }

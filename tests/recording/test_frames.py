@@ -1,4 +1,4 @@
-"""Pictures in a .mcap: to the last bit, by the official reader, of one sensor and of two feet; and without times."""
+"""Frames in a .mcap: to the last bit, by the official reader, of one sensor and of two feet; and without times."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True, allow_infinity=False)
 
 
 @st.composite
-def pictures(draw: st.DrawFn) -> Frames:
+def some_frames(draw: st.DrawFn) -> Frames:
     rows, columns, n = draw(st.integers(1, 4)), draw(st.integers(1, 5)), draw(st.integers(0, 6))
     cells = draw(
         st.lists(draw(st.sampled_from([WHOLE, ANY])), min_size=n * rows * columns, max_size=n * rows * columns)
@@ -54,8 +54,8 @@ def bits(frames: Frames) -> np.ndarray:
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(frames=pictures())
-def test_a_mcap_gives_pictures_back_to_the_last_bit(tmp_path: Path, frames: Frames) -> None:
+@given(frames=some_frames())
+def test_a_mcap_gives_frames_back_to_the_last_bit(tmp_path: Path, frames: Frames) -> None:
     place = tmp_path / "a.mcap"
     assert taxel.convert(frames, place, overwrite=True) == []
     recording = taxel.open(place)
@@ -69,11 +69,11 @@ def test_a_mcap_gives_pictures_back_to_the_last_bit(tmp_path: Path, frames: Fram
 
 
 def decoded(place: Path) -> list[tuple[str, dict[str, str], int, object]]:
-    """Return topic, metadata of the channel, time in the file and message of all pictures, by the official reader."""
+    """Return topic, metadata of the channel, time in the file and message of all frames, by the official reader."""
     found = []
     with place.open("rb") as file:
         for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
-            if not channel.topic.startswith("/pictures/"):
+            if not channel.topic.startswith("/frames/"):
                 continue
             assert (schema.name, schema.encoding, channel.message_encoding) == (
                 "foxglove.RawImage",
@@ -89,7 +89,7 @@ def decoded(place: Path) -> list[tuple[str, dict[str, str], int, object]]:
     return found
 
 
-def test_the_official_reader_decodes_every_picture(tmp_path: Path) -> None:
+def test_the_official_reader_decodes_every_frame(tmp_path: Path) -> None:
     cases = {
         "whole": ("16UC1", "<u2", [[0, 1, 2], [3, 65_535, 5]]),
         "gone": ("32FC1", "<f4", [[0, np.nan, 2.5], [3, 4, -5]]),
@@ -101,7 +101,7 @@ def test_the_official_reader_decodes_every_picture(tmp_path: Path) -> None:
         found = decoded(place)
         assert [log for _, _, log, _ in found] == [0, 1_500_008_000, 21_500_001_000]
         for (topic, metadata, _, image), at in zip(found, t, strict=True):
-            assert topic == "/pictures/board"
+            assert topic == "/frames/board"
             assert (metadata["unit"], metadata["source"], metadata["clock"]) == ("kPa", "board", "true")
             assert json.loads(metadata["array"])["columns"] == 3
             assert (image.width, image.height, image.encoding, image.step) == (
@@ -145,7 +145,7 @@ def test_a_viewer_sees_ten_pictures_a_second_above_rest(tmp_path: Path) -> None:
         assert taxel.open(tmp_path / f"{unit}.mcap").frames() == frames
 
 
-def test_each_source_has_low_rate_pictures_but_where_pictures_are_numbered(tmp_path: Path) -> None:
+def test_each_source_has_low_rate_pictures_but_where_frames_are_numbered(tmp_path: Path) -> None:
     array = Array(2, 3)
     left = Frames(np.ones((50, 2, 3)), np.arange(50) * 20_000 + 7, unit="N", array=array)
     right = Frames(np.ones((500, 2, 3)), np.arange(500) * 2000 - 3000, unit="N", array=array)
@@ -164,7 +164,7 @@ def test_each_source_has_low_rate_pictures_but_where_pictures_are_numbered(tmp_p
     assert low_rate(tmp_path / "numbered.mcap") == {}
 
 
-def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
+def test_everything_beside_the_frames_is_kept(tmp_path: Path) -> None:
     array = Array(1, 2, name="channels")
     frames = Frames([[[1.0, 2.5]], [[3.0, 4.0]]], [0, 10_000], unit="N", array=array)
     marks = Marks(
@@ -177,7 +177,7 @@ def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
     back = taxel.open(tmp_path / "a.mcap")
     assert back.frames() == frames
     assert [(note.text, note.t) for note in back.notes] == [("heel", 5000), ("bare", None)]
-    assert (back.detections, back.columns, back.lost) == (of.one.marks.detections(), ["hip", "knee"], ("something",))
+    assert (back.detections, back.columns, back.lost) == (of.main.marks.detections(), ["hip", "knee"], ("something",))
     assert (back.source, back.verdict, back.remarks) == (
         "an amplifier",
         "the .npz does not say what was lost",
@@ -186,12 +186,12 @@ def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
     assert not back.truncated
 
 
-def test_pictures_of_events_say_that_the_datagrams_are_left(tmp_path: Path) -> None:
+def test_frames_of_events_say_that_the_datagrams_are_left(tmp_path: Path) -> None:
     events = taxel.Events([0, 30_000], [1, 2], [0, 0], [True, True], array=Array(1, 4), intensity=[10, 40])
     taxel.convert(events, tmp_path / "events.mcap")
-    lost = taxel.convert(tmp_path / "events.mcap", tmp_path / "pictures.mcap", frames_hz=100)
+    lost = taxel.convert(tmp_path / "events.mcap", tmp_path / "frames.mcap", frames_hz=100)
     assert lost == ["raw datagrams with their arrival times"]
-    back = taxel.open(tmp_path / "pictures.mcap")
+    back = taxel.open(tmp_path / "frames.mcap")
     assert back.frames() == taxel.open(tmp_path / "events.mcap").frames(100)
 
 
@@ -227,7 +227,7 @@ def test_both_feet_of_a_file_become_sources_left_and_right(
         assert not source.truncated
     # The feet are interleaved by time in the file, and a cut of both is one of each.
     topics = [topic for topic, _, _, _ in decoded(tmp_path / "both.mcap")]
-    assert set(topics) == {"/pictures/left", "/pictures/right"}
+    assert set(topics) == {"/frames/left", "/frames/right"}
     stop = int(trials[0].frames().t[len(trials[0].frames()) // 2])
     [half] = taxel.cut(both, stop_us=stop)
     taxel.convert(half, tmp_path / "half.mcap")
@@ -294,7 +294,7 @@ def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys
 # without times
 
 
-def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_frames_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = write_icub(tmp_path)
     file = file if file.is_file() else next(tmp_path.iterdir())
     opened = taxel.open_all(file)
@@ -303,20 +303,20 @@ def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest
     for ending in (".npz", ".h5", ".mcap"):
         taxel.convert(opened[0], tmp_path / f"one{ending}")
         assert not taxel.open(tmp_path / f"one{ending}").timed
-    assert "that its pictures have no times" in taxel.convert(opened[0], tmp_path / "one.csv")
+    assert "that its frames have no times" in taxel.convert(opened[0], tmp_path / "one.csv")
     one = taxel.open(tmp_path / "one.mcap")
     assert decoded(tmp_path / "one.mcap")[0][1]["clock"] == "false"
-    with pytest.raises(ProblemError, match="its pictures have no times; give rate_hz"):
+    with pytest.raises(ProblemError, match="its frames have no times; give rate_hz"):
         LevelCrossing([100.0]).encode(one)
     with pytest.raises(ProblemError, match="have no rate"):
         one.frames(50)
     code, said, _ = call(capsys, "info", tmp_path / "one.mcap")
     assert code == 0
-    assert "pictures are numbered" in said
-    assert "at picture " in said
+    assert "frames are numbered" in said
+    assert "at frame " in said
     assert " us" not in said
     assert " s)" not in said
-    assert "pictures/s" not in said
+    assert "frames/s" not in said
     timed = one.at_rate(40)
     assert timed.timed
     assert timed.frames().t.tolist() == [25_000 * k for k in range(len(one.frames()))]

@@ -1,4 +1,4 @@
-//! A picture in the bytes that clients receive: docs/panel-protocol.md, *Pictures*.
+//! A frame in the bytes that clients receive: docs/panel-protocol.md, *Frames*.
 
 use std::ops::Range;
 
@@ -26,7 +26,7 @@ pub(super) const FOLLOWS: u16 = 16;
 const REST_GIVEN: u16 = 32;
 const REST_QUIET: u16 = 64;
 
-/// What a picture contains beside the state of the array.
+/// What a frame contains beside the state of the array.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct About {
     pub(super) flags: u16,
@@ -39,11 +39,11 @@ pub(super) struct About {
     pub(super) column_us: i64,
 }
 
-/// Raster and curves in the width that a picture shows, from narrower columns and from up to two stores.
+/// Raster and curves in the width that a frame shows, from narrower columns and from up to two stores.
 struct ShownColumns<'a> {
-    own: &'a TimeColumns,
-    /// First column of `own`; earlier ones come from `whole`.
-    first_own: i64,
+    of_view: &'a TimeColumns,
+    /// First column of `of_view`; earlier ones come from `whole`.
+    first_of_view: i64,
     whole: Option<&'a TimeColumns>,
     /// Up to when columns are known, us, and the last stored column.
     latest: Option<i64>,
@@ -56,8 +56,8 @@ struct ShownColumns<'a> {
 
 impl<'a> ShownColumns<'a> {
     fn new(
-        own: &'a TimeColumns,
-        first_own: i64,
+        of_view: &'a TimeColumns,
+        first_of_view: i64,
         whole: Option<&'a TimeColumns>,
         latest: Option<i64>,
         column_us: i64,
@@ -66,27 +66,29 @@ impl<'a> ShownColumns<'a> {
         let stored_us = column_us.min(COLUMN_US);
         let last = latest.map_or(i64::MIN, |t| column_of(t, stored_us));
         // A view that has played for long has dropped the beginning of its own columns.
-        let first_own = first_own.max(own.reach().map_or(i64::MAX, |(first, _)| first));
-        Self { own, first_own, whole, latest, last, factor: column_us / stored_us, noise }
+        let first_of_view = first_of_view.max(of_view.reach().map_or(i64::MAX, |(first, _)| first));
+        Self { of_view, first_of_view, whole, latest, last, factor: column_us / stored_us, noise }
     }
 
     /// The first known column.
     fn first(&self) -> i64 {
-        let first =
-            self.whole.and_then(TimeColumns::reach).map_or(self.first_own, |(first, _)| first.min(self.first_own));
+        let first = self
+            .whole
+            .and_then(TimeColumns::reach)
+            .map_or(self.first_of_view, |(first, _)| first.min(self.first_of_view));
         first.div_euclid(self.factor)
     }
 
     /// The stored columns of a shown one: those of the whole recording, then the view's own.
     fn parts(&self, column: i64) -> [(&TimeColumns, Range<i64>); 2] {
         let parts = column * self.factor..((column + 1) * self.factor).min(self.last + 1);
-        let own = self.first_own.clamp(parts.start, parts.end.max(parts.start));
-        [(self.whole.unwrap_or(self.own), parts.start..own), (self.own, own..parts.end)]
+        let of_view = self.first_of_view.clamp(parts.start, parts.end.max(parts.start));
+        [(self.whole.unwrap_or(self.of_view), parts.start..of_view), (self.of_view, of_view..parts.end)]
     }
 
     fn raster(&self, column: i64, out: &mut Vec<u8>) {
         let begin = out.len();
-        out.resize(begin + self.own.rows(), 0);
+        out.resize(begin + self.of_view.rows(), 0);
         for (store, columns) in self.parts(column) {
             store.add_raster(columns, &mut out[begin..]);
         }
@@ -105,12 +107,12 @@ impl<'a> ShownColumns<'a> {
         let mut all = vec![];
         for column in columns {
             let begin = all.len();
-            all.resize(begin + self.own.channel_count(), 0);
-            all.resize(begin + self.own.value_count(), MISSING_SUM);
+            all.resize(begin + self.of_view.channel_count(), 0);
+            all.resize(begin + self.of_view.value_count(), MISSING_SUM);
             for (store, columns) in self.parts(column) {
                 store.raise_values(columns, &mut all[begin..]);
             }
-            let sources = all[begin + self.own.channel_count()..].chunks_exact_mut(OF_SOURCE);
+            let sources = all[begin + self.of_view.channel_count()..].chunks_exact_mut(OF_SOURCE);
             for (source, _) in sources.zip(self.noise.1).filter(|(source, noise)| source[0] <= **noise) {
                 source[1..].fill(f32::NAN.to_bits());
             }
@@ -119,7 +121,7 @@ impl<'a> ShownColumns<'a> {
     }
 }
 
-/// Picture of the newest state, and its last column. `narrow` has the columns where they are narrower than the state's.
+/// Frame of the newest state, and its last column. `narrow` has the columns where they are narrower than the state's.
 pub(super) fn of_state(
     state: &mut ArrayState,
     narrow: Option<&mut Player>,
@@ -130,21 +132,21 @@ pub(super) fn of_state(
 ) -> (Vec<u8>, i64) {
     state.update_curve();
     let state = &*state;
-    let (own, first_own) = match narrow {
+    let (of_view, first_of_view) = match narrow {
         Some(narrow) => {
             narrow.state_mut().update_curve();
-            let (own, first_own, _) = narrow.time_columns();
-            (own, first_own)
+            let (of_view, first_of_view, _) = narrow.time_columns();
+            (of_view, first_of_view)
         }
         // The state's columns are too wide, so none is known.
         None if about.column_us < COLUMN_US => (state.time_columns(), i64::MAX),
         None => (state.time_columns(), i64::MIN),
     };
-    let shown = ShownColumns::new(own, first_own, None, state.latest(), about.column_us, (0, &[]));
+    let shown = ShownColumns::new(of_view, first_of_view, None, state.latest(), about.column_us, (0, &[]));
     write(state, columns, &shown, history, spikes, about)
 }
 
-/// Picture of a source at the time of playback, and its last column. The columns are those of `window`, or else those up to that
+/// Frame of a source at the time of playback, and its last column. The columns are those of `window`, or else those up to that
 /// time.
 pub(super) fn of_player(player: &mut Player, window: Option<&mut Player>, about: About) -> (Vec<u8>, i64) {
     player.state_mut().update_curve();
@@ -156,9 +158,9 @@ pub(super) fn of_player(player: &mut Player, window: Option<&mut Player>, about:
         }
         None => player,
     };
-    let (own, first_own, whole) = beside.time_columns();
+    let (of_view, first_of_view, whole) = beside.time_columns();
     let noise = player.index().time_columns().map_or((0, &[][..]), |all| (all.noise(), all.source_noise()));
-    let shown = ShownColumns::new(own, first_own, whole, beside.state().latest(), about.column_us, noise);
+    let shown = ShownColumns::new(of_view, first_of_view, whole, beside.state().latest(), about.column_us, noise);
     write(player.state(), player.index().array().columns, &shown, beside.history(), beside.spikes(), about)
 }
 
@@ -207,8 +209,8 @@ fn write(
     if let Some(spikes) = spikes {
         section(&mut out, 6, &|out| spikes.write(range.clone(), out));
     }
-    let (own, of_all) = (shown.own, shown.values(range.clone()));
-    let each = || of_all.chunks_exact(own.value_count().max(1)).map(|all| all.split_at(own.channel_count()));
+    let (of_view, of_all) = (shown.of_view, shown.values(range.clone()));
+    let each = || of_all.chunks_exact(of_view.value_count().max(1)).map(|all| all.split_at(of_view.channel_count()));
     section(&mut out, 7, &|out| {
         // Values above rest have 16 bits.
         #[allow(clippy::cast_possible_truncation)]
@@ -220,7 +222,7 @@ fn write(
         sources().flat_map(|source| &source[1..]).for_each(|at| out.extend(at.to_le_bytes()));
     });
     let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
-    put(0, b"TXP1");
+    put(0, b"TXF1");
     // The protocol's fields are as wide as the largest array and section need.
     #[allow(clippy::cast_possible_truncation)]
     {

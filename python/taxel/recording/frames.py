@@ -1,4 +1,4 @@
-"""Pictures of a recording: its own, or the held values at multiples of a period; raw or calibrated."""
+"""Frames of a recording: its own, or the held values at multiples of a period; raw or calibrated."""
 
 from __future__ import annotations
 
@@ -16,13 +16,11 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.recording import parts
-from taxel.recording.contents import Board, Contents, Drawn, Pictures, Source, Stream, several, with_losses
+from taxel.recording.contents import Board, Contents, Drawn, FrameSource, Source, Stream, several, with_losses
 from taxel.recording.once import UNKNOWN, Once, known
 from taxel.tare import Tare
 
-__all__ = ["FRAMES_HZ", "at_rate", "calibrated", "period_us", "pictures", "times_at"]
-
-#: The default rate of pictures of a recording of events, Hz.
+#: The default rate of frames of a recording of events, Hz.
 FRAMES_HZ = 100.0
 
 
@@ -37,12 +35,12 @@ def period_us(name: str, rate_hz: float) -> int:
     if not 0 < rate <= 1e6:
         raise refused(name, f" is {rate}: must be above 0, at most 1000000")
     if rate < 1e-9:
-        raise refused(name, f" is {rate}: must be 1e-9 or more, a picture in 31 years")
+        raise refused(name, f" is {rate}: must be 1e-9 or more, a frame in 31 years")
     return round(1e6 / rate)
 
 
 def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
-    """Return the times of numbered pictures at a rate, us.
+    """Return the times of numbered frames at a rate, us.
 
     Raises
     ------
@@ -51,43 +49,43 @@ def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
     us = number * (1e6 / rate_hz)
     if len(us) and np.abs(us).max() > TIME_US:
         raise ProblemError(
-            f"{rate_hz:g} Hz: picture {number[-1]} comes at {us[-1] / 1e6:.3g} s; must lie within 142 years"
+            f"{rate_hz:g} Hz: frame {number[-1]} comes at {us[-1] / 1e6:.3g} s; must lie within 142 years"
         )
     t: NDArray[np.int64] = np.rint(us).astype(np.int64)
     return t
 
 
-def pictures(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz") -> Pictures:
-    """Return the same recording as pictures.
+def as_frames(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz") -> FrameSource:
+    """Return the same recording as frames.
 
     Parameters
     ----------
     of : Source
     rate_hz : float, above 0, optional
-        Pictures a second, with a period rounded to whole us; default: pictures are unchanged, events have 100 a second.
+        Frames a second, with a period rounded to whole us; default: frames are unchanged, events have 100 a second.
     name : str
         The name of the rate in errors.
 
     Returns
     -------
-    Pictures
+    FrameSource
         For events: the held values of the taxels, beginning with those at the start of the recording, or with 0; for
-        pictures: the last one at each time.
+        frames: the last one at each time.
 
     Raises
     ------
-    ProblemError : an invalid rate; when the pictures are read, events without intensities
+    ProblemError : an invalid rate; when the frames are read, events without intensities
     """
     period = None if rate_hz is None else period_us(name, rate_hz)
     if period is not None and of.untimed:
-        raise ProblemError(f"{of.origin.path}: its pictures have no times, so they have no rate; see recording.at_rate")
-    if isinstance(of, Pictures):
+        raise ProblemError(f"{of.origin.path}: its frames have no times, so they have no rate; see recording.at_rate")
+    if isinstance(of, FrameSource):
         return replace(of, readings=replace(of.readings, frames=Once(lambda: _resampled(of.table, period))))
     if not isinstance(of, Board):
         # Reading the events raises the error that lists the sources.
         _ = of.table
     header = {part: getattr(of, part) for part in ("marks", "timing", "losses")}
-    # The first picture includes the held values.
+    # The first frame includes the held values.
     header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
     frames = Once(lambda: _drawn(of, period))
     return Drawn(of.origin, of.sensor, parts.Readings(frames), of.part(parts.Wire), **header)
@@ -112,21 +110,21 @@ def _resampled(frames: Frames, period: int | None) -> Frames:
 
 
 def at_rate(of: Contents, rate_hz: float) -> Contents:
-    """Return numbered pictures with times: picture k at k / rate.
+    """Return numbered frames with times: frame k at k / rate.
 
     Raises
     ------
-    ProblemError : pictures that have times, or an invalid rate
+    ProblemError : frames that have times, or an invalid rate
     """
     period_us("rate_hz", rate_hz)
-    if not of.one.untimed:
-        raise ProblemError(f"{of.one.origin.path}: has times of its own; a rate is of pictures without times")
+    if not of.main.untimed:
+        raise ProblemError(f"{of.main.origin.path}: has times of its own; a rate is of frames without times")
     sources = {name: _at_rate(source, rate_hz) for name, source in of.sources.items()}
-    return Contents(several(sources) if of.is_several else _at_rate(of.one, rate_hz), sources)
+    return Contents(several(sources) if of.is_several else _at_rate(of.main, rate_hz), sources)
 
 
 def _at_rate(of: Source, rate_hz: float) -> Source:
-    if not isinstance(of, Pictures) or not of.untimed:
+    if not isinstance(of, FrameSource) or not of.untimed:
         return of
 
     def frames(table: Frames) -> Frames:
@@ -139,14 +137,14 @@ def _at_rate(of: Source, rate_hz: float) -> Source:
     return replace(of, readings=readings, marks=replace(of.marks, notes=of.marks.notes.to(notes)))
 
 
-def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = None) -> Pictures:
-    """Return the same recording as pictures in N or kPa, by its calibration.
+def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = None) -> FrameSource:
+    """Return the same recording as frames in N or kPa, by its calibration.
 
     Parameters
     ----------
     of : Source
     rate_hz : float, above 0, optional
-        As of `pictures`.
+        As of `as_frames`.
     rest : Tare, optional
         Today's rest; default: the calibration's own.
 
@@ -160,7 +158,7 @@ def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = Non
             f"{of.origin.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing is N "
             "or kPa"
         )
-    drawn = pictures(of, rate_hz)
+    drawn = as_frames(of, rate_hz)
     made = replace(
         drawn,
         readings=replace(drawn.readings, frames=known(calibration.apply(drawn.table, rest))),

@@ -1,4 +1,4 @@
-"""Recordings of pictures in the panel: all that taxel opens, at their rate, in their unit, as a client sees them."""
+"""Recordings of frames in the panel: all that taxel opens, at their rate, in their unit, as a client sees them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ UNKNOWN = 65_535
 
 
 def opened(page, name, **more):
-    """Open a recording; return what the server said of it, and the picture shown at a time."""
+    """Open a recording; return what the server said of it, and the frame shown at a time."""
     assert page.ask("open", name=name, **more)["type"] == "done"
     return page.since_asked("opened", name=name)
 
@@ -35,14 +35,14 @@ def values_at(page, about, t_us):
     assert page.ask("seek", t_us=t_us)["type"] == "done"
     page.send(type="credit", n=2)
     while True:
-        picture = page.until("picture")
-        found = head(picture)[0]
+        frame = page.until("frame")
+        found = head(frame)[0]
         if found["t_us"] == t_us:
             break
-    ticks = section(picture, 0, "<u2").reshape(found["rows"], found["columns"]).astype(float)
+    ticks = section(frame, 0, "<u2").reshape(found["rows"], found["columns"]).astype(float)
     ticks[ticks == UNKNOWN] = np.nan
-    of = about["pictures"]
-    return (ticks - of["zero"]) * of["step"], picture
+    of = about["frames"]
+    return (ticks - of["zero"]) * of["step"], frame
 
 
 def frames_of(fractions=True):
@@ -54,22 +54,22 @@ def frames_of(fractions=True):
 
 
 @pytest.mark.parametrize("ending", [".mcap", ".npz", ".h5", ".csv"])
-def test_a_picture_of_any_kind_of_file_is_shown_in_its_unit(tmp_path, ending):
+def test_a_frame_of_any_kind_of_file_is_shown_in_its_unit(tmp_path, ending):
     frames, file = frames_of(ending != ".csv"), tmp_path / f"mat{ending}"
     taxel.convert(frames, file)
     with Panel(file) as panel, Client(panel) as page:
         about = opened(page, file.name)
-        of = about["pictures"]
-        assert (of["count"], of["unit"], of["picture_us"]) == (300, "counts" if ending == ".csv" else "kPa", None)
+        of = about["frames"]
+        assert (of["count"], of["unit"], of["number_us"]) == (300, "counts" if ending == ".csv" else "kPa", None)
         assert (about["start_us"], about["stop_us"]) == (7, 2_990_007)
         assert of["step"] == 1 if ending == ".csv" else 0 < of["step"] < 0.002
         for k in (0, 3, 45, 299):
-            values, picture = values_at(page, about, int(frames.t[k]))
+            values, frame = values_at(page, about, int(frames.t[k]))
             assert np.allclose(
                 values, frames.values[k], atol=0.51 * of["step"] if of["step"] != 1 else 0, equal_nan=True
             )
-            assert head(picture)[0]["events"] == k + 1
-        # Between two pictures the earlier one is shown; a step goes to the next.
+            assert head(frame)[0]["events"] == k + 1
+        # Between two frames the earlier one is shown; a step goes to the next.
         values, _ = values_at(page, about, 15_000)
         assert np.allclose(values, frames.values[1], atol=of["step"])
         assert page.ask("step", frames=1)["type"] == "done"
@@ -89,13 +89,13 @@ def test_both_feet_stand_side_by_side(tmp_path):
     columns = left.array.columns
     with Panel(file) as panel, Client(panel) as page:
         about = opened(page, file.name)
-        places = about["pictures"]["sources"]
+        places = about["frames"]["sources"]
         assert [(one["name"], one["left"]) for one in places] == [("left", 0), ("right", columns + 1)]
         assert about["array"]["exists"] == "1" * columns + "0" + "1" * right.array.columns
         values, _ = values_at(page, about, int(left.t[30]))
-        assert np.allclose(values[0, :columns], left.values[30, 0], atol=about["pictures"]["step"])
+        assert np.allclose(values[0, :columns], left.values[30, 0], atol=about["frames"]["step"])
         assert np.isnan(values[0, columns])
-        assert np.allclose(values[0, columns + 1 :], right.values[30, 0], atol=about["pictures"]["step"])
+        assert np.allclose(values[0, columns + 1 :], right.values[30, 0], atol=about["frames"]["step"])
         # A label with a source is of that foot, one without of both.
         assert page.ask("mark", label="heel", t_us=50_000, source="left")["type"] == "done"
         assert page.ask("mark", label="turn", t_us=90_000)["type"] == "done"
@@ -132,7 +132,7 @@ def spikes_of(trains):
     ],
     ids=lambda encoder: encoder.name,
 )
-def test_spikes_of_pictures_are_those_of_the_encoder(tmp_path, encoder):
+def test_spikes_of_frames_are_those_of_the_encoder(tmp_path, encoder):
     frames = frames_of(fractions=False)
     taxel.convert(frames, tmp_path / "mat.mcap")
     expected = spikes_of(encoder.encode(frames))
@@ -145,16 +145,16 @@ def test_spikes_of_pictures_are_those_of_the_encoder(tmp_path, encoder):
         for t_us in (int(frames.t[-1]), 1_500_007, 2_200_007):
             there = [one for one in expected if one[0] <= t_us / 1000]
             assert sorted(spikes_up_to(page, t_us)) == sorted(there)
-            while not page.pictures or head(page.pictures[-1])[0]["t_us"] != t_us:
+            while not page.frames or head(page.frames[-1])[0]["t_us"] != t_us:
                 page.next()
-            about, raster = head(page.pictures[-1])[0], section(page.pictures[-1], 6, "u1").reshape(-1, 4)
+            about, raster = head(page.frames[-1])[0], section(page.frames[-1], 6, "u1").reshape(-1, 4)
             counted = np.zeros(raster.shape, int)
             for t, train, _ in there:
                 column = int(t * 1000) // about["column_us"] - about["first"]
                 counted[column, train * 4 // encoder.trains(frames.array)] += 1
             assert np.array_equal((raster & 15) + (raster >> 4), counted)
         if encoder.name == "level_crossing":
-            # Narrow columns end 1.8 s after the beginning: the encoder begins there, with the picture before.
+            # Narrow columns end 1.8 s after the beginning: the encoder begins there, with the frame before.
             assert page.ask("zoom", column_us=125)["type"] == "done"
             told = spikes_up_to(page, 2_200_007)
             assert len(told) < len(there)
@@ -178,7 +178,7 @@ def test_spikes_of_both_feet_are_those_of_each(tmp_path):
         assert sorted(spikes_up_to(page, about["stop_us"])) == sorted(expected)
 
 
-def test_an_encoder_that_does_not_fit_pictures_is_refused_with_the_reason(tmp_path):
+def test_an_encoder_that_does_not_fit_frames_is_refused_with_the_reason(tmp_path):
     taxel.convert(frames_of(), tmp_path / "mat.mcap")
     trial = taxel.open_all(write_icub(tmp_path))[0]
     taxel.convert(trial, tmp_path / "grasp.npz")
@@ -187,7 +187,7 @@ def test_an_encoder_that_does_not_fit_pictures_is_refused_with_the_reason(tmp_pa
         said = page.ask("encode", encoder={"name": "fa2"})
         assert (said["type"], said["field"]) == ("refused", "encoder")
         assert "must come every" in said["reason"]
-        # A value is missing from the 41st picture on.
+        # A value is missing from the 41st frame on.
         assert page.ask("encode", encoder={"name": "change_events"})["type"] == "done"
         assert page.ask("seek", t_us=450_000)["type"] == "done"
         assert "values must be finite" in page.until("warning")["text"]
@@ -196,13 +196,13 @@ def test_an_encoder_that_does_not_fit_pictures_is_refused_with_the_reason(tmp_pa
         assert (said["type"], "give rate_hz" in said["reason"]) == ("refused", True)
 
 
-def test_pictures_without_times_are_numbered(tmp_path):
+def test_frames_without_times_are_numbered(tmp_path):
     frames = Frames(np.arange(12.0).reshape(4, 1, 3), np.arange(4), array=Array(1, 3))
-    trial = taxel.open_all(write_icub(tmp_path))[0]._contents.one
+    trial = taxel.open_all(write_icub(tmp_path))[0]._contents.main
     taxel.convert(taxel.Recording(Contents.of(source_from(frames, trial.origin, untimed=True))), tmp_path / "grasp.npz")
     with Panel(tmp_path / "grasp.npz") as panel, Client(panel) as page:
         about = opened(page, "grasp.npz")
-        us = about["pictures"]["picture_us"]
+        us = about["frames"]["number_us"]
         assert (about["start_us"], about["stop_us"]) == (0, 3 * us)
         values, _ = values_at(page, about, 2 * us)
         assert np.array_equal(values[0], [6, 7, 8])
@@ -220,9 +220,9 @@ def test_a_file_of_several_trials_shows_each(tmp_path):
     file = write_icub(tmp_path, trials={1: 242 - np.arange(180).reshape(3, 60) // 9, 2: np.full((2, 60), 200)})
     with Panel(file) as panel, Client(panel) as page:
         about = opened(page, file.name)
-        assert (about["pictures"]["trial"], about["pictures"]["trials"]) == ("ball/1", ["ball/1", "ball/2"])
+        assert (about["frames"]["trial"], about["frames"]["trials"]) == ("ball/1", ["ball/1", "ball/2"])
         about = opened(page, file.name, trial="ball/2")
-        assert (about["pictures"]["trial"], about["pictures"]["count"]) == ("ball/2", 2)
+        assert (about["frames"]["trial"], about["frames"]["count"]) == ("ball/2", 2)
         values, _ = values_at(page, about, 0)
         assert np.array_equal(values, np.full((5, 12), 55))
         assert page.ask("open", name=file.name, trial="ball/9")["type"] == "refused"
@@ -236,7 +236,7 @@ def test_events_of_a_table_are_shown_as_those_of_a_board(tmp_path):
     taxel.convert(events, tmp_path / "events.npz")
     with Panel(tmp_path / "events.npz") as panel, Client(panel) as page:
         about = opened(page, "events.npz")
-        assert about["pictures"] is None
+        assert about["frames"] is None
         assert about["events"] == 2
         temporary = panel._requests._files._folder.name
     assert not Path(temporary).exists()
@@ -263,15 +263,15 @@ def test_a_large_table_is_shown_from_its_beginning_and_then_whole(tmp_path, monk
 
     monkeypatch.setattr(shown_files.ShownFiles, "opened", slowly)
     [whole] = open_joined(file)
-    pictures = sum(len(one.frames()) for one in whole.sources.values())
+    frames = sum(len(one.frames()) for one in whole.sources.values())
     with Panel(file) as panel, Client(panel) as page:
         first = opened(page, file.name)
-        assert 0 < first["pictures"]["count"] < pictures / 2
-        assert first["pictures"]["left_s"] > 0
+        assert 0 < first["frames"]["count"] < frames / 2
+        assert first["frames"]["left_s"] > 0
         share = page.until("loading", name=file.name)["share"]
         assert 0 < share < 1
         then = page.until("opened", name=file.name)
-        assert (then["pictures"]["count"], then["pictures"]["left_s"]) == (pictures, None)
+        assert (then["frames"]["count"], then["frames"]["left_s"]) == (frames, None)
         assert page.until("transport")["t_us"] == first["start_us"]
 
 
@@ -284,7 +284,7 @@ def test_what_is_no_recording_is_refused_at_once(tmp_path):
         Panel(tmp_path / "empty")
 
 
-def test_the_health_of_pictures_names_the_places_that_are_shown(tmp_path):
+def test_the_health_of_frames_names_the_places_that_are_shown(tmp_path):
     file = write_tekscan(tmp_path)
     with Panel(file) as panel, Client(panel) as page:
         opened(page, file.name)
@@ -294,15 +294,15 @@ def test_the_health_of_pictures_names_the_places_that_are_shown(tmp_path):
 
 def above_rest_of(page, about, t_us):
     """Return what the client draws above rest at a time, in the unit of the file."""
-    _, picture = values_at(page, about, t_us)
-    held = section(picture, 0, "<u2").astype(int)
-    rests = [one for one in (section(shown, 5, "<u2") for shown in page.pictures) if len(one)]
+    _, frame = values_at(page, about, t_us)
+    held = section(frame, 0, "<u2").astype(int)
+    rests = [one for one in (section(shown, 5, "<u2") for shown in page.frames) if len(one)]
     above = np.where((held == UNKNOWN) | (rests[-1] == UNKNOWN), 0, held - rests[-1].astype(int))
-    above[above <= about["pictures"]["floor"]] = 0
-    return above * about["pictures"]["step"]
+    above[above <= about["frames"]["floor"]] = 0
+    return above * about["frames"]["step"]
 
 
-def test_pictures_of_unknown_unit_are_above_the_rest_of_a_quiet_stretch_as_info_has_it(tmp_path):
+def test_frames_of_unknown_unit_are_above_the_rest_of_a_quiet_stretch_as_info_has_it(tmp_path):
     rng, t = np.random.default_rng(8), np.arange(400) * 10_000
     values = 60 + rng.normal(0, 0.1, (400, 6, 6)) + np.arange(400)[:, None, None] * 0.01
     values[200:260, 1:4, 1:4] += 70
@@ -312,13 +312,13 @@ def test_pictures_of_unknown_unit_are_above_the_rest_of_a_quiet_stretch_as_info_
     assert rest.source == "quiet"
     with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
         about = opened(page, "mat.npz")
-        assert [one["rest"] for one in about["pictures"]["sources"]] == ["quiet"]
+        assert [one["rest"] for one in about["frames"]["sources"]] == ["quiet"]
         for k in (30, 150, 210, 255, 399):
             expected = np.where(over.values[k] >= floor, over.values[k], 0)
             shown = above_rest_of(page, about, int(t[k])).reshape(6, 6)
-            # The rest of the page is that of a picture not long before, half a tick from it at most.
+            # The rest of the page is that of a frame not long before, half a tick from it at most.
             assert shown == pytest.approx(expected, abs=0.6 / ticks_by_unit(recording.frames()) + 2e-3)
-            assert head(page.pictures[-1])[0]["flags"] & 96 == 64
+            assert head(page.frames[-1])[0]["flags"] & 96 == 64
         force, _ = max_and_column(page, about)
         assert force == pytest.approx(np.where(over.values >= floor, over.values, 0).sum(axis=(1, 2)).max(), rel=0.02)
 
@@ -333,7 +333,7 @@ def test_a_press_that_is_held_sets_the_rest_of_a_falling_sensor_nowhere_anew(tmp
         (tmp_path / "layout.toml").write_text(layout)
     with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
         about = opened(page, "mat.npz")
-        [source] = about["pictures"]["sources"]
+        [source] = about["frames"]["sources"]
         assert (source["rest"], source["falls"]) == ("quiet", layout is None)
         # Before it, in it, and after it, taxels that read as at rest are at rest; pressed ones are above it if turned.
         for k in (100, 260, 700, 1240, 1300, 2500):
@@ -358,7 +358,7 @@ def test_a_taxel_that_flickers_is_in_no_sum_and_not_the_first_touch(tmp_path, un
     taxel.convert(Frames(values, t, unit=unit, array=Array(8, 8)), tmp_path / "mat.npz")
     with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
         about = opened(page, "mat.npz")
-        assert about["pictures"]["flickering"] == [[5, 6]]
+        assert about["frames"]["flickering"] == [[5, 6]]
         assert 4_000_000 <= about["touch_us"] < 4_800_000
         assert max_and_column(page, about)[0] < 700
         flickers, _ = values_at(page, about, int(t[7]))
@@ -370,7 +370,7 @@ def max_and_column(page, about):
     """Return the greatest sum of the overview, in the unit of the file, and its column."""
     page.send(type="overview")
     force = page.until("overview")["force"]
-    return max(force) * about["pictures"]["step"], int(np.argmax(force))
+    return max(force) * about["frames"]["step"], int(np.argmax(force))
 
 
 @pytest.mark.parametrize("unit", ["N", "kPa", "counts"])
@@ -387,14 +387,14 @@ def test_noise_is_no_area_and_moves_no_centre_and_counts_in_the_sum_of_forces(tm
     shown, floor, _ = above_rest(taxel.open(tmp_path / "mat.npz"))
     with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
         about = opened(page, "mat.npz")
-        step = about["pictures"]["step"]
-        assert about["pictures"]["floor"] * step == pytest.approx(floor, abs=step)
+        step = about["frames"]["step"]
+        assert about["frames"]["floor"] * step == pytest.approx(floor, abs=step)
         for begin, y, x in presses:
             for k, pressed in ((begin - 20, False), (begin + 10, True)):
-                _, picture = values_at(page, about, k * 10_000)
-                at = head(picture)[0]
-                total, area = section(picture, 3, "<u4").reshape(-1, 4)[-1, :2]
-                centre = section(picture, 3, "<f4").reshape(-1, 4)[-1, 2:]
+                _, frame = values_at(page, about, k * 10_000)
+                at = head(frame)[0]
+                total, area = section(frame, 3, "<u4").reshape(-1, 4)[-1, :2]
+                centre = section(frame, 3, "<f4").reshape(-1, 4)[-1, 2:]
                 assert at["t_us"] == k * 10_000
                 of_all = unit != "counts"
                 # As taxel info has it: one in ten may have more noise than what counts as such, in counts more.
@@ -425,21 +425,19 @@ def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
     with Panel(file) as panel, Client(panel) as page:
         about = opened(page, file.name)
         assert page.ask("zoom", column_us=column_us)["type"] == "done"
-        _, picture = values_at(page, about, 5_000_000)
-        while head(picture)[0]["column_us"] != column_us:
-            picture = page.until("picture")
-        of = head(picture)[0]
-        sums = section(picture, 8, "<u4").reshape(-1, 2)
-        centres = section(picture, 9, "<f4").reshape(-1, 2, 2)
+        _, frame = values_at(page, about, 5_000_000)
+        while head(frame)[0]["column_us"] != column_us:
+            frame = page.until("frame")
+        of = head(frame)[0]
+        sums = section(frame, 8, "<u4").reshape(-1, 2)
+        centres = section(frame, 9, "<f4").reshape(-1, 2, 2)
         assert len(sums) == len(centres) == of["count"] > 70
         for number, at, own in zip(range(of["first"], of["first"] + of["count"]), centres, sums, strict=True):
             ends = [min(end, 5_000_000) for end in parts_of(number, column_us)]
             for k, frames in enumerate(feet):
                 seen = frames.values.reshape(len(frames), -1)[np.searchsorted(frames.t, ends, side="right") - 1]
                 most = seen[np.argmax(seen.sum(axis=1))].astype(float)
-                assert own[k] * about["pictures"]["step"] == pytest.approx(
-                    most.sum(), abs=9 * about["pictures"]["step"]
-                )
+                assert own[k] * about["frames"]["step"] == pytest.approx(most.sum(), abs=9 * about["frames"]["step"])
                 if not most.sum():
                     assert np.isnan(at[k]).all()
                     continue
@@ -455,10 +453,10 @@ def test_without_a_quiet_stretch_values_are_shown_as_they_are(tmp_path):
     taxel.convert(Frames(values, t, unit="raw", array=Array(4, 4)), tmp_path / "mat.npz")
     with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
         about = opened(page, "mat.npz")
-        assert [one["rest"] for one in about["pictures"]["sources"]] == ["none"]
+        assert [one["rest"] for one in about["frames"]["sources"]] == ["none"]
         shown = above_rest_of(page, about, 300_000)
-        assert shown == pytest.approx(np.float32(values[30]).ravel(), abs=about["pictures"]["step"])
-        assert head(page.pictures[-1])[0]["flags"] & 96 == 0
+        assert shown == pytest.approx(np.float32(values[30]).ravel(), abs=about["frames"]["step"])
+        assert head(page.frames[-1])[0]["flags"] & 96 == 0
 
 
 def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
@@ -470,8 +468,8 @@ def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
     with Panel(tmp_path / "placed.npz") as panel, Client(panel) as page:
         for name, expected in (("placed", (-650.0, -20.0)), ("channels", (np.nan, np.nan))):
             about = opened(page, f"{name}.npz")
-            _, picture = values_at(page, about, 150_000)
-            centre = section(picture, 3, "<f4").reshape(-1, 4)[-1, 2:]
+            _, frame = values_at(page, about, 150_000)
+            centre = section(frame, 3, "<f4").reshape(-1, 4)[-1, 2:]
             assert centre == pytest.approx(expected, abs=0.02, nan_ok=True)
 
 
@@ -500,19 +498,19 @@ def test_a_force_from_pressures_uses_each_taxel_s_area(tmp_path, seed):
         taxel.convert(frames, tmp_path / "foot.npz", overwrite=True)
         with Panel(tmp_path / "foot.npz") as panel, Client(panel) as page:
             about = opened(page, "foot.npz")
-            newtons = about["pictures"]["newtons"]
+            newtons = about["frames"]["newtons"]
             force = force_n(frames)
             assert (newtons is None) == (force is None) == (unit != "kPa" or known is None)
             # In another unit the rest of a quiet stretch is subtracted.
             total = values.sum(axis=(1, 2)) if force is None else force
             if unit == "kPa":
-                step = about["pictures"]["step"] if newtons is None else newtons
+                step = about["frames"]["step"] if newtons is None else newtons
                 page.send(type="overview")
                 assert max(page.until("overview")["force"]) * step == pytest.approx(total.max(), rel=2e-3)
                 # What is played from a keyframe is weighed as the whole is.
                 for k in (25, 40, 59):
-                    _, picture = values_at(page, about, int(frames.t[k]))
-                    assert section(picture, 3, "<u4").reshape(-1, 4)[-1, 0] * step == pytest.approx(total[k], rel=2e-3)
+                    _, frame = values_at(page, about, int(frames.t[k]))
+                    assert section(frame, 3, "<u4").reshape(-1, 4)[-1, 0] * step == pytest.approx(total[k], rel=2e-3)
 
 
 @pytest.mark.parametrize("column", [False, True])
@@ -527,16 +525,16 @@ def test_channels_have_a_curve_each(tmp_path, column):
         about = opened(page, "insole.npz")
         for t_us, column_us in ((3_000_000, 4_000), (7_000_000, 4_000), (15_000_000, 16_000), (15_004_000, 1_000)):
             assert page.ask("zoom", column_us=column_us)["type"] == "done"
-            _, picture = values_at(page, about, t_us)
-            while head(picture)[0]["column_us"] != column_us:
-                picture = page.until("picture")
-            of = head(picture)[0]
-            curves = section(picture, 7, "<u2").reshape(-1, 7)
+            _, frame = values_at(page, about, t_us)
+            while head(frame)[0]["column_us"] != column_us:
+                frame = page.until("frame")
+            of = head(frame)[0]
+            curves = section(frame, 7, "<u2").reshape(-1, 7)
             assert len(curves) == of["count"] > 100
             for number, curve in enumerate(curves, of["first"]):
                 ends = [min(end, t_us) for end in parts_of(number, column_us)]
                 at = np.searchsorted(frames.t, ends, side="right") - 1
-                np.testing.assert_array_equal(curve * about["pictures"]["step"], values[at, 0].max(axis=0))
+                np.testing.assert_array_equal(curve * about["frames"]["step"], values[at, 0].max(axis=0))
 
 
 def test_only_channels_have_a_curve_each(tmp_path):
@@ -544,5 +542,5 @@ def test_only_channels_have_a_curve_each(tmp_path):
         frames = Frames(np.ones((20, *array.shape)), np.arange(20) * 10_000, unit="N", array=array)
         taxel.convert(frames, tmp_path / f"{name}.npz")
         with Panel(tmp_path / f"{name}.npz") as panel, Client(panel) as page:
-            _, picture = values_at(page, opened(page, f"{name}.npz"), 100_000)
-            assert not section(picture, 7, "<u2").size
+            _, frame = values_at(page, opened(page, f"{name}.npz"), 100_000)
+            assert not section(frame, 7, "<u2").size

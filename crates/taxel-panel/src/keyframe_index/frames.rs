@@ -1,7 +1,7 @@
-//! The index of a recording of pictures: all of them in memory, their values in whole steps of the unit.
+//! The index of a recording of frames: all of them in memory, their values in whole steps of the unit.
 //!
-//! Views show changes of ticks. Pictures are shown by the same code: a tick is then a step of their unit, and the changes
-//! at a time are the cells that differ from the picture before.
+//! Views show changes of ticks. Frames are shown by the same code: a tick is then a step of their unit, and the changes
+//! at a time are the cells that differ from the frame before.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use taxel_live::Result;
 use taxel_live::pipeline::Change;
 use taxel_live::recording::Remarks;
 
-use super::{ChangeReader, KeyframeIndex, Pictures, Read};
+use super::{ChangeReader, FrameSources, KeyframeIndex, Read};
 use crate::array_state::{Keyframe, RestSource};
 use crate::centre::Coordinates;
 use crate::load::Load;
@@ -39,9 +39,9 @@ const AT_ONCE: usize = 4096;
 /// A tracked rest is stored where that of a taxel is further than this from the stored one, in ticks of the noise floor.
 const REST_MOVED: f64 = 0.5;
 
-/// Where a source's pictures are in the array of the recording.
+/// Where a source's frames are in the array of the recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PicturePlace {
+pub struct FramePlace {
     /// Name of the source.
     pub name: String,
     /// Its first column in the array of the recording.
@@ -52,9 +52,9 @@ pub struct PicturePlace {
     pub columns: u16,
 }
 
-/// What the values of a source's pictures are above.
+/// What the values of a source's frames are above.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PictureRest {
+pub struct FrameRest {
     /// Where it is known from. That of a quiet stretch is tracked from its values on; without any the values are above 0.
     pub source: RestSource,
     /// The rest of each cell, in the unit; [`Value::NO_REST`](taxel_core::rest::Value::NO_REST) where it is unknown.
@@ -71,24 +71,24 @@ pub struct PictureRest {
     pub preload_at: String,
 }
 
-/// The pictures of a source as they are given.
+/// The frames of a source as they are given.
 #[derive(Debug, Clone)]
-pub struct PictureSource<'a> {
+pub struct FrameSource<'a> {
     /// Where they are in the array.
-    pub place: PicturePlace,
+    pub place: FramePlace,
     /// Their times, us, ascending.
     pub t: Vec<i64>,
-    /// Their values row by row, picture after picture; NaN where one is missing.
+    /// Their values row by row, frame after frame; NaN where one is missing.
     pub values: &'a [f32],
     /// What they are above.
-    pub rest: PictureRest,
+    pub rest: FrameRest,
 }
 
-impl PictureSource<'_> {
-    /// The rest of the cells in steps, each from the picture of this number on: once where it is fixed, else where it moved.
+impl FrameSource<'_> {
+    /// The rest of the cells in steps, each from the frame of this number on: once where it is fixed, else where it moved.
     #[allow(clippy::cast_possible_truncation)]
     fn rests(&self, steps: Steps) -> Vec<(usize, Vec<u16>)> {
-        let PictureRest { source, values, ticks_by_unit, falls, .. } = &self.rest;
+        let FrameRest { source, values, ticks_by_unit, falls, .. } = &self.rest;
         let fixed = |values: &[f64]| values.iter().map(|&value| steps.of_rest(value)).collect();
         match source {
             RestSource::None => return vec![(0, vec![steps.zero; values.len()])],
@@ -102,8 +102,8 @@ impl PictureSource<'_> {
         }
         let mut stored: Vec<Option<f64>> = vec![];
         let mut rests: Vec<(usize, Vec<u16>)> = vec![];
-        for (k, (&t, picture)) in self.t.iter().zip(self.values.chunks_exact(values.len())).enumerate() {
-            tracked.take(t, picture.iter().map(|value| value * *ticks_by_unit as f32));
+        for (k, (&t, frame)) in self.t.iter().zip(self.values.chunks_exact(values.len())).enumerate() {
+            tracked.take(t, frame.iter().map(|value| value * *ticks_by_unit as f32));
             let moved = |(now, then): (Option<f64>, &Option<f64>)| match (now, then) {
                 (Some(now), Some(then)) => (now - then).abs() > REST_MOVED,
                 (now, then) => now.is_some() != then.is_some(),
@@ -124,25 +124,25 @@ impl PictureSource<'_> {
     }
 }
 
-/// The pictures of a source, in steps.
+/// The frames of a source, in steps.
 #[derive(Debug, Clone)]
 struct Source {
-    place: PicturePlace,
+    place: FramePlace,
     t: Vec<i64>,
-    /// Row by row, picture after picture; [`UNKNOWN`] where a value is missing.
+    /// Row by row, frame after frame; [`UNKNOWN`] where a value is missing.
     ticks: Vec<u16>,
     rest_source: RestSource,
     falls: bool,
     flickering: Vec<usize>,
     preload_at: String,
-    /// The rest of its cells, each from the picture of this number on; there is one at least.
+    /// The rest of its cells, each from the frame of this number on; there is one at least.
     rests: Vec<(usize, Vec<u16>)>,
 }
 
 impl Source {
-    fn new(from: PictureSource<'_>, steps: Steps) -> Self {
+    fn new(from: FrameSource<'_>, steps: Steps) -> Self {
         let (ticks, mut rests) = (steps.ticks(from.values), from.rests(steps));
-        let PictureRest { source: rest_source, falls, flickering, preload_at, .. } = from.rest;
+        let FrameRest { source: rest_source, falls, flickering, preload_at, .. } = from.rest;
         for (_, rest) in &mut rests {
             // No value is above the greatest; a taxel without a rest would get that of its first value.
             flickering.iter().for_each(|&cell| rest[cell] = UNKNOWN - 1);
@@ -150,12 +150,12 @@ impl Source {
         Self { place: from.place, t: from.t, ticks, rest_source, falls, flickering, preload_at, rests }
     }
 
-    /// The rest of its cells at a picture; before the first one, that of the first.
+    /// The rest of its cells at a frame; before the first one, that of the first.
     fn rest(&self, k: usize) -> &[u16] {
         &self.rests[self.rests.partition_point(|&(from, _)| from <= k).max(1) - 1].1
     }
 
-    /// Whether another rest holds from this picture on.
+    /// Whether another rest holds from this frame on.
     fn rest_moves(&self, k: usize) -> bool {
         k > 0 && self.rests.binary_search_by_key(&k, |&(from, _)| from).is_ok()
     }
@@ -164,11 +164,11 @@ impl Source {
         usize::from(self.place.rows) * usize::from(self.place.columns)
     }
 
-    fn picture(&self, k: usize) -> &[u16] {
+    fn frame(&self, k: usize) -> &[u16] {
         &self.ticks[k * self.cells()..(k + 1) * self.cells()]
     }
 
-    /// Number of pictures up to a time.
+    /// Number of frames up to a time.
     fn until(&self, t: i64) -> usize {
         self.t.partition_point(|&at| at <= t)
     }
@@ -221,13 +221,13 @@ impl Steps {
     }
 }
 
-/// What a file of pictures states beside them.
+/// What a file of frames states beside them.
 #[derive(Debug, Clone, Default)]
-pub struct PictureFile {
+pub struct FrameFile {
     /// Unit of the values.
     pub unit: String,
-    /// Time from one picture to the next in the index, where the pictures are numbered, us; `None` where they have times.
-    pub picture_us: Option<i64>,
+    /// Time from one frame to the next in the index, where the frames are numbered, us; `None` where they have times.
+    pub number_us: Option<i64>,
     /// Notes, markers, detections.
     pub remarks: Remarks,
     /// The source that each note is of; "" where it is of all of them.
@@ -238,21 +238,21 @@ pub struct PictureFile {
     pub trial: Option<String>,
     /// See `trial`.
     pub trials: Vec<String>,
-    /// How long the whole takes to read, s, where these pictures are only those at the beginning of the file.
+    /// How long the whole takes to read, s, where these frames are only those at the beginning of the file.
     pub left_s: Option<f64>,
 }
 
-/// An indexed recording of pictures.
+/// An indexed recording of frames.
 #[derive(Debug)]
-pub struct PictureIndex {
+pub struct FrameIndex {
     /// What the file states.
-    pub file: PictureFile,
+    pub file: FrameFile,
     /// Size of a step of the shown values, in the unit.
     pub step: f64,
     /// Ticks of the value 0.
     pub zero: u16,
-    /// Number of pictures.
-    pub pictures: u64,
+    /// Number of frames.
+    pub count: u64,
     /// Steps above rest up to which a taxel counts as not loaded: of several sources, the most.
     pub floor: u16,
     /// The force that a step of the sums is, N; `None` where they are sums of the values.
@@ -264,13 +264,13 @@ pub struct PictureIndex {
     range: Option<(i64, i64)>,
 }
 
-/// Number of the next picture of each source.
+/// Number of the next frame of each source.
 type Cursor = Vec<usize>;
 
-impl PictureIndex {
-    /// Indexes pictures of sources that have places in `array`.
+impl FrameIndex {
+    /// Indexes frames of sources that have places in `array`.
     #[must_use]
-    pub fn new(array: Array, file: PictureFile, sources: Vec<PictureSource<'_>>) -> Self {
+    pub fn new(array: Array, file: FrameFile, sources: Vec<FrameSource<'_>>) -> Self {
         let steps = Steps::of(sources.iter().map(|source| source.values), array.len());
         let floor = sources.iter().map(|source| source.floor(steps)).max().unwrap_or(0);
         let sources: Vec<Source> = sources.into_iter().map(|source| Source::new(source, steps)).collect();
@@ -281,7 +281,7 @@ impl PictureIndex {
             file,
             step: steps.size,
             zero: steps.zero,
-            pictures: sources.iter().map(|source| source.t.len() as u64).sum(),
+            count: sources.iter().map(|source| source.t.len() as u64).sum(),
             floor,
             newtons: newtons.map(|newtons| newtons * steps.size),
             weights,
@@ -295,7 +295,7 @@ impl PictureIndex {
     }
 
     /// The places of its sources, where the rest of each comes from, whether its values fall from it, and where something lay then.
-    pub fn places(&self) -> impl Iterator<Item = (&PicturePlace, RestSource, bool, &str)> {
+    pub fn places(&self) -> impl Iterator<Item = (&FramePlace, RestSource, bool, &str)> {
         self.sources.iter().map(|source| (&source.place, source.rest_source, source.falls, source.preload_at.as_str()))
     }
 
@@ -310,22 +310,22 @@ impl PictureIndex {
         self.sources.iter().flat_map(of)
     }
 
-    /// Time of the last picture up to a time, us.
+    /// Time of the last frame up to a time, us.
     #[must_use]
-    pub fn picture_until(&self, t: i64) -> Option<i64> {
+    pub fn frame_until(&self, t: i64) -> Option<i64> {
         self.sources.iter().filter_map(|source| source.t[..source.until(t)].last().copied()).max()
     }
 
-    /// The source and the number of the next picture, with its time.
+    /// The source and the number of the next frame, with its time.
     fn next(&self, cursor: &Cursor) -> Option<(usize, usize, i64)> {
         let ahead = self.sources.iter().zip(cursor).enumerate();
         let ahead = ahead.filter_map(|(source, (of, &k))| of.t.get(k).map(|&t| (source, k, t)));
         ahead.min_by_key(|&(_, _, t)| t)
     }
 
-    /// Mean time from one picture of a source to the next, us; 0 where there is one alone.
+    /// Mean time from one frame of a source to the next, us; 0 where there is one alone.
     #[must_use]
-    pub fn picture_us(&self) -> i64 {
+    pub fn frame_us(&self) -> i64 {
         let mean = |source: &Source| {
             let (first, last) = source.t.first().zip(source.t.last())?;
             Some((last - first) / i64::try_from(source.t.len()).ok()?.saturating_sub(1).max(1))
@@ -354,7 +354,7 @@ impl PictureIndex {
         let at = Coordinates::new(&self.array);
         while let Some((source, k, t)) = self.next(&cursor) {
             cursor[source] += 1;
-            let known = self.sources[source].picture(k).iter().any(|&ticks| ticks != UNKNOWN);
+            let known = self.sources[source].frame(k).iter().any(|&ticks| ticks != UNKNOWN);
             loads[source] = known.then(|| self.load(&self.sources[source], k, &at));
             let column = column_of(t, COLUMN_US);
             columns.extend_to(column);
@@ -389,15 +389,15 @@ impl PictureIndex {
         Some(self.sources.len()).filter(|count| (2..=MOST_SOURCES).contains(count)).unwrap_or(0)
     }
 
-    /// The taxels of a source's picture, each with its steps above rest as they count in the sums.
+    /// The taxels of a source's frame, each with its steps above rest as they count in the sums.
     fn above<'a>(&'a self, source: &'a Source, k: usize) -> impl Iterator<Item = (usize, u16)> + 'a {
-        let values = source.picture(k).iter().zip(source.rest(k));
+        let values = source.frame(k).iter().zip(source.rest(k));
         let floor = self.sum_floor();
         let above = move |(&ticks, &rest): (&u16, &u16)| above_noise(ticks, rest, floor);
         source.taxels(self.array.columns).zip(values.map(above))
     }
 
-    /// The load of a source's picture.
+    /// The load of a source's frame.
     fn load(&self, source: &Source, k: usize, at: &Coordinates) -> Load {
         let mut load = Load::default();
         for (taxel, above) in self.above(source, k) {
@@ -421,7 +421,7 @@ struct Noise {
 }
 
 impl Noise {
-    /// Takes the sum of a picture, whose time counts from the first one.
+    /// Takes the sum of a frame, whose time counts from the first one.
     fn take(&mut self, t: i64, sum: u32) {
         let stretch = t / STRETCH_US;
         if stretch != self.stretch {
@@ -438,16 +438,16 @@ impl Noise {
     }
 }
 
-struct PictureChanges {
-    index: Arc<PictureIndex>,
+struct FrameChanges {
+    index: Arc<FrameIndex>,
     cursor: Cursor,
     held: Vec<u16>,
     rest: Vec<u16>,
-    /// Whether the rest has changed with the last picture.
+    /// Whether the rest has changed with the last frame.
     rest_moved: bool,
 }
 
-impl ChangeReader for PictureChanges {
+impl ChangeReader for FrameChanges {
     fn read(&mut self, out: &mut Vec<Change>) -> Result<Read> {
         if std::mem::take(&mut self.rest_moved) {
             return Ok(Read::Rest(self.rest.clone()));
@@ -462,15 +462,15 @@ impl ChangeReader for PictureChanges {
                 #[allow(clippy::cast_possible_truncation)]
                 out.push(Change { t, taxel: taxel as u32, ticks, up, repaired: false });
             };
-            for (taxel, &ticks) in source.taxels(self.index.array.columns).zip(source.picture(k)) {
+            for (taxel, &ticks) in source.taxels(self.index.array.columns).zip(source.frame(k)) {
                 let held = std::mem::replace(&mut self.held[taxel], ticks);
                 if held != ticks {
                     put(taxel, ticks, ticks > held);
                 }
             }
             if out.len() == before {
-                // A picture equal to the one before has a time of its own.
-                let same = source.taxels(self.index.array.columns).zip(source.picture(k)).next();
+                // A frame equal to the one before has a time of its own.
+                let same = source.taxels(self.index.array.columns).zip(source.frame(k)).next();
                 out.extend(same.map(|(taxel, &ticks)| {
                     #[allow(clippy::cast_possible_truncation)]
                     Change { t, taxel: taxel as u32, ticks, up: true, repaired: false }
@@ -488,13 +488,13 @@ impl ChangeReader for PictureChanges {
     }
 }
 
-impl Pictures for PictureIndex {
+impl FrameSources for FrameIndex {
     fn array(&self) -> &Array {
         &self.array
     }
 
     fn numbered(&self) -> bool {
-        self.file.picture_us.is_some()
+        self.file.number_us.is_some()
     }
 
     fn rest_source(&self) -> RestSource {
@@ -554,17 +554,17 @@ impl Pictures for PictureIndex {
     }
 
     #[allow(clippy::cast_possible_truncation)]
-    fn picture(&self, source: usize, k: usize) -> Option<(i64, Vec<f32>)> {
+    fn frame(&self, source: usize, k: usize) -> Option<(i64, Vec<f32>)> {
         let of = &self.sources[source];
         let value = |&ticks: &u16| match ticks {
             UNKNOWN => f32::NAN,
             ticks => ((f64::from(ticks) - f64::from(self.zero)) * self.step) as f32,
         };
-        of.t.get(k).map(|&t| (t, of.picture(k).iter().map(value).collect()))
+        of.t.get(k).map(|&t| (t, of.frame(k).iter().map(value).collect()))
     }
 }
 
-impl KeyframeIndex for Arc<PictureIndex> {
+impl KeyframeIndex for Arc<FrameIndex> {
     fn array(&self) -> &Array {
         &self.array
     }
@@ -573,8 +573,8 @@ impl KeyframeIndex for Arc<PictureIndex> {
         self.floor
     }
 
-    fn pictures(&self) -> Option<Arc<dyn Pictures>> {
-        Some(Arc::clone(self) as Arc<dyn Pictures>)
+    fn frames(&self) -> Option<Arc<dyn FrameSources>> {
+        Some(Arc::clone(self) as Arc<dyn FrameSources>)
     }
 
     fn range(&self) -> Option<(i64, i64)> {
@@ -585,7 +585,7 @@ impl KeyframeIndex for Arc<PictureIndex> {
         let (mut held, mut rest) = (vec![UNKNOWN; self.array.len()], vec![UNKNOWN; self.array.len()]);
         let cursor: Cursor = self.sources.iter().map(|source| source.until(t)).collect();
         for (source, &next) in self.sources.iter().zip(&cursor).filter(|(_, next)| **next > 0) {
-            source.taxels(self.array.columns).zip(source.picture(next - 1)).for_each(|(k, &ticks)| held[k] = ticks);
+            source.taxels(self.array.columns).zip(source.frame(next - 1)).for_each(|(k, &ticks)| held[k] = ticks);
         }
         for (source, &next) in self.sources.iter().zip(&cursor) {
             let of_last = source.rest(next.saturating_sub(1));
@@ -598,7 +598,7 @@ impl KeyframeIndex for Arc<PictureIndex> {
             rest: rest.clone(),
             tracked: None,
         };
-        let changes = PictureChanges { index: Arc::clone(self), cursor, held, rest, rest_moved: false };
+        let changes = FrameChanges { index: Arc::clone(self), cursor, held, rest, rest_moved: false };
         Ok((keyframe, Box::new(changes)))
     }
 
@@ -623,13 +623,13 @@ mod tests {
     use crate::player::{Player, ViewOptions};
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
-    fn place(name: &str, left: u16) -> PicturePlace {
-        PicturePlace { name: name.to_owned(), left, rows: 2, columns: 3 }
+    fn place(name: &str, left: u16) -> FramePlace {
+        FramePlace { name: name.to_owned(), left, rows: 2, columns: 3 }
     }
 
-    fn index(left: &(Vec<i64>, Vec<f32>), right: &(Vec<i64>, Vec<f32>)) -> Arc<PictureIndex> {
+    fn index(left: &(Vec<i64>, Vec<f32>), right: &(Vec<i64>, Vec<f32>)) -> Arc<FrameIndex> {
         let array = Array::new(2, 7, 1.0, "feet").unwrap();
-        let rest = PictureRest {
+        let rest = FrameRest {
             source: RestSource::None,
             values: vec![0.0; 6],
             ticks_by_unit: 1.0,
@@ -640,13 +640,13 @@ mod tests {
         };
         let source = |place, (t, values): &'_ (Vec<i64>, Vec<f32>)| (place, t.clone(), values.clone());
         let all = [source(place("left", 0), left), source(place("right", 4), right)];
-        let sources = all.iter().map(|(place, t, values)| PictureSource {
+        let sources = all.iter().map(|(place, t, values)| FrameSource {
             place: place.clone(),
             t: t.clone(),
             values,
             rest: rest.clone(),
         });
-        Arc::new(PictureIndex::new(array, PictureFile::default(), sources.collect()))
+        Arc::new(FrameIndex::new(array, FrameFile::default(), sources.collect()))
     }
 
     fn drawn(random: &mut StdRng, fractions: bool) -> (Vec<i64>, Vec<f32>) {
@@ -668,7 +668,7 @@ mod tests {
     }
 
     #[test]
-    fn at_any_time_the_last_picture_of_each_source_is_shown_with_its_load() {
+    fn at_any_time_the_last_frame_of_each_source_is_shown_with_its_load() {
         let mut random = StdRng::seed_from_u64(7);
         for round in 0..40 {
             let (left, right) = (drawn(&mut random, round % 2 == 0), drawn(&mut random, round % 2 == 0));
@@ -753,7 +753,7 @@ mod tests {
                 };
                 (0..600).flat_map(|k| [k; 16]).map(&mut value).collect::<Vec<f32>>()
             });
-            let rest = PictureRest {
+            let rest = FrameRest {
                 source: RestSource::Quiet,
                 values: vec![200.0; 16],
                 ticks_by_unit: 0.5,
@@ -762,25 +762,25 @@ mod tests {
                 flickering: vec![],
                 preload_at: String::new(),
             };
-            let sources = values.iter().zip([("left", 0), ("right", 5)]).map(|(values, (name, left))| PictureSource {
-                place: PicturePlace { name: name.to_owned(), left, rows: 4, columns: 4 },
+            let sources = values.iter().zip([("left", 0), ("right", 5)]).map(|(values, (name, left))| FrameSource {
+                place: FramePlace { name: name.to_owned(), left, rows: 4, columns: 4 },
                 t: (0..600).map(|k| 10_000 * k).collect(),
                 values,
                 rest: rest.clone(),
             });
             let array = Array::new(4, 9, 1.0, "feet").unwrap();
-            let index = PictureIndex::new(array, PictureFile::default(), sources.collect());
+            let index = FrameIndex::new(array, FrameFile::default(), sources.collect());
             let columns = index.time_columns.as_ref().unwrap();
             for k in 0..600 {
                 let sum = columns.curve(column_of(10_000 * k as i64, COLUMN_US)).sum;
                 let (touches, noise) = (stands(0, k) || stands(1, k), columns.noise());
-                assert_eq!(sum > noise, touches, "spread {spread}, picture {k}: {sum} of {noise}");
+                assert_eq!(sum > noise, touches, "spread {spread}, frame {k}: {sum} of {noise}");
             }
         }
     }
 
     #[test]
-    fn steps_go_from_picture_to_picture_both_ways() {
+    fn steps_go_from_frame_to_frame_both_ways() {
         let left = ((0..9).map(|k| 10_000 * k).collect::<Vec<i64>>(), vec![1.0; 54]);
         let index = index(&left, &(vec![], vec![]));
         let shared: Arc<dyn KeyframeIndex> = Arc::new(index);
