@@ -260,23 +260,23 @@ fn a_board_of_afferents_fires_as_equations_5_1_to_5_5_say() {
         let returned = frame >= 3 && random.random_range(0..10) > 0;
         let mut read = ticks.clone();
         read[70] = if returned { ticks[70] } else { NOT_RETURNED };
-        let said = words(&play(&mut board, &read));
+        let sent = words(&play(&mut board, &read));
         if !returned {
-            assert!(said.is_empty(), "frame {frame}: {said:?}");
+            assert!(sent.is_empty(), "frame {frame}: {sent:?}");
             continue;
         }
         let pressure = (f64::from(ticks[70]).powf(0.7) * 65_536.0).round() as i64;
         let integral = pressure - *base.get_or_insert(pressure);
         if integral.abs() > theta {
             spikes += 1;
-            let [Word::Change { x, y, p, .. }, Word::Intensity { ticks: told, .. }] = said[..] else {
-                panic!("frame {frame}: {said:?}, {integral} against {theta}")
+            let [Word::Change { x, y, p, .. }, Word::Intensity { ticks: told, .. }] = sent[..] else {
+                panic!("frame {frame}: {sent:?}, {integral} against {theta}")
             };
             assert_eq!((x, y, p), (6, 1, integral > 0), "frame {frame}");
             assert_eq!(i64::from(told), integral.abs() / 64, "frame {frame}");
             (base, theta) = (Some(pressure), theta + jump);
         } else {
-            assert!(said.is_empty(), "frame {frame}: {said:?}, {integral} against {theta}");
+            assert!(sent.is_empty(), "frame {frame}: {sent:?}, {integral} against {theta}");
             theta = if theta > rest { theta - decay } else { rest };
         }
     }

@@ -218,12 +218,12 @@ fn cells_along_a_pitch_are_the_grid_of_as_many_taxels_and_a_taxel_feels_their_me
 
 #[test]
 fn more_cells_than_can_be_reckoned_with_are_refused_with_how_many_can() {
-    let said = |array: &Array, n: u16| check_cells(&Foam::default(), array, n).unwrap_err().to_string();
+    let message = |array: &Array, n: u16| check_cells(&Foam::default(), array, n).unwrap_err().to_string();
     let (thesis, large) = (Array::thesis(), Array::new(256, 256, 2.67, "large").unwrap());
-    assert!(said(&thesis, 0).contains("cells_per_pitch is 0") && said(&thesis, 17).contains("from 1 to 16"));
+    assert!(message(&thesis, 0).contains("cells_per_pitch is 0") && message(&thesis, 17).contains("from 1 to 16"));
     check_cells(&Foam::default(), &thesis, 16).unwrap();
     let most = most_cells(&Foam::default(), &large).unwrap();
-    assert!((2..16).contains(&most) && said(&large, 16).contains(&format!("must be {most} or less")));
+    assert!((2..16).contains(&most) && message(&large, 16).contains(&format!("must be {most} or less")));
 }
 
 #[test]

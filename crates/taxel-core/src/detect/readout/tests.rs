@@ -73,10 +73,10 @@ fn files_that_are_no_readout_are_refused_by_name() {
         (&good.replacen("\"tau\": 0.5", "\"tau\": 0", 1), "contact: tau is 0"),
         (&good.replacen("1.0,", "", 1), "contact: 9 weights, the encoder makes 10 trains of 64 x 64"),
     ];
-    for (text, said) in cases {
+    for (text, message) in cases {
         let error = Readout::from_json(text).unwrap_err();
-        assert!(matches!(error, Error::Format(_)), "{said}");
-        assert!(error.to_string().contains(said), "{error}, not {said}");
+        assert!(matches!(error, Error::Format(_)), "{message}");
+        assert!(error.to_string().contains(message), "{error}, not {message}");
         assert!(!error.to_string().contains('\n'));
     }
 }
@@ -85,8 +85,8 @@ fn files_that_are_no_readout_are_refused_by_name() {
 fn a_readout_refuses_neurons_that_were_trained_otherwise() {
     let mut other = readout();
     other.neurons.get_mut("lift").unwrap().neuron.after_spike = AfterSpike::Reset;
-    let said = other.check().unwrap_err().to_string();
-    assert_eq!(said, "lift: trained for after_spike \"reset\", this readout is for after_spike \"keep\"");
+    let message = other.check().unwrap_err().to_string();
+    assert_eq!(message, "lift: trained for after_spike \"reset\", this readout is for after_spike \"keep\"");
     let mut other = readout();
     other.neurons.get_mut("lift").unwrap().neuron.time = Time::Continuous;
     assert!(other.check().unwrap_err().to_string().starts_with("lift: trained for time \"continuous\""));
@@ -98,10 +98,10 @@ fn a_readout_refuses_neurons_that_were_trained_otherwise() {
 #[test]
 fn another_array_and_a_missing_tare_are_refused() {
     let array = Array::new(63, 64, 2.67, "other").unwrap();
-    let said = readout().stream(&array, 192.0, None).err().unwrap().to_string();
-    assert!(said.starts_with("an array of 63 x 64 taxels: the readout was trained on 64 x 64"), "{said}");
-    let said = readout().stream(&Array::thesis(), 192.0, None).err().unwrap().to_string();
-    assert!(said.contains("tare"), "{said}");
+    let message = readout().stream(&array, 192.0, None).err().unwrap().to_string();
+    assert!(message.starts_with("an array of 63 x 64 taxels: the readout was trained on 64 x 64"), "{message}");
+    let message = readout().stream(&Array::thesis(), 192.0, None).err().unwrap().to_string();
+    assert!(message.contains("tare"), "{message}");
     // A readout without an array of its own accepts every array with the same number of trains.
     let tare = Tare {
         array: array.clone(),
@@ -185,9 +185,9 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
                 .unwrap()
                 .0
         };
-        let said = run(&events, &zeroings);
-        assert_eq!(said, run(&low, &[]), "seed {seed}, {name}");
-        (count, changed) = (count + said.len(), changed + usize::from(said != run(&events, &[])));
+        let detections = run(&events, &zeroings);
+        assert_eq!(detections, run(&low, &[]), "seed {seed}, {name}");
+        (count, changed) = (count + detections.len(), changed + usize::from(detections != run(&events, &[])));
 
         // Live: pushed in pieces, with time advanced in between and each zeroing set before any later input.
         let mut live = readout.stream(&array, 192.0, Some(&tare)).unwrap();
@@ -204,7 +204,7 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
             from = to;
         }
         live.advance(events.t[599] + SILENCE_US, &mut pieces).unwrap();
-        assert_eq!(pieces, said, "seed {seed}, {name}");
+        assert_eq!(pieces, detections, "seed {seed}, {name}");
     }
     assert!(count > 400, "there must be detections to compare: {count}");
     assert!(changed > 20, "a zeroing changes the detections: {changed} of 40");
@@ -215,11 +215,11 @@ fn only_a_taxel_that_exists_is_zeroed() {
     let array = Array { exists: Some(vec![true, true, true, false]), ..Array::new(2, 2, 1.0, "three").unwrap() };
     let z = Zeroing { t: 0, x: 0, y: 0, rest: 1.0, before: None };
     assert!(z.check(&array).is_ok());
-    for (wrong, said) in [
+    for (wrong, message) in [
         (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: none there in 2 x 2"),
         (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: none there in 2 x 2"),
         (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: a rest of NaN"),
     ] {
-        assert_eq!(wrong.check(&array).unwrap_err().to_string(), said);
+        assert_eq!(wrong.check(&array).unwrap_err().to_string(), message);
     }
 }

@@ -32,8 +32,8 @@ fn a_preset_leaves_what_it_does_not_say() {
                 (then.wire_version, then.record, then.channels, then.lines),
                 (wire_version, record, channels, 8)
             );
-            let said = Registers { wire_version, record, channels, lines: 8, ..preset.registers };
-            assert_eq!(then, said, "{}", preset.name);
+            let chosen = Registers { wire_version, record, channels, lines: 8, ..preset.registers };
+            assert_eq!(then, chosen, "{}", preset.name);
         }
     }
     let of = |lines, channels| {

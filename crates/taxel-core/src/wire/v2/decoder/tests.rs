@@ -103,7 +103,7 @@ fn a_straggler_of_before_a_reset_changes_nothing_that_is_held_since() {
     let array = Array::thesis();
     let registers = Registers { wire_version: 2, ..Registers::default() };
     let mut board = Board::new(registers, &array).unwrap();
-    let mut said = |ticks: u16, taxels: usize| {
+    let mut sent = |ticks: u16, taxels: usize| {
         let mut out = vec![];
         for level in [0, ticks, ticks + 20] {
             let mut pressed = vec![0; 4096];
@@ -118,7 +118,7 @@ fn a_straggler_of_before_a_reset_changes_nothing_that_is_held_since() {
         board.reset().unwrap();
         out
     };
-    let (before, since) = (said(50, 4096), said(200, 100));
+    let (before, since) = (sent(50, 4096), sent(200, 100));
     let (late, begun) = before.split_last().unwrap();
     let mut decoder = Decoder::new(array.clone());
     let mut events = Events::empty(array);
