@@ -31,6 +31,15 @@ def test_moticon_rows_that_are_missing_for_a_foot_are_missing_not_zero(tmp_path)
     assert left.series["total"].max() == 400
 
 
+def test_a_moticon_insole_that_sent_nothing_is_an_empty_recording(tmp_path):
+    def silent(rows):
+        return [*rows[:3], *("\t".join([row.split("\t")[0], *[""] * 25, *row.split("\t")[26:]]) for row in rows[3:])]
+
+    write_moticon(tmp_path, silent)
+    left, right = formats.trials(tmp_path)
+    assert (left.frames.values.shape, right.frames.values.shape) == ((0, 1, 16), (199, 1, 16))
+
+
 def test_what_a_file_holds_beside_its_taxels_is_said_and_goes_with_the_file(tmp_path):
     left, right = taxel.open_all(write_moticon(tmp_path))
     columns = [

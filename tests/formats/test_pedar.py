@@ -38,6 +38,13 @@ def test_a_spoilt_pedar_line_is_named(tmp_path, change, said):
         list(formats.trials(tmp_path))
 
 
+def test_a_pedar_table_without_rows_is_two_empty_recordings(tmp_path):
+    write_pedar(tmp_path, lambda rows: rows[:5])
+    for trial in formats.trials(tmp_path):
+        assert trial.frames.values.shape == (0, 1, 5)
+        assert not any(map(len, trial.truth.values()))
+
+
 def test_pedar_contacts_are_the_rows_that_the_readme_lists():
     left, right = pedar.trials(shared("pressure_formats"))
     assert list(left.truth["contact"] // 10_000 - 1) == [343, 477, 603, 734, 859, 988, 1119, 1249, 1389]

@@ -87,6 +87,13 @@ def test_nwb_takes_our_trains_and_gives_them_back(tmp_path: Path, trains: SpikeT
     assert trains.values is None or np.array_equal(back.values, trains.values)
 
 
+def test_nwb_keeps_the_kind_of_trains_without_a_spike(tmp_path: Path) -> None:
+    pytest.importorskip("pynwb")
+    trains = SpikeTrains.from_lists([[], []], 0.0, 100.0, [[], []], kind="signed")
+    back = SpikeTrains.from_nwb(trains.to_nwb(tmp_path / "a.nwb"))
+    assert (len(back), len(back.times), back.kind) == (2, 0, "signed")
+
+
 def test_nwb_holds_seconds_and_what_was_watched(tmp_path: Path) -> None:
     pynwb = pytest.importorskip("pynwb")
     begun = datetime(2021, 5, 4, 12, tzinfo=UTC)

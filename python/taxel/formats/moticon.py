@@ -109,7 +109,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             name=f"{file.stem} {foot}",
             person=about.get("Sensor insoles", "moticon"),
             recorded=Frames(
-                readings.column("values").reshape(len(readings), 1, -1),
+                readings.column("values")[:, None],
                 readings.column("t"),
                 unit="N/cm2",
                 array=Array(1, len(columns) - 1, name="Moticon insole"),

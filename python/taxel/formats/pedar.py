@@ -97,7 +97,7 @@ def _read(file: Path) -> Iterator[Trial]:
             name=f"{file.stem} {foot}",
             person=file.stem,
             recorded=Frames(
-                (pressure := read.column(foot)).reshape(len(t), 1, -1),
+                (pressure := read.column(foot))[:, None],
                 t,
                 unit=unit[1] if unit else "kPa",
                 array=Array(1, pressure.shape[1], name="pedar insole"),
