@@ -61,7 +61,7 @@ def _write(file: BinaryIO, source: BinaryIO) -> None:
     if values is not None:
         meaning = "factor of the weight" if kind == "graded" else "polarity or bits"
         # A list without values has no type to write.
-        none = [] if any(map(len, values)) else np.empty(0, np.float32)
+        none: Any = [] if any(map(len, values)) else np.empty(0, np.float32)
         session.add_unit_column("value", f"{kind} value of each spike: {meaning}", data=none, index=True)
     valued: dict[str, object] = {}
     if kind == "graded":
