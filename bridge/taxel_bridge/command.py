@@ -103,13 +103,12 @@ def _announce(place: str, name: str, console: Console) -> None:
         console.print(
             f"warning: every computer that reaches {place} can receive the board, and the connection is not encrypted: "
             "use it on a network that you trust, or through a tunnel",
-            soft_wrap=True,
         )
     if host in ("0.0.0.0", "::"):
         # These stand for all addresses of this computer; other computers need one of them.
         place = f"HOST:{place.rpartition(':')[2]}"
         name += ", HOST being this computer's name or address"
-    console.print(f"receive it with --from zenoh:{place}/{name}", soft_wrap=True, highlight=False)
+    console.print(f"receive it with --from zenoh:{place}/{name}", highlight=False)
 
 
 def _watch(live: Live, published: Bridge, seconds: float | None, console: Console) -> None:

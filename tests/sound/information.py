@@ -97,6 +97,10 @@ SOUND: dict[str, Sound] = {
         for readout in READOUTS
         for name in ("predict", "decision_function")
     },
+    **{
+        f"taxel.information.{type(readout).__name__}.score": method(readout, "score", patterns=[PLAIN], y=[0])
+        for readout in READOUTS
+    },
     "taxel.information.LabelledTrial": plain(
         taxel.information.LabelledTrial,
         source=EVENTS,

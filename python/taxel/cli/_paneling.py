@@ -28,8 +28,7 @@ def announce(panel: Panel, opens: bool, console: Console) -> None:
         console.print(
             f"warning: the panel listens on {host}: everybody who has its address with the token can see the board "
             "and set registers, and the connection is not encrypted",
-            soft_wrap=True,
         )
-    console.print(f"panel: {panel.url}", soft_wrap=True, highlight=False)
+    console.print(f"panel: {panel.url}", highlight=False)
     if opens and not webbrowser.open(panel.url):
         console.print("no browser could be opened here: open the address yourself")

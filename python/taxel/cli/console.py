@@ -20,6 +20,10 @@ class Console(rich.console.Console):  # noqa: TID251  the place where it is allo
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, **options)
 
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print; a text is one line, however long: a path that is broken in two cannot be copied or searched for."""
+        super().print(*objects, **{"soft_wrap": all(isinstance(shown, str) for shown in objects), **options})
+
     def render_str(self, text: str, **options: Any) -> Text:
         """Return a text as one line: a name in it may hold line breaks."""
         return super().render_str(escaped(text), **options)

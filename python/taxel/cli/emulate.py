@@ -141,10 +141,10 @@ def emulate(typed: _Typed) -> None:
         try_whole(typed.labels, overwrite=typed.overwrite)
     touch, text, board = _played(typed)
     console = Console(stderr=True, quiet=typed.as_json)
-    console.print(f"{text}, to {typed.host}:{typed.port}", soft_wrap=True)
+    console.print(f"{text}, to {typed.host}:{typed.port}")
     report = _emulated(typed, touch, board, console)
     if typed.labels is not None:
-        console.print(f"truth: {typed.labels}", soft_wrap=True)
+        console.print(f"truth: {typed.labels}")
     if typed.as_json:
         summary: dict[str, Any] = {"seed": board["seed"], "scenes": typed.scenes, "preset": board["preset"]}
         summary |= {"held": report.held, "verdict": report.verdict}
@@ -232,7 +232,7 @@ def _emulated(typed: _Typed, touch: Any, board: dict[str, Any], console: Console
             if address is not None:
                 console.print(f"commands are accepted at {address}")
             if typed.line is not None:
-                console.print(f"the serial line is {typed.line}", soft_wrap=True)
+                console.print(f"the serial line is {typed.line}")
 
         def watch(report: EmulatorReport) -> None:
             last[:] = [report]

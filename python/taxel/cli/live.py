@@ -118,8 +118,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
             frame_us = Registers(array=Array._of(sensor)).frame_us
             console.print(
                 f"the readout assumes frames of {plain(frame_us)} us, as of a board at reset; state others by "
-                "--preset, or by --rate-hz and --bits",
-                soft_wrap=True,
+                "--preset, or by --rate-hz and --bits"
             )
         with Live(**options | {"remote": board}) as pipeline:
             last = _shown(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
@@ -132,7 +131,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
         console.print(f"tare written to {typed.save_tare}")
     if typed.report is not None and trained is not None and summary.path is not None:
         _report(typed.report, trained, summary.path, tare if tare is not None else rest)
-        console.print(f"report: {typed.report / 'report.html'}", soft_wrap=True)
+        console.print(f"report: {typed.report / 'report.html'}")
     _unsent(summary)
     if not lines:
         _print_summary(summary, options["guard_frames"])
@@ -283,7 +282,7 @@ def _watch(
             # Where the display is not shown, each silence is one line.
             if not console.is_terminal and bool(now_silent := _silence(now, pipeline.place)) != bool(silence):
                 silence = now_silent
-                console.print(silence or "datagrams arrive", soft_wrap=True)
+                console.print(silence or "datagrams arrive")
             if not now["taring"]:
                 at_rest.close()
                 if panel is not None and control is not None:

@@ -111,7 +111,7 @@ class _NeuronPerClass(Parameters, ABC):
 
         Raises
         ------
-        ProblemError : not fitted, or patterns that are invalid
+        ProblemError : not fitted, no pattern, or patterns or labels that are invalid
 
         Examples
         --------
@@ -119,7 +119,10 @@ class _NeuronPerClass(Parameters, ABC):
         >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
         1.0
         """
-        return float(np.mean(self.predict(patterns) == words("y", y)))
+        found, labels = self.predict(patterns), words("y", y)
+        if not 0 < len(labels) == len(found):
+            raise refused("y", f" has {len(labels)} entries: must be {max(1, len(found))}, one a pattern")
+        return float(np.mean(found == labels))
 
     def __sklearn_tags__(self) -> Any:
         # Only scikit-learn calls this, so it is installed.

@@ -303,7 +303,7 @@ impl TareBuilder {
         };
         let (rest, noise) = (of_each(Integral::mean), of_each(Integral::deviation));
         if rest.iter().all(Option::is_none) {
-            return Err(problem!("tare from {start} to {stop} us: nothing came"));
+            return Err(problem!("tare from {start} to {stop} us: no value came"));
         }
         Ok(Tare { rest, noise, array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
     }
