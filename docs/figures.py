@@ -3,7 +3,7 @@
 python docs/figures.py            judges all statements and draws all pictures again
 python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first, with the commit
 
-A report is taken if the commit that is checked out computed it, without local changes. Beside each figure its coarse
+A report is taken if the commit that is checked out computed it, without local changes. Beside each figure its toy
 result is kept, with which `taxel study NAME --confirm` compares that of later code.
 """
 
@@ -18,14 +18,14 @@ from typing import Any
 
 from taxel_studies import STUDIES, load
 from taxel_studies.commit import code_version
-from taxel_studies.kept import keep_coarse
+from taxel_studies.kept import keep_toy
 from taxel_studies.study import drawn
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
 
 
 def keep(report: Path, data: Path | None = None) -> None:
-    """Copy the numbers of a report, and run it at coarse size; its tables are made again where they are shown."""
+    """Copy the numbers of a report, and run it at toy size; its tables are made again where they are shown."""
     for name in STUDIES:
         summary = report / name / "summary.json"
         if summary.exists():
@@ -34,7 +34,7 @@ def keep(report: Path, data: Path | None = None) -> None:
             if section.get("commit") != code_version("taxel", "taxel_studies"):
                 sys.exit(f"{name}: not computed by the commit that is checked out, without local changes; run it again")
             (FIGURES / f"{name}.json").write_text(json.dumps(section) + "\n")
-            keep_coarse(name, FIGURES, data=data)
+            keep_toy(name, FIGURES, data=data)
 
 
 def judged(section: dict[str, Any]) -> list[dict[str, Any]]:

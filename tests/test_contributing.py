@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FORMAT, STUDY, ENCODER, LEARNER, PAGE, OPTION = "channel", "quiet", "binary", "echo", "clients", "mounted"
 #: The tests that check the laws and registries of formats, studies, encoders, learners, and parts of the page.
 TESTS = {
-    FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
+    FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py", "tests/recording/test_memory.py"],
     STUDY: [
         f"studies/tests/{name}.py"
         for name in ("test_study_registry", "test_quiet", "test_studies", "test_public_names")
@@ -78,7 +78,7 @@ def copy(tmp_path: Path) -> Path:
     for compiled in (ROOT / "python" / "taxel").glob("_core*.so"):
         (tmp_path / "python" / "taxel" / compiled.name).symlink_to(compiled)
     shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=unneeded)
-    for room in ("formats", "learn"):
+    for room in ("formats", "learn", "recording"):
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
     for shared in (ROOT / "tests").glob("[!t]*.py"):
         shutil.copy(shared, tmp_path / "tests")
@@ -95,6 +95,7 @@ def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     quietly = ["-q", "-p", "no:cacheprovider", "--continue-on-collection-errors"]
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
     about = {STUDY: f"{name} or registry or without_weight", LEARNER: "echo or Echo or nothing_is_left_out"}
+    about[FORMAT] = "channel or registry or among_the_large"
     about[ENCODER] = "binary or nothing_is_left_out"
     about[OPTION] = "live or option"
     chosen = ["-k", about[name]] if name in about else []
@@ -107,6 +108,7 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("python/taxel/formats/channel.py", False),
         ("python/taxel/formats/__init__.py", True),
         ("tests/formats/making.py", True),
+        ("tests/recording/large.py", True),
         ("tests/formats/test_channel.py", False),
     ]
     assert [(p.path, bool(p.after)) for p in of(STUDY)] == [
@@ -161,6 +163,7 @@ def test_what_contributing_says_is_enough(copy: Path, name: str) -> None:
         (FORMAT, "formats/__init__.py", "FORMATS lacks channel"),
         (FORMAT, "making.py", "write_channel"),
         (FORMAT, "test_channel.py", "add tests/formats/test_channel.py"),
+        (FORMAT, "large.py", "Extra items in the left set"),
         (FORMAT, "formats/channel.py", "No module named 'taxel.formats.channel'"),
         (STUDY, "taxel_studies/__init__.py", "STUDIES lacks quiet"),
         (STUDY, "test_quiet.py", "no test of studies/tests imports or names quiet"),

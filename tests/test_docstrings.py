@@ -55,6 +55,7 @@ def entries(lines: list[str]) -> dict[str, str]:
         if line and not line.startswith(" "):
             listed, _, about = line.partition(" : ")
             names = [name.strip().lstrip("*") for name in listed.split(",")]
+            assert not found.keys() & set(names), f"two entries of {names}"
             found |= dict.fromkeys(names, about)
         else:
             found |= {name: f"{found[name]} {line.strip()}" for name in names}

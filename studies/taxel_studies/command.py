@@ -77,7 +77,7 @@ def every(
     figures: Figures = KEPT,
     as_json: AsJson = False,
 ) -> None:
-    """Run every study and make one page of them; with --confirm, compare each with its kept coarse result.
+    """Run every study and make one page of them; with --confirm, compare each with its kept toy result.
 
     Studies on recordings are left out, and named, where no recordings are; so are those whose packages are not
     installed.

@@ -1,7 +1,7 @@
-"""The kept figures, and whether today's code still gives their coarse results.
+"""The kept figures, and whether today's code still gives their toy results.
 
 A figure is kept as its numbers, ``NAME.json``, with the commit, the date and the machine that computed them. Beside it,
-``coarse/NAME.json`` holds what the study gave at size toy: a check in minutes, where a figure takes hours.
+``toy/NAME.json`` holds what the study gave at size toy: a check in minutes, where a figure takes hours.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from taxel import FormatError, ProblemError
 from taxel.report import write_whole
 from taxel_studies import STUDIES, load
 
-__all__ = ["COARSE", "coarse_result", "confirm", "keep_coarse", "kept_figures"]
+__all__ = ["TOY", "confirm", "keep_toy", "kept_figures", "toy_result"]
 
-#: The size of the coarse result.
-COARSE = "toy"
+#: The size of the toy result.
+TOY = "toy"
 #: What is compared of a result; the rest says by which code, when and where it was computed.
 _COMPARED = ("parameters", "unread", "said")
 #: Times differ from run to run, so they are not compared.
@@ -39,10 +39,10 @@ def kept_figures(folder: Path) -> list[str]:
     return names
 
 
-def coarse_result(name: str, data: Path | None = None, *, strict: bool = False) -> dict[str, Any]:
+def toy_result(name: str, data: Path | None = None, *, strict: bool = False) -> dict[str, Any]:
     """Run a study at its smallest size; return parameters and results without times, commit, date and machine."""
     with tempfile.TemporaryDirectory() as report:
-        section = load(name).run(Path(report), size=COARSE, data=data, strict=strict, quiet=True)
+        section = load(name).run(Path(report), size=TOY, data=data, strict=strict, quiet=True)
     result = {key: section[key] for key in (*_COMPARED, "commit", "date", "machine")}
     plain: dict[str, Any] = json.loads(json.dumps(result | {"said": _timeless(section["said"])}))
     return plain
@@ -55,12 +55,12 @@ def _timeless(value: Any) -> Any:
 
 
 def confirm(name: str, folder: Path, *, data: Path | None = None, strict: bool = False) -> None:
-    """Run a study at coarse size, and compare the result with the kept one.
+    """Run a study at toy size, and compare the result with the kept one.
 
     Parameters
     ----------
     name : str
-        Of a study whose coarse result is kept.
+        Of a study whose toy result is kept.
     folder : Path
         Of the kept figures.
     data : Path, optional
@@ -70,23 +70,23 @@ def confirm(name: str, folder: Path, *, data: Path | None = None, strict: bool =
 
     Raises
     ------
-    ProblemError : no coarse result is kept; the result differs from the kept one by more than rounding
+    ProblemError : no toy result is kept; the result differs from the kept one by more than rounding
     """
-    file = folder / "coarse" / f"{name}.json"
+    file = folder / "toy" / f"{name}.json"
     if not file.exists():
-        raise ProblemError(f"{file}: no coarse result of {name} is kept; docs/figures.py keeps one with a figure")
-    before, now = json.loads(file.read_text(encoding="utf-8")), coarse_result(name, data, strict=strict)
+        raise ProblemError(f"{file}: no toy result of {name} is kept; docs/figures.py keeps one with a figure")
+    before, now = json.loads(file.read_text(encoding="utf-8")), toy_result(name, data, strict=strict)
     differs = [line for key in _COMPARED for line in _differences(before[key], now[key], key)]
     if differs:
         more = f" and {len(differs) - 3} more" if len(differs) > 3 else ""
-        raise ProblemError(f"{name}: its coarse result is another one: {'; '.join(differs[:3])}{more}")
+        raise ProblemError(f"{name}: its toy result is another one: {'; '.join(differs[:3])}{more}")
 
 
-def keep_coarse(name: str, folder: Path, *, data: Path | None = None) -> None:
-    """Run a study at coarse size, and keep the result beside its figure."""
-    (folder / "coarse").mkdir(exist_ok=True)
-    text = json.dumps(coarse_result(name, data)) + "\n"
-    write_whole(folder / "coarse" / f"{name}.json", lambda into: into.write(text.encode()), overwrite=True)
+def keep_toy(name: str, folder: Path, *, data: Path | None = None) -> None:
+    """Run a study at toy size, and keep the result beside its figure."""
+    (folder / "toy").mkdir(exist_ok=True)
+    text = json.dumps(toy_result(name, data)) + "\n"
+    write_whole(folder / "toy" / f"{name}.json", lambda into: into.write(text.encode()), overwrite=True)
 
 
 def _differences(kept: Any, now: Any, where: str) -> Any:

@@ -1,4 +1,4 @@
-"""Figures saved for the page name the commit that ran them, or are not saved; their coarse results are compared."""
+"""Figures saved for the page name the commit that ran them, or are not saved; their toy results are compared."""
 
 import importlib.util
 import json
@@ -35,12 +35,12 @@ def report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_kept_figure_and_its_coarse_result_name_the_commit(report: Path) -> None:
+def test_a_kept_figure_and_its_toy_result_name_the_commit(report: Path) -> None:
     figures.keep(report)
-    for name in ("fig6.1.json", "coarse/fig6.1.json"):
+    for name in ("fig6.1.json", "toy/fig6.1.json"):
         assert json.loads((report / "kept" / name).read_text())["commit"] == "0123abc"
-    coarse = json.loads((report / "kept" / "coarse" / "fig6.1.json").read_text())
-    assert {"date", "machine"} < coarse.keys()
+    toy = json.loads((report / "kept" / "toy" / "fig6.1.json").read_text())
+    assert {"date", "machine"} < toy.keys()
 
 
 @pytest.mark.parametrize("code", ["4567def", "0123abc with local changes, 1"])
@@ -72,11 +72,11 @@ def test_bars_begin_at_zero(file: Path) -> None:
 
 @pytest.fixture
 def figure(tmp_path: Path) -> Path:
-    """A folder that keeps one small figure with its coarse result."""
+    """A folder that keeps one small figure with its toy result."""
     section = load("fig6.1").run(tmp_path / "report", size="toy", quiet=True)
     (tmp_path / "kept").mkdir()
     (tmp_path / "kept" / "fig6.1.json").write_text(json.dumps(section))
-    kept.keep_coarse("fig6.1", tmp_path / "kept")
+    kept.keep_toy("fig6.1", tmp_path / "kept")
     return tmp_path / "kept"
 
 
@@ -90,20 +90,20 @@ def test_what_is_not_kept_is_refused(figure: Path) -> None:
     assert kept.kept_figures(figure) == ["fig6.1"]
     with pytest.raises(FormatError, match="holds no kept figure"):
         kept.kept_figures(figure / "report")
-    with pytest.raises(ProblemError, match=r"fig6\.2\.json: no coarse result of fig6\.2 is kept"):
+    with pytest.raises(ProblemError, match=r"fig6\.2\.json: no toy result of fig6\.2 is kept"):
         kept.confirm("fig6.2", figure)
 
 
 @pytest.mark.parametrize("part", ["said", "parameters", "unread"])
-def test_a_coarse_result_that_is_another_one_is_found_and_stays(figure: Path, part: str) -> None:
-    file = figure / "coarse" / "fig6.1.json"
+def test_a_toy_result_that_is_another_one_is_found_and_stays(figure: Path, part: str) -> None:
+    file = figure / "toy" / "fig6.1.json"
     spoil(file, lambda result: result.update({"commit": "4567def", "date": "2020-01-01", "machine": "another"}))
     before = file.read_text()
     kept.confirm("fig6.1", figure)
     assert file.read_text() == before
     spoil(file, lambda result: result[part].update({"spikes": [1.0]}))
     before = file.read_text()
-    with pytest.raises(ProblemError, match=r"fig6\.1: its coarse result is another one"):
+    with pytest.raises(ProblemError, match=r"fig6\.1: its toy result is another one"):
         kept.confirm("fig6.1", figure)
     assert file.read_text() == before
 
@@ -115,10 +115,10 @@ def test_a_result_that_is_rounded_otherwise_is_the_same(figure: Path) -> None:
 
         return change
 
-    spoil(figure / "coarse" / "fig6.1.json", moved(1e-13))
+    spoil(figure / "toy" / "fig6.1.json", moved(1e-13))
     kept.confirm("fig6.1", figure)
-    spoil(figure / "coarse" / "fig6.1.json", moved(1e-7))
-    with pytest.raises(ProblemError, match="its coarse result is another one"):
+    spoil(figure / "toy" / "fig6.1.json", moved(1e-7))
+    with pytest.raises(ProblemError, match="its toy result is another one"):
         kept.confirm("fig6.1", figure)
 
 
@@ -135,8 +135,8 @@ def test_all_kept_figures_are_tried_and_those_that_moved_named(figure: Path) -> 
     for name in ("fig6.2", "fig6.1"):
         section = json.loads((figure / "fig6.1.json").read_text()) | {"name": name}
         (figure / f"{name}.json").write_text(json.dumps(section))
-        kept.keep_coarse(name, figure)
-    spoil(figure / "coarse" / "fig6.1.json", lambda result: result["said"].update({"spikes": [1.0]}))
+        kept.keep_toy(name, figure)
+    spoil(figure / "toy" / "fig6.1.json", lambda result: result["said"].update({"spikes": [1.0]}))
     ended = CliRunner().invoke(app, ["all", "--confirm", "--figures", str(figure)])
     assert isinstance(ended.exception, ProblemError)
     assert "not confirmed: fig6.1;" in str(ended.exception)
@@ -146,7 +146,7 @@ def test_all_kept_figures_are_tried_and_those_that_moved_named(figure: Path) -> 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("name", kept.kept_figures(figures.FIGURES))
-def test_a_study_gives_its_kept_coarse_result(name: str) -> None:
+def test_a_study_gives_its_kept_toy_result(name: str) -> None:
     data = Path(os.environ["TAXEL_DATA"]) if "TAXEL_DATA" in os.environ else None
     why = load(name).cannot_run(data)
     if why is not None:

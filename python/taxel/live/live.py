@@ -111,16 +111,6 @@ class Live:
         Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and
         is raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues
         to receive; up to 16 384 detections wait for it.
-    lines : bool
-        Write each detection to the standard output as one line of JSON.
-    send : str or sequence of str
-        Send each detection as such a line to "udp:HOST:PORT" (a datagram each), "pipe:PATH" (an existing named pipe)
-        or "serial:PATH@BAUD"; "lsl:NAME" sends its label in a stream of markers of the lab streaming layer. Up to 1024
-        lines wait for a slow reader; lines without room, or without a reader, are lost and counted.
-    kernel_buffer_bytes, queue_bytes, readout_events : int, 0 or more (bytes, bytes, events), optional
-        Sizes of the queues in the kernel, before the decoder and before the readout.
-    gro : bool, optional
-        Let the kernel merge trains of datagrams (`UDP_GRO`). It then counts its drops in trains.
 
     Raises
     ------
