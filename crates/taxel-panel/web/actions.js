@@ -17,20 +17,18 @@ import { seconds } from "./words.js";
  * @property {import("./labels.js").Labels} labels
  * @property {import("./view.js").View} view
  * @property {import("./maps.js").Maps} maps
+ * @property {import("./lanes.js").Lanes} lanes
  * @property {import("./window.js").TimeWindow} window
  */
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
-
-/** Difference between the widths of raster and lanes on each side, CSS pixels. */
-const RASTER_INSET = 44;
 
 /**
  * Binds keys and buttons to their actions.
  * @param {Parts} parts
  * @param {() => Timeline | null} timeline
  */
-export function bindActions({ server, player, settings, recorder, labels, view, maps, window }, timeline) {
+export function bindActions({ server, player, settings, recorder, labels, view, maps, lanes, window }, timeline) {
   const help = part("help", HTMLDialogElement);
   const cutHere = (/** @type {0 | 1} */ end) => player.meant(timeline()?.cursor_us).then((t_us) => view.setCut(end, t_us));
   const step = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
@@ -47,7 +45,7 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
     settings.set("theme", next);
     notify(`theme: ${next === "system" ? "as the system has it" : next}`);
   };
-  const picture = () => savePicture(pictureOf(player, settings, maps)).then(() => notify("picture saved"), failed);
+  const picture = () => savePicture(pictureOf(player, lanes)).then(() => notify("picture saved"), failed);
   /** Sets the rest of the watched taxel to its held value, for the readout too. */
   const zero = () => {
     const { taxel } = maps;
@@ -112,29 +110,10 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
 /**
  * What a saved picture contains.
  * @param {Parts["player"]} player
- * @param {Parts["settings"]} settings
- * @param {Parts["maps"]} maps
+ * @param {Parts["lanes"]} lanes
  */
-function pictureOf(player, { values }, maps) {
-  /** @type {{ title: string, canvas: HTMLCanvasElement, inset: number }[]} */
-  const lanes = [];
-  for (const [id, title] of /** @type {const} */ ([
-    ["raster", values.raster === "spikes" ? "Spikes by row" : "Changes by row"],
-    ["channels", `Channels, ${part("channels-scale", HTMLElement).textContent}`],
-  ])) {
-    const canvas = part(id, HTMLCanvasElement);
-    if (canvas.clientWidth) lanes.push({ title, canvas, inset: RASTER_INSET });
-  }
-  for (const [id, on, title] of /** @type {const} */ ([
-    ["taxel-lane", values.showTaxel, `Taxel ${maps.named()}`],
-    ["force-lane", values.showForce, `${part("force-title", HTMLElement).textContent} and area`],
-    ["centre-lane", values.showCentre, "Centre"],
-  ])) {
-    const canvas = part(id, HTMLElement).querySelector("canvas");
-    // The lane of a watched taxel is hidden while none is watched.
-    if (on && canvas?.clientWidth) lanes.push({ title, canvas, inset: 0 });
-  }
+function pictureOf(player, lanes) {
   const source = player.transport.source ?? "live";
   const at = seconds(player.t_us ?? 0);
-  return { title: `${source}, ${at}`, file: `${source.replace(/\.[^.]+$/, "")}-${at.replace(/[ ,]/g, "")}.png`, lanes };
+  return { title: `${source}, ${at}`, file: `${source.replace(/\.[^.]+$/, "")}-${at.replace(/[ ,]/g, "")}.png`, lanes: lanes.pictured() };
 }

@@ -1,6 +1,7 @@
 // The curves of all channels, one above the other: of a sensor that has no map.
 
-import { fitted, ground, themed } from "./dom.js";
+import { fitted, ground, make, themed } from "./dom.js";
+import { rounded } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
@@ -8,28 +9,54 @@ import { fitted, ground, themed } from "./dom.js";
 const LEAST = 8;
 /** Room between two curves, CSS pixels. */
 const GAP = 2;
+/** So many names have room beside their curves. */
+const NAMED = 8;
 
 /** The canvas of the curves; all have one scale, so that they can be compared. */
 export class Channels {
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
-    this.canvas = canvas;
-    this.context = ground(canvas);
+  /** @param {HTMLElement} place */
+  constructor(place) {
+    this.place = place;
+    this.names = make("span", { id: "channel-names", class: "rows", "aria-hidden": "true" });
+    this.canvas = make("canvas", { id: "channels" });
+    place.append(this.names, this.canvas);
+    this.context = ground(this.canvas);
+    /** The sensor whose channels are named. @type {import("./geometry.js").Geometry | null} */
+    this.sensor = null;
+  }
+
+  /**
+   * Names the sources that stand one above the other; else the channels, or only the first and the last without names or of many.
+   * @param {import("./geometry.js").Geometry} sensor
+   * @param {number[]} places
+   */
+  name(sensor, places) {
+    const { array, sources } = sensor;
+    this.sensor = sensor;
+    this.place.parentElement?.style.setProperty("--count", String(places.length));
+    const all = array.names !== undefined && places.length <= NAMED;
+    const shown = (all ? places : [places[0], places[places.length - 1]]).map((k) => array.names?.[k] || String(k));
+    const several = sources.length > 1;
+    this.names.classList.toggle("several", several || all);
+    this.names.replaceChildren(...(several ? sources.map(({ name }) => name) : shown).map((name) => make("span", { title: name }, name)));
   }
 
   /**
    * @param {Timeline} timeline
-   * @param {number[]} places of the channels that exist
-   * @param {number | null} watched the place of one of them
-   * @returns {number} the steps above rest that fill a curve's height
+   * @param {import("./lanes.js").Shown} shown
+   * @returns {string} the value that fills a curve's height
    */
-  draw(timeline, places, watched) {
+  draw(timeline, { sensor, taxel, values }) {
+    if (sensor.kind !== "channels") return "";
+    const places = sensor.there;
+    const watched = taxel && Math.max(...taxel);
+    if (this.sensor !== sensor) this.name(sensor, places);
     const { width, height, ratio } = fitted(this.canvas);
     const { context } = this;
     const { columns, window, column_us, span_us, channels, channel_count: all } = timeline;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
-    if (!columns || !window || !all || !width || !height) return LEAST;
+    if (!columns || !window || !all || !width || !height) return "";
     const [first, last] = columns;
     // A column more on the left, so that curves begin at the edge.
     const shown = Array.from({ length: last - first + 2 }, (_, i) => timeline.known(first - 1 + i));
@@ -71,6 +98,6 @@ export class Channels {
       context.globalAlpha = 1;
       context.stroke(curve);
     });
-    return most;
+    return `each up to ${rounded(most * values.step)} ${values.unit}`;
   }
 }

@@ -1,8 +1,7 @@
-// The time cursor over the lanes, and the values of the lanes at it; what pointer and wheel do there.
+// The time cursor over the lanes; what pointer and wheel do there.
 
 import { part, write } from "./dom.js";
-import { UNKNOWN_VALUE } from "./protocol.js";
-import { rounded, seconds, whole } from "./words.js";
+import { seconds } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
@@ -26,12 +25,6 @@ export class Cursor {
     this.timeline = timeline;
     this.window = window;
     this.track = part("track", HTMLElement);
-    /** Unit of the values, size of a tick in it, and ticks of the value 0. */
-    this.values = { unit: "ticks", step: 1, zero: 0 };
-    /** Unit of their sum, and size of a tick in it. */
-    this.sums = { unit: "ticks", step: 1 };
-    /** The sensor that is shown. @type {import("./geometry.js").Geometry | null} */
-    this.sensor = null;
     /** Where a press began, and whether it has become a drag. @type {{ x: number, drags: boolean } | null} */
     this.press = null;
     const lanes = part("lanes", HTMLElement);
@@ -111,51 +104,10 @@ export class Cursor {
       line.hidden = share === null;
       if (share !== null) line.style.left = `${(100 * share).toFixed(3)}%`;
     };
-    place(part("cursor-line", HTMLElement), timeline?.cursor_us ?? null);
+    const cursor = timeline?.cursor_us ?? null;
+    place(part("cursor-line", HTMLElement), cursor);
+    write(part("cursor-time", HTMLElement), cursor === null ? "" : seconds(cursor));
     const t_us = timeline?.t_us ?? null;
     place(part("time-line", HTMLElement), timeline?.following ? null : t_us);
-  }
-
-  /** Writes the values at the cursor, or at the time shown. */
-  write() {
-    const timeline = this.timeline();
-    const place = timeline?.pointed ?? -1;
-    const outputs = [...part("force-sums", HTMLElement).querySelectorAll("output")];
-    const cursor = timeline?.cursor_us ?? null;
-    write(part("cursor-time", HTMLElement), cursor === null ? "" : seconds(cursor));
-    if (!timeline || place < 0) {
-      for (const output of [...outputs, ...["taxel-now", "force-area", "centre-now"].map((id) => part(id, HTMLElement))]) write(output, "");
-      return;
-    }
-    const [least, greatest, last] = timeline.history.subarray(3 * place, 3 * place + 3);
-    const { unit, step, zero } = this.values;
-    const value = (/** @type {number} */ ticks) => rounded((ticks - zero) * step);
-    const now = `${value(last)} ${unit}`;
-    write(part("taxel-now", HTMLElement), last === UNKNOWN_VALUE ? "" : least === greatest ? now : `${now} (${value(least)} to ${value(greatest)})`);
-    const { sums } = this;
-    const written = timeline.sums(place).map((sum) => (Number.isNaN(sum) ? "missing" : `${sums.step === 1 ? whole(sum) : rounded(sum * sums.step)} ${sums.unit}`));
-    outputs.forEach((output, k) => write(output, written[k] ?? ""));
-    if (Number.isNaN(timeline.sum[place])) {
-      write(part("shown-info", HTMLElement), "missing");
-      for (const id of ["force-area", "centre-now"]) write(part(id, HTMLElement), "");
-      return;
-    }
-    const area = this.sensor?.area(timeline.area[place]) ?? "";
-    write(part("force-area", HTMLElement), area);
-    const centre = this.centre(timeline, place);
-    write(part("centre-now", HTMLElement), centre);
-    const channels = this.sensor?.kind === "channels";
-    const sum = written.length > 1 ? written.map((one, k) => `${this.sensor?.sources[k].name ?? ""} ${one}`).join(", ") : written[0];
-    write(part("shown-info", HTMLElement), `${sum}${channels ? "" : ` over ${area}, centre (${this.sensor?.axes.join(", ") ?? ""}): ${centre}`}`);
-  }
-
-  /** @param {Timeline} timeline @param {number} place @returns {string} the centre of pressure, of several sources of each that is pressed */
-  centre(timeline, place) {
-    const { sensor } = this;
-    const [first, ...others] = timeline.centres(place);
-    if (!sensor || sensor.kind === "channels") return "";
-    if (!others.length) return Number.isNaN(first[0]) ? "nothing pressed" : sensor.centre(...first);
-    const pressed = [first, ...others].flatMap((at, k) => (Number.isNaN(at[0]) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, at)}`]));
-    return pressed.length ? `${pressed.join("  ")} ${sensor.unit}`.trim() : "nothing pressed";
   }
 }

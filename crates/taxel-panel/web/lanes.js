@@ -1,201 +1,321 @@
-// Curves under the raster: the watched taxel, force and area, the centre. All share one time.
+// The lanes, one above the other: all share one time. A new lane is an entry of LANES and what draws it: the block on the page, its place, its
+// box in the tab of the view, what the cursor says and what a saved picture contains come from the entry.
 
-import uPlot from "./vendor/uPlot.js";
-import { escaped, make, part, themed, write } from "./dom.js";
+import { Channels } from "./channels.js";
+import { make, part, themed, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
-import { rounded } from "./words.js";
+import { Raster } from "./raster.js";
+import uPlot from "./vendor/uPlot.js";
+import { rounded, whole } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
-/** @typedef {(number | null)[]} Curve */
-/** @typedef {"taxel" | "force" | "centre"} Name */
+/** @typedef {{ draw: (timeline: Timeline, shown: Shown) => string, colour?: () => void }} Painter `draw` returns what the heading says;
+ *   `colour` is called before it, and for each theme */
+/** @typedef {{ scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }} Plan of the curves, without the axis of time */
+
+/**
+ * What the page shows.
+ * @typedef {object} Shown
+ * @property {import("./geometry.js").Geometry} sensor
+ * @property {import("./geometry.js").Taxel | null} taxel the watched one
+ * @property {string} named its name
+ * @property {{ unit: string, step: number, zero: number, frames: boolean }} values their unit, the size of a tick in it, ticks of the value 0, and whether they are of frames
+ * @property {{ unit: string, step: number }} sums unit of the sum of the values, and size of a tick in it
+ * @property {string} raster "changes" or "spikes"
+ * @property {string} spikes encoder and latency
+ */
+
+/**
+ * A lane. It draws curves (`plan`, `at`, `says`), or paints a canvas (`painter`).
+ * @typedef {object} Lane
+ * @property {string} name of its elements: `NAME-block` with a heading, and `NAME-lane`
+ * @property {string} label what it is, for those who hear the page
+ * @property {number} least height that it needs with its heading, CSS pixels
+ * @property {string} [kind] class of its place in style.css
+ * @property {`show${string}`} setting that shows it
+ * @property {string} [box] text of the setting's box; without one it shares the box of another lane
+ * @property {(shown: Shown) => boolean} [fits] whether it has anything to show of this source; without it: of all
+ * @property {(shown: Shown, sources: string[]) => (Node | string)[]} heading
+ * @property {(shown: Shown, said: string) => string} title in a saved picture; said: by its heading
+ * @property {(shown: () => Shown, sources: string[]) => Plan} [plan]
+ * @property {(shown: Shown, timeline: Timeline, place: number) => (number | null)[]} [at] values of all curves in a column
+ * @property {(shown: Shown, timeline: Timeline, place: number) => string[]} [says] texts of the outputs in its heading, of a column
+ * @property {(place: HTMLElement) => Painter} [painter]
+ */
 
 /** Room for the numbers on either side, CSS pixels; the raster has the same. */
 const SIDE = 44;
 /** CSS pixels between two lines of the grid. */
 const GRID_PX = 96;
-/** @type {readonly Name[]} */
-const NAMES = ["taxel", "force", "centre"];
+/** Of so many channels at most each has a curve. */
+const MOST_CHANNELS = 64;
 /** Colours of the sums of several sources, by their names in style.css. */
 const COLOURS = ["more", "less", "label", "good"];
 
-/** Curves of the window, drawn by uPlot. */
+/** @param {string} kind */
+const swatch = (kind) => make("span", { class: `swatch ${kind}` });
+/** @param {Record<string, string>} [attributes] */
+const output = (attributes) => make("output", { "aria-live": "off", ...attributes });
+
+/**
+ * @param {string} scale
+ * @param {number} side
+ * @param {string} stroke
+ * @returns {uPlot.Axis}
+ */
+const axis = (scale, side, stroke) => ({
+  scale, side, stroke,
+  size: SIDE, gap: 4, space: 24,
+  font: "11px system-ui, sans-serif",
+  grid: { show: side === 3, stroke: themed("grid"), width: 1 },
+  ticks: { show: false },
+  values: (_, marks) => marks.map((mark) => (mark >= 10_000 ? `${mark / 1000}k` : String(mark))),
+});
+/** @param {string} stroke @param {string} scale @param {number[]} [dash] @returns {uPlot.Series} */
+const line = (stroke, scale, dash) => ({ stroke, scale, width: 1.25, points: { show: false }, ...(dash ? { dash } : {}) });
+/** @param {() => number} least of its end @returns {uPlot.Scale.Range} */
+const fromZero = (least) => (_, __, greatest) => [0, Math.max(least(), (greatest ?? 0) * 1.1)];
+/** @param {string[]} sources @returns {string[]} the colour of each, or of one curve for all */
+const coloured = (sources) => (sources.length ? COLOURS.slice(0, sources.length) : COLOURS.slice(0, 1)).map(themed);
+
+/** @param {Shown} shown @param {Timeline} timeline @param {number} place @returns {string[]} the sum, of several sources of each */
+const sumsAt = ({ sums: { unit, step } }, timeline, place) =>
+  timeline.sums(place).map((sum) => (Number.isNaN(sum) ? "missing" : `${step === 1 ? whole(sum) : rounded(sum * step)} ${unit}`));
+
+/** @param {Shown} shown @param {Timeline} timeline @param {number} place @returns {string} the number of taxels that are pressed */
+const areaAt = ({ sensor }, timeline, place) => (Number.isNaN(timeline.area[place]) ? "" : sensor.area(timeline.area[place]));
+
+/** @param {Shown} shown @param {Timeline} timeline @param {number} place @returns {string} the centre of pressure, of several sources of each that is pressed */
+function centreAt({ sensor }, timeline, place) {
+  const [first, ...others] = timeline.centres(place);
+  if (sensor.kind === "channels" || Number.isNaN(timeline.sum[place])) return "";
+  if (!others.length) return Number.isNaN(first[0]) ? "nothing pressed" : sensor.centre(...first);
+  const pressed = [first, ...others].flatMap((at, k) => (Number.isNaN(at[0]) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, at)}`]));
+  return pressed.length ? `${pressed.join("  ")} ${sensor.unit}`.trim() : "nothing pressed";
+}
+
+/** The lanes, from top to bottom. @type {readonly Lane[]} */
+export const LANES = [
+  {
+    name: "raster", label: "Raster of events by row over time", kind: "raster", least: 96,
+    setting: "showRaster", box: "Raster, channels",
+    // Of frames and channels the values say more than their changes.
+    fits: ({ raster, values, sensor }) => raster === "spikes" || (!values.frames && sensor.kind !== "channels"),
+    heading: ({ raster }) =>
+      raster === "spikes" ? ["Raster spikes of ", output({ id: "spikes-info", class: "dim" })] : ["Raster ", make("span", {}, swatch("more"), " more ", swatch("less"), " less, by row")],
+    title: ({ raster }) => (raster === "spikes" ? "Spikes by row" : "Changes by row"),
+    painter: (place) => new Raster(place),
+  },
+  {
+    name: "channels", label: "Curve of each channel over time, one above the other", kind: "raster", least: 96,
+    setting: "showRaster",
+    fits: ({ sensor }) => sensor.kind === "channels" && sensor.count <= MOST_CHANNELS,
+    heading: () => ["Channels ", swatch("more"), " ", output({ id: "channels-scale", class: "dim" })],
+    title: (_, scale) => `Channels, ${scale}`,
+    painter: (place) => new Channels(place),
+  },
+  {
+    name: "taxel", label: "History of the watched taxel", least: 72,
+    setting: "showTaxel", box: "Taxel",
+    fits: ({ taxel }) => taxel !== null,
+    heading: () => ["Taxel ", make("span", {}, "least to greatest, last"), " ", output()],
+    says: ({ values: { unit, step, zero } }, timeline, place) => {
+      const [least, greatest, last] = timeline.history.subarray(3 * place, 3 * place + 3);
+      if (last === UNKNOWN_VALUE) return [];
+      const value = (/** @type {number} */ ticks) => rounded((ticks - zero) * step);
+      return [`${value(last)} ${unit}${least === greatest ? "" : ` (${value(least)} to ${value(greatest)})`}`];
+    },
+    title: ({ named }) => `Taxel ${named}`,
+    plan: (shown) => {
+      /** @type {uPlot.Series} the edge of a band */
+      const bound = { scale: "value", points: { show: false } };
+      const room = () => 2 * shown().values.step;
+      return {
+        scales: { value: { range: (_, least, greatest) => (least === null ? [0, 10] : [least - room(), greatest + room()]) } },
+        series: [bound, bound, line(themed("more"), "value")],
+        bands: [{ series: [2, 1], fill: themed("band") }],
+        axes: [axis("value", 3, themed("dim"))],
+      };
+    },
+    at: ({ values: { step, zero } }, { history }, place) =>
+      history[3 * place + 2] === UNKNOWN_VALUE ? [] : Array.from(history.subarray(3 * place, 3 * place + 3), (ticks) => (ticks - zero) * step),
+  },
+  {
+    name: "force", label: "Sum of the values, or force, and number of taxels pressed", least: 72,
+    setting: "showForce", box: "Sum or force, area",
+    heading: ({ sensor, sums }, sources) => [
+      make("b", { id: "force-title" }, sums.unit === "N" ? "Force" : "Sum"),
+      " ",
+      make("span", { id: "force-sums" }, ...(sources.length ? sources.flatMap((source, k) => [swatch(COLOURS[k]), ` ${source} `, output(), " "]) : [swatch("more"), " ", output({ id: "force-sum" })])),
+      " ",
+      make("span", { id: "area-legend", class: sources.length ? "apart" : "", hidden: sensor.kind === "channels" }, make("span", { class: "gap" }, "Area"), " ", swatch("less dashed"), " ", output({ id: "force-area" })),
+    ],
+    says: (shown, timeline, place) => [...sumsAt(shown, timeline, place), areaAt(shown, timeline, place)],
+    title: ({ sums }) => `${sums.unit === "N" ? "Force" : "Sum"} and area`,
+    plan: (shown, sources) => {
+      const areas = shown().sensor.kind !== "channels";
+      // Beside the colours of several sources the area has none.
+      const [force, area] = sources.length ? [themed("dim"), themed("dim")] : ["more", "less"].map(themed);
+      return {
+        scales: { force: { range: fromZero(() => 8 * shown().sums.step) }, area: { range: fromZero(() => 8) } },
+        series: [...coloured(sources).map((colour) => line(colour, "force")), { ...line(area, "area", [5, 3]), show: areas }],
+        axes: [axis("force", 3, force), { ...axis("area", 1, area), ...(areas ? {} : { values: () => [] }) }],
+      };
+    },
+    at: ({ sums: { step } }, timeline, place) => [...timeline.sums(place).map((sum) => (sum >= 0 ? sum * step : null)), timeline.area[place] >= 0 ? timeline.area[place] : null],
+  },
+  {
+    name: "centre", label: "Centre of pressure", kind: "low", least: 62,
+    setting: "showCentre", box: "Centre",
+    fits: ({ sensor }) => sensor.kind !== "channels",
+    heading: ({ sensor: { axes: [across, down] } }, sources) =>
+      ["Centre ", make("span", { class: sources.length ? "apart" : "" }, swatch("more"), ` ${across} `, swatch("less dashed"), ` ${down}`), " ", output({ id: "centre-now" })],
+    says: (shown, timeline, place) => [centreAt(shown, timeline, place)],
+    title: () => "Centre",
+    plan: (shown, sources) => {
+      const [low, high] = shown().sensor.limits;
+      const down = themed("less");
+      return {
+        scales: { place: { range: [low, high] } },
+        series: coloured(sources).flatMap((colour) => [line(colour, "place"), line(sources.length ? colour : down, "place", [5, 3])]),
+        axes: [{ ...axis("place", 3, themed("dim")), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
+      };
+    },
+    at: ({ sensor }, timeline, place) =>
+      timeline.centres(place).flatMap(([x, y], k) => (Number.isNaN(x) ? [null, null] : [sensor.kind === "channels" ? x : sensor.across(k, x), y])),
+  },
+];
+
+/** The lanes on the page. */
 export class Lanes {
-  constructor() {
-    /** @type {Map<Name, uPlot>} */
-    this.plots = new Map();
-    /** Least and greatest coordinate of a centre; null of channels, which have neither centre nor area. @type {[number, number] | null} */
-    this.limits = [0, 64];
+  /**
+   * @param {import("./settings.js").Settings} settings
+   * @param {() => Shown} shown
+   */
+  constructor(settings, shown) {
+    this.settings = settings;
+    this.shown = shown;
     /** Names of the sources that have curves of their own; empty: one for all. @type {string[]} */
     this.sources = [];
-    /** The sensor that is shown. @type {import("./geometry.js").Geometry | null} */
-    this.sensor = null;
-    /** Size of a tick in the unit of the values, and ticks of the value 0. */
-    this.values = { step: 1, zero: 0 };
-    /** Size of a tick in the unit of the sum of the values. */
-    this.sum_step = 1;
-    /** Times from the left edge of the window, s, and curves at them. @type {Record<Name, [number[], ...Curve[]]>} */
-    this.data = { taxel: [[], [], [], []], force: [[], [], []], centre: [[], [], []] };
+    /** What the headings and plots were made for. */
+    this.made = "";
     /** The length of the window, s, and where the axis has numbers, s from its left edge. */
     this.span_s = 1;
     /** @type {number[]} */
     this.splits = [];
-    this.observer = new ResizeObserver(() => this.fit());
-    for (const name of NAMES) this.observer.observe(part(`${name}-lane`, HTMLElement));
-    this.make();
+    const observer = new ResizeObserver(() => this.fit());
+    this.all = LANES.map((lane) => {
+      const [heading, place] = [make("h2"), make("div", { id: `${lane.name}-lane`, class: `lane ${lane.kind ?? ""}`, role: "img", "aria-label": lane.label })];
+      const block = make("section", { id: `${lane.name}-block` }, heading, place);
+      part("axis", HTMLElement).before(block);
+      observer.observe(place);
+      return { lane, block, heading, place, painter: lane.painter?.(place), plot: /** @type {uPlot | null} */ (null) };
+    });
   }
 
-  /** Makes the plots, and again after the theme has changed. */
-  make() {
-    const [text, grid, one, two, band] = ["dim", "grid", "more", "less", "band"].map(themed);
-    /**
-     * @param {string} scale
-     * @param {number} side
-     * @param {string} stroke
-     * @returns {uPlot.Axis}
-     */
-    const axis = (scale, side, stroke) => ({
-      scale,
-      side,
-      stroke,
-      size: SIDE,
-      gap: 4,
-      space: 24,
-      font: "11px system-ui, sans-serif",
-      grid: { show: side === 3, stroke: grid, width: 1 },
-      ticks: { show: false },
-      values: (_, marks) => marks.map((mark) => (mark >= 10_000 ? `${mark / 1000}k` : String(mark))),
-    });
+  /** @returns {Lane[]} those that are shown */
+  get seen() {
+    const shown = this.shown();
+    return LANES.filter(({ setting, fits }) => this.settings.values[setting] && (!fits || fits(shown)));
+  }
+
+  /** Shows the lanes that the settings ask for and the source has. */
+  show() {
+    const { seen } = this;
+    for (const { lane, block } of this.all) block.hidden = !seen.includes(lane);
+    this.renew();
+  }
+
+  /** Makes headings and plots where they are not yet for this theme and source. */
+  renew() {
+    const { sources } = this;
+    const shown = this.shown();
+    const { sensor, sums, raster } = shown;
+    const made = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, raster, sources]);
+    if (this.made === made) return;
+    this.made = made;
+    const grid = { stroke: themed("grid"), width: 1 };
     /** @type {uPlot.Axis} */
-    const time = { show: true, size: 0, values: () => [], grid: { stroke: grid, width: 1 }, ticks: { show: false }, splits: () => this.splits };
-    /** @param {string} stroke @param {string} scale @param {number[]} [dash] @returns {uPlot.Series} */
-    const line = (stroke, scale, dash) => ({ stroke, scale, width: 1.25, points: { show: false }, ...(dash ? { dash } : {}) });
-    /** @type {uPlot.Series} the edge of a band */
-    const bound = { scale: "value", points: { show: false } };
-    /** @param {() => number} least of its end @returns {uPlot.Scale.Range} */
-    const fromZero = (least) => (_, __, most) => [0, Math.max(least(), (most ?? 0) * 1.1)];
-    const [low, high] = this.limits ?? [0, 1];
-    const areas = this.limits !== null;
-    const colours = this.sources.length ? COLOURS.slice(0, this.sources.length).map(themed) : [one];
-    // Beside the colours of several sources the area has none.
-    const area = this.sources.length ? text : two;
-    /** @type {Record<Name, { scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }>} */
-    const plans = {
-      taxel: {
-        scales: { value: { range: (_, least, most) => (least === null ? [0, 10] : [least - 2 * this.values.step, most + 2 * this.values.step]) } },
-        series: [{}, bound, bound, line(one, "value")],
-        bands: [{ series: [2, 1], fill: band }],
-        axes: [time, axis("value", 3, text)],
-      },
-      force: {
-        scales: { force: { range: fromZero(() => 8 * this.sum_step) }, area: { range: fromZero(() => 8) } },
-        series: [{}, ...colours.map((colour) => line(colour, "force")), { ...line(area, "area", [5, 3]), show: areas }],
-        axes: [time, axis("force", 3, this.sources.length ? text : one), { ...axis("area", 1, area), ...(areas ? {} : { values: () => [] }) }],
-      },
-      centre: {
-        scales: { place: { range: [low, high] } },
-        series: [{}, ...(this.sources.length ? colours.flatMap((colour) => [line(colour, "place"), line(colour, "place", [5, 3])]) : [line(one, "place"), line(two, "place", [5, 3])])],
-        axes: [time, { ...axis("place", 3, text), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
-      },
-    };
-    for (const name of NAMES) {
-      this.plots.get(name)?.destroy();
-      const place = part(`${name}-lane`, HTMLElement);
-      const { scales, ...plan } = plans[name];
-      const right = name === "force" ? 0 : SIDE;
-      const plot = new uPlot(
+    const time = { show: true, size: 0, values: () => [], grid, ticks: { show: false }, splits: () => this.splits };
+    for (const one of this.all) {
+      const { lane, heading, place, painter } = one;
+      heading.replaceChildren(...lane.heading(shown, sources));
+      painter?.colour?.();
+      one.plot?.destroy();
+      if (!lane.plan) continue;
+      const { scales, series, axes, bands } = lane.plan(this.shown, sources);
+      one.plot = new uPlot(
         {
-          ...plan,
-          width: Math.max(100, place.clientWidth),
-          height: Math.max(40, place.clientHeight),
-          // Half of the uppermost number's height.
-          padding: [7, right, 4, 0],
-          legend: { show: false },
-          cursor: { show: false },
+          bands, series: [{}, ...series], axes: [time, ...axes],
+          width: Math.max(100, place.clientWidth), height: Math.max(40, place.clientHeight),
+          // Half of the uppermost number's height; on the right, room for numbers where there are none.
+          padding: [7, axes.length > 1 ? 0 : SIDE, 4, 0],
+          legend: { show: false }, cursor: { show: false },
           scales: { x: { time: false, range: () => [0, this.span_s] }, ...scales },
         },
-        this.data[name],
+        [[], ...series.map(() => [])],
         place,
       );
-      this.plots.set(name, plot);
     }
-  }
-
-  /** @param {import("./geometry.js").Geometry} sensor */
-  size(sensor) {
-    this.sensor = sensor;
-    const limits = sensor.kind === "channels" ? null : sensor.limits;
-    const [across, down] = sensor.axes;
-    write(part("centre-across", HTMLElement), across);
-    write(part("centre-down", HTMLElement), down);
-    part("area-legend", HTMLElement).hidden = limits === null;
-    if (String(this.limits) === String(limits)) return;
-    this.limits = limits;
-    this.make();
-  }
-
-  /** Names the curves of the sums, by their colours, which those of the centres have too. @param {string[]} sources that have a curve each; none: one curve for all */
-  name(sources) {
-    if (String(this.sources) === String(sources)) return;
-    this.sources = sources;
-    /** @type {Curve[]} */
-    const curves = [[], ...(sources.length ? sources.map(() => []) : [[]])];
-    this.data.force = [this.data.taxel[0], ...curves];
-    this.data.centre = [this.data.taxel[0], ...curves.slice(1).flatMap(() => [[], []])];
-    part("centre-legend", HTMLElement).classList.toggle("apart", sources.length > 0);
-    const one = () => make("output", { id: "force-sum", "aria-live": "off" });
-    const names = sources.flatMap((source, k) => [make("span", { class: `swatch ${COLOURS[k]}` }), ` ${escaped(source)} `, make("output", { "aria-live": "off" }), " "]);
-    part("force-sums", HTMLElement).replaceChildren(...(names.length ? names : [make("span", { class: "swatch more" }), " ", one()]));
-    part("area-legend", HTMLElement).classList.toggle("apart", sources.length > 0);
-    this.make();
   }
 
   /** Fits the plots to their places. */
   fit() {
-    for (const [name, plot] of this.plots) {
-      const { clientWidth: width, clientHeight: height } = part(`${name}-lane`, HTMLElement);
-      if (width > 0 && height > 0 && (plot.width !== width || plot.height !== height)) plot.setSize({ width, height });
+    for (const { plot, place: { clientWidth: width, clientHeight: height } } of this.all) {
+      if (plot && width > 0 && height > 0 && (plot.width !== width || plot.height !== height)) plot.setSize({ width, height });
     }
   }
 
   /** @param {Timeline} timeline */
   draw(timeline) {
-    const { columns, window, column_us, history, area } = timeline;
-    const { step, zero } = this.values;
-    if (!columns || !window) return;
+    const { columns, window, column_us } = timeline;
+    const shown = this.shown();
+    this.sources = shown.sensor.sources.slice(0, timeline.source_count).map(({ name }) => name);
+    this.renew();
     this.span_s = timeline.span_us / 1e6;
-    this.splits = timeline.ticks(part("force-lane", HTMLElement).clientWidth / GRID_PX).map(({ share }) => share * this.span_s);
-    const [first, end] = columns;
-    // A column more on the left, so that curves begin at the edge.
-    const count = end - first + 2;
-    const [times, least, greatest, last] = this.data.taxel;
-    const [, ...sums] = this.data.force;
-    const touched = sums.pop() ?? [];
-    const [, ...places] = this.data.centre;
-    this.data.force[0] = this.data.centre[0] = times;
-    for (const curve of [times, least, greatest, last, ...sums, touched, ...places]) curve.length = count;
-    const { sensor } = this;
-    /** @param {number} k @param {number} x */
-    const across = (k, x) => (sensor && sensor.kind !== "channels" ? sensor.across(k, x) : x);
-    for (let i = 0; i < count; i++) {
-      const place = timeline.known(first - 1 + i);
-      // A curve has the value at the end of its column.
-      times[i] = ((first + i) * column_us - window[0]) / 1e6;
-      const known = place >= 0 && history[3 * place + 2] !== UNKNOWN_VALUE;
-      least[i] = known ? (history[3 * place] - zero) * step : null;
-      greatest[i] = known ? (history[3 * place + 1] - zero) * step : null;
-      last[i] = known ? (history[3 * place + 2] - zero) * step : null;
-      const each = place >= 0 ? timeline.sums(place) : [];
-      sums.forEach((curve, k) => (curve[i] = each[k] >= 0 ? each[k] * this.sum_step : null));
-      touched[i] = place >= 0 && area[place] >= 0 ? area[place] : null;
-      const centres = place >= 0 ? timeline.centres(place) : [];
-      for (let k = 0; 2 * k < places.length; k++) {
-        const [x, y] = centres[k] ?? [NaN, NaN];
-        places[2 * k][i] = Number.isNaN(x) ? null : across(k, x);
-        places[2 * k + 1][i] = Number.isNaN(x) ? null : y;
+    this.splits = timeline.ticks(part("lanes", HTMLElement).clientWidth / GRID_PX).map(({ share }) => share * this.span_s);
+    for (const { lane, block, heading, painter, plot } of this.all) {
+      if (block.hidden) continue;
+      const drawn = painter?.draw(timeline, shown) ?? "";
+      if (painter) for (const output of heading.querySelectorAll("output")) write(output, drawn);
+      if (!plot || !lane.at || !columns || !window) continue;
+      // A column more on the left, so that curves begin at the edge.
+      const numbers = Array.from({ length: columns[1] - columns[0] + 2 }, (_, i) => columns[0] - 1 + i);
+      /** @type {(number | null)[][]} */
+      const curves = plot.series.slice(1).map(() => []);
+      for (const number of numbers) {
+        const place = timeline.known(number);
+        const values = place < 0 ? [] : lane.at(shown, timeline, place);
+        curves.forEach((curve, k) => curve.push(values[k] ?? null));
       }
+      // A curve has the value at the end of its column.
+      plot.setData([numbers.map((number) => ((number + 1) * column_us - window[0]) / 1e6), ...curves]);
     }
-    for (const [name, plot] of this.plots) {
-      if (!part(`${name}-block`, HTMLElement).hidden) plot.setData(this.data[name]);
+  }
+
+  /** Writes the values at the cursor, or at the time shown. @param {Timeline | null} timeline */
+  write(timeline) {
+    const shown = this.shown();
+    const place = timeline?.pointed ?? -1;
+    for (const { lane, heading } of this.all) {
+      if (!lane.says) continue;
+      const said = timeline && place >= 0 ? lane.says(shown, timeline, place) : [];
+      heading.querySelectorAll("output").forEach((one, k) => write(one, said[k] ?? ""));
     }
+    if (!timeline || place < 0) return;
+    const { sensor } = shown;
+    const sums = sumsAt(shown, timeline, place);
+    const sum = sums.length > 1 ? sums.map((one, k) => `${sensor.sources[k].name} ${one}`).join(", ") : sums[0];
+    const more = sensor.kind === "channels" ? "" : ` over ${areaAt(shown, timeline, place)}, centre (${sensor.axes.join(", ")}): ${centreAt(shown, timeline, place)}`;
+    write(part("shown-info", HTMLElement), Number.isNaN(timeline.sum[place]) ? "missing" : `${sum}${more}`);
+  }
+
+  /** @returns {{ title: string, canvas: HTMLCanvasElement, inset: number }[]} the lanes of a saved picture */
+  pictured() {
+    return this.all.flatMap(({ lane, heading, place }) => {
+      const canvas = place.querySelector("canvas");
+      const said = heading.querySelector("output")?.textContent ?? "";
+      return canvas?.clientWidth ? [{ title: lane.title(this.shown(), said), canvas, inset: lane.painter ? SIDE : 0 }] : [];
+    });
   }
 }

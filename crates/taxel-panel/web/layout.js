@@ -9,9 +9,8 @@ const UNDER = { above: 41, beside: 50 };
 const GAP = 20;
 /** Below the message above the maps. */
 const BELOW_BANNER = 8;
-/** The least that lanes need: the flags, the detections, the axis, and each lane with its title. */
+/** The least that is needed beside the lanes: the flags, the detections, the axis. */
 const FLAGS_AND_AXIS = 79;
-const LANE = { raster: 96, channels: 96, taxel: 72, force: 72, centre: 62 };
 /** The least width of lanes that stand beside maps. */
 const LANES_WIDE = 460;
 /** Part of the width that maps beside the lanes may take. */
@@ -24,8 +23,8 @@ const NARROW = "(max-width: 860px)";
 /** Chooses the arrangement in which the maps are largest. */
 export class Layout {
   /**
-   * @param {() => { aspect: number, maps: number, lanes: (keyof typeof LANE)[] }} shown width over height of a map, how many maps
-   *   there are, and the lanes
+   * @param {() => { aspect: number, maps: number, lanes: import("./lanes.js").Lane[] }} shown width over height of a map, how many
+   *   maps there are, and the lanes
    * @param {() => void} arranged called after the sizes have changed
    */
   constructor(shown, arranged) {
@@ -46,7 +45,7 @@ export class Layout {
     const { clientWidth: wide } = this.views;
     const banner = this.banner.offsetHeight;
     const high = this.views.clientHeight - (banner && banner + BELOW_BANNER);
-    const low = FLAGS_AND_AXIS + lanes.reduce((sum, lane) => sum + LANE[lane], 0);
+    const low = FLAGS_AND_AXIS + lanes.reduce((sum, { least }) => sum + least, 0);
     const beside = Math.min(BESIDE * wide, wide - LANES_WIDE - GAP);
     /** @type {[Place, number][]} */
     const widths = [

@@ -2,7 +2,6 @@
 
 import { bindActions } from "./actions.js";
 import { Board } from "./board.js";
-import { Channels } from "./channels.js";
 import { writeCounters, writePace } from "./counters.js";
 import { Cursor } from "./cursor.js";
 import { Detections, recorded } from "./detections.js";
@@ -16,7 +15,6 @@ import { Notes } from "./notes.js";
 import { failed, notify, silence } from "./notice.js";
 import { Player } from "./player.js";
 import { readFrame } from "./protocol.js";
-import { Raster } from "./raster.js";
 import { Recorder } from "./recorder.js";
 import { Server } from "./server.js";
 import { Settings } from "./settings.js";
@@ -27,7 +25,7 @@ import { Timeline } from "./timeline.js";
 import { Training } from "./training.js";
 import { View } from "./view.js";
 import { TimeWindow } from "./window.js";
-import { beginning, begun, counted, numbering, rounded, short } from "./words.js";
+import { beginning, begun, counted, numbering, short } from "./words.js";
 
 /** @typedef {import("./messages.js").Message} Message */
 /** @typedef {import("./messages.js").Hello} Hello */
@@ -41,12 +39,6 @@ const LANES_MS = 33;
 /** How often lanes are drawn for users who prefer reduced motion, ms. */
 const REDUCED_MS = 1000;
 const OVERVIEW_MS = 2000;
-/** The lanes, from top to bottom. */
-const LANES = /** @type {const} */ (["raster", "channels", "taxel", "force", "centre"]);
-/** Of so many channels at most each has a curve. */
-const MOST_CHANNELS = 64;
-/** So many names of channels have room beside their curves. */
-const NAMED_CHANNELS = 8;
 
 const settings = new Settings();
 const fragment = new URLSearchParams(location.hash.slice(1));
@@ -58,16 +50,11 @@ const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.c
 });
 const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
 const maps = new Maps(settings, watch);
-const raster = new Raster(part("raster", HTMLCanvasElement));
-const channels = new Channels(part("channels", HTMLCanvasElement));
-const lanes = new Lanes();
+const lanes = new Lanes(settings, shown);
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
 const notes = new Notes(player, labels);
 const training = new Training(server, player);
-const layout = new Layout(arrangement, () => {
-  lanes.fit();
-  lanesDue = true;
-});
+const layout = new Layout(arrangement, () => (lanesDue = true));
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
@@ -87,6 +74,8 @@ let registers = null;
 let zeroed = [];
 /** The recording that is being opened. @type {string | null} */
 let opening = null;
+/** Encoder and latency of the spikes in the raster. */
+let spikes = "";
 /** Why the last one was not opened. */
 let refused = "";
 /** Whether the server is connected, and why not. */
@@ -133,8 +122,6 @@ function showUnits() {
   const frames = opened?.frames;
   const { unit, step, zero } = frames ?? { unit: "ticks", step: 1, zero: 0 };
   maps.values = { unit, step, zero, frames: frames !== null && frames !== undefined };
-  lanes.values = { step, zero };
-  cursor.values = { unit, step, zero };
   numbering.number_us = frames?.number_us ?? null;
   numbering.begin_us = beginning(opened?.start_us ?? null);
   write(part("begun", HTMLElement), begun() && `0 s: ${begun()}`);
@@ -142,35 +129,21 @@ function showUnits() {
   trials.hidden = !frames?.trials.length;
   trials.replaceChildren(...(frames?.trials ?? []).map((name) => make("option", { value: name }, name)));
   trials.value = frames?.trial ?? "";
-  showSums();
   showLanes();
 }
 
-/** Shows the sum of the values: as force where it is in N, or known of a pressure. */
-function showSums() {
-  const { unit, step } = maps.values;
+/** @returns {import("./lanes.js").Shown} */
+function shown() {
+  const { geometry: sensor, taxel, values } = maps;
   const newtons = opened?.frames?.newtons ?? null;
-  const sums = newtons === null ? { unit, step } : { unit: "N", step: newtons };
-  lanes.sum_step = sums.step;
-  cursor.sums = sums;
-  write(part("force-title", HTMLElement), sums.unit === "N" ? "Force" : "Sum");
+  // The sum of the values is a force where they are in N, or where it is known of a pressure.
+  const sums = newtons === null ? { unit: values.unit, step: values.step } : { unit: "N", step: newtons };
+  return { sensor, taxel, named: maps.named(), values, sums, raster: settings.values.raster, spikes };
 }
 
 /** What the page has to place: see `Layout`. */
 function arrangement() {
-  const { values } = settings;
-  const { geometry } = maps;
-  const of = geometry.kind === "channels" ? geometry.count : 0;
-  /** @type {[typeof LANES[number], boolean][]} */
-  const all = [
-    // Of frames and channels the values say more than their changes.
-    ["raster", values.showRaster && (values.raster === "spikes" || (!opened?.frames && !of))],
-    ["channels", values.showRaster && of > 0 && of <= MOST_CHANNELS],
-    ["taxel", values.showTaxel && maps.taxel !== null],
-    ["force", values.showForce],
-    ["centre", values.showCentre && !of],
-  ];
-  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: all.flatMap(([name, shown]) => (shown ? [name] : [])) };
+  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: lanes.seen };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */
@@ -192,26 +165,7 @@ function resize(array) {
     timeWindow.forget();
   }
   maps.size(array, opened?.frames?.sources ?? []);
-  lanes.size(maps.geometry);
-  cursor.sensor = maps.geometry;
-  showSums();
-  if (maps.geometry.kind === "channels") showChannels(maps.geometry);
-  write(part("raster-rows", HTMLElement), String(array.rows - 1));
   showLanes();
-}
-
-/**
- * Names the sources that stand one above the other; else the channels, or only the first and the last without names or of many.
- * @param {{ array: import("./messages.js").ArrayInfo, there: number[], sources: import("./messages.js").FrameSource[] }} sensor
- */
-function showChannels({ array, there, sources }) {
-  part("channels-block", HTMLElement).style.setProperty("--count", String(there.length));
-  const names = part("channel-names", HTMLElement);
-  const all = array.names !== undefined && there.length <= NAMED_CHANNELS;
-  const shown = (all ? there : [there[0], there[there.length - 1]]).map((k) => array.names?.[k] || String(k));
-  const several = sources.length > 1;
-  names.classList.toggle("several", several || all);
-  names.replaceChildren(...(several ? sources.map(({ name }) => name) : shown).map((name) => make("span", { title: name }, name)));
 }
 
 /** @param {ArrayBuffer} buffer */
@@ -257,7 +211,9 @@ function receive(message) {
       if (player.transport.source === null) showDetections(detections.live, hello?.readout ?? []);
       return;
     case "spikes":
-      return write(part("spikes-info", HTMLElement), spikesInfo(message));
+      spikes = spikesInfo(message);
+      lanesDue = true;
+      return;
     case "recorder":
       recorder.take(message);
       if (player.transport.source === null) labels.choose(message.state === "recording" || message.state === "finishing" ? message.file : null);
@@ -492,8 +448,11 @@ function drawFrame(now_ms) {
   const moving = player.transport.state !== "paused";
   if (timeline && (lanesDue || timeDue) && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
     lanesAt = now_ms;
-    if (lanesDue) drawLanes(timeline);
-    else cursor.draw();
+    if (lanesDue) {
+      lanes.draw(timeline);
+      labels.place();
+      mark();
+    } else cursor.draw();
     lanesDue = timeDue = false;
   }
   if (now_ms - textAt >= TEXT_MS) {
@@ -506,27 +465,12 @@ function drawFrame(now_ms) {
   }
 }
 
-/** @param {Timeline} shown */
-function drawLanes(shown) {
-  const { values } = settings;
-  const { geometry } = maps;
-  if (geometry.kind === "channels") {
-    const most = channels.draw(shown, geometry.there, maps.taxel && Math.max(...maps.taxel));
-    write(part("channels-scale", HTMLElement), `each up to ${rounded(most * maps.values.step)} ${maps.values.unit}`);
-  }
-  lanes.name(geometry.sources.slice(0, shown.source_count).map(({ name }) => name));
-  if (arrangement().lanes.includes("raster")) raster.draw(shown, values.raster === "spikes" ? "spikes" : "changes");
-  lanes.draw(shown);
-  labels.place();
-  mark();
-}
-
 function writeText() {
   maps.write();
   writeCounters(counters, drawn);
   timeWindow.write();
   if (training.since !== null) training.write();
-  cursor.write();
+  lanes.write(timeline);
   player.write();
   strip.draw();
   strip.write();
@@ -541,24 +485,19 @@ function writeText() {
 function applyTheme() {
   document.documentElement.dataset.theme = settings.theme;
   maps.colour();
-  raster.colour();
-  lanes.make();
+  lanes.renew();
   mapsDue = lanesDue = true;
 }
 
 function showLanes() {
   const { values } = settings;
-  const { lanes: shown } = arrangement();
-  for (const id of LANES) part(`${id}-block`, HTMLElement).hidden = !shown.includes(id);
   for (const name of ["pressure", "change"]) {
     part(`${name}-figure`, HTMLElement).hidden = mapsShown() !== "both" && mapsShown() !== name;
     part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
   }
   part("pressure-alone", HTMLButtonElement).hidden = part("maps-field", HTMLElement).hidden = !hasMaps();
-  part("raster-changes", HTMLElement).hidden = values.raster === "spikes";
-  part("raster-spikes", HTMLElement).hidden = values.raster !== "spikes";
+  lanes.show();
   layout.arrange();
-  lanes.fit();
   lanesDue = true;
 }
 
@@ -574,7 +513,7 @@ matchMedia("(prefers-color-scheme: light)").addEventListener("change", applyThem
 
 // ------------------------------------------------------------------------------------------------ start
 
-bindActions({ server, player, settings, recorder, labels, view, maps, window: timeWindow }, () => timeline);
+bindActions({ server, player, settings, recorder, labels, view, maps, lanes, window: timeWindow }, () => timeline);
 part("files", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
   if (value) ask(value);
@@ -607,8 +546,8 @@ showKeys();
 showTab("board");
 labels.show();
 view.showCut();
-showLanes();
 applyTheme();
+showLanes();
 requestAnimationFrame(drawFrame);
 addEventListener("beforeunload", (event) => {
   if (server.saves) event.preventDefault();

@@ -1,20 +1,21 @@
 // Ups and downs of each row over time; or an encoder's spikes.
 
-import { fitted, ground, themed } from "./dom.js";
+import { fitted, ground, make, themed, write } from "./dom.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
 /** The raster's canvas. Columns of time and rows are gathered, most first, where the screen has fewer pixels. */
 export class Raster {
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
-    this.canvas = canvas;
-    this.context = ground(canvas);
+  /** @param {HTMLElement} place */
+  constructor(place) {
+    this.canvas = make("canvas", { id: "raster" });
+    this.last = make("span");
+    place.append(make("span", { class: "rows", "aria-hidden": "true" }, make("span", {}, "0"), this.last), this.canvas);
+    this.context = ground(this.canvas);
     this.image = new ImageData(1, 1);
     this.pixels = new Uint32Array(1);
     this.words = new Uint32Array(256);
     this.unscaled = document.createElement("canvas");
-    this.colour();
   }
 
   /** Makes the colours again, after the theme has changed. */
@@ -35,14 +36,16 @@ export class Raster {
 
   /**
    * @param {Timeline} timeline
-   * @param {"changes" | "spikes"} what
+   * @param {import("./lanes.js").Shown} shown
+   * @returns {string} what the spikes are of
    */
-  draw(timeline, what) {
+  draw(timeline, { raster: what, spikes }) {
+    write(this.last, String(timeline.rows - 1));
     const { width, height } = fitted(this.canvas);
     const { columns: shown, window, column_us, span_us, rows } = timeline;
     if (!shown || !window || !width || !height) {
       this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-      return;
+      return spikes;
     }
     const [begin, end] = shown;
     const columns = Math.ceil((end - begin + 1) / this.canvas.width);
@@ -77,5 +80,6 @@ export class Raster {
     this.context.imageSmoothingEnabled = false;
     const scale = (this.canvas.width * column_us) / span_us;
     this.context.drawImage(this.unscaled, (group * columns - window[0] / column_us) * scale, 0, wide * columns * scale, this.canvas.height);
+    return spikes;
   }
 }

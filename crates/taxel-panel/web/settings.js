@@ -1,8 +1,10 @@
 // The settings of the page, which the browser stores for this address.
 
+import { LANES } from "./lanes.js";
+
 const PLACE = "taxel.panel";
 
-const DEFAULTS = {
+const OTHERS = {
   theme: "system",
   map: "lipari",
   gamma: 1,
@@ -11,10 +13,6 @@ const DEFAULTS = {
   flipY: false,
   raster: "changes",
   maps: "both",
-  showRaster: true,
-  showTaxel: true,
-  showForce: true,
-  showCentre: true,
   tones: true,
   letters: true,
   label: "contact",
@@ -23,11 +21,15 @@ const DEFAULTS = {
   addresses: "",
 };
 
-/** @typedef {typeof DEFAULTS} Values */
+/** @typedef {typeof OTHERS & Record<`show${string}`, boolean>} Values those of the lanes are in LANES */
+
+/** @type {Values} */
+const DEFAULTS = { ...OTHERS, ...Object.fromEntries(LANES.map(({ setting }) => [setting, true])) };
 
 /** Values by name; listeners are called after a change. */
 export class Settings {
   constructor() {
+    /** @type {Values} */
     this.values = { ...DEFAULTS };
     /** @type {((name: keyof Values) => void)[]} */
     this.listeners = [];

@@ -2,6 +2,7 @@
 
 import { MAPS } from "./colours.js";
 import { make, part, write } from "./dom.js";
+import { LANES } from "./lanes.js";
 import { counted, seconds } from "./words.js";
 
 /** @typedef {import("./messages.js").Health} Health */
@@ -36,22 +37,14 @@ export class View {
       select.onchange = () => settings.set(name, select.value);
     }
     for (const name of /** @type {const} */ (["gamma", "contrast"])) this.slider(name);
-    /** @type {[string, "flipX" | "flipY" | "showRaster" | "showTaxel" | "showForce" | "showCentre" | "tones" | "letters"][]} */
-    const boxes = [
-      ["flip-x", "flipX"],
-      ["flip-y", "flipY"],
-      ["show-raster", "showRaster"],
-      ["show-taxel", "showTaxel"],
-      ["show-force", "showForce"],
-      ["show-centre", "showCentre"],
-      ["tones", "tones"],
-      ["letters", "letters"],
-    ];
-    for (const [id, name] of boxes) {
-      const box = part(id, HTMLInputElement);
+    /** @param {HTMLInputElement} box @param {"flipX" | "flipY" | "tones" | "letters" | `show${string}`} name of its setting */
+    const bind = (box, name) => {
       box.checked = settings.values[name];
       box.onchange = () => settings.set(name, box.checked);
-    }
+      return box;
+    };
+    for (const [id, name] of /** @type {const} */ ([["flip-x", "flipX"], ["flip-y", "flipY"], ["tones", "tones"], ["letters", "letters"]])) bind(part(id, HTMLInputElement), name);
+    for (const { box, setting } of LANES) if (box) part("lane-boxes", HTMLElement).append(make("label", { class: "check" }, bind(make("input", { type: "checkbox" }), setting), ` ${box}`));
     settings.watch(() => {
       part("theme", HTMLSelectElement).value = settings.values.theme;
       part("raster-what", HTMLSelectElement).value = settings.values.raster;
