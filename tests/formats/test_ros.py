@@ -21,7 +21,7 @@ import taxel
 from taxel import FormatError, ProblemError
 from taxel.formats import ros
 from taxel.formats.ros.reading import _times
-from taxel.recording.open_options import OpenOptions
+from taxel.recording.text_options import TextOptions
 from taxel.tasks.labels import references
 
 from . import bags
@@ -558,7 +558,7 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
     bag = bags.write(tmp_path / "pick.mcap", several)
     table = tmp_path / "labels.csv"
     table.write_text("recording,source,label,t_us\n" + "".join(f"{names[s]}touch,{us + t}\n" for s, t in rows))
-    options = OpenOptions(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
+    options = TextOptions(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
     opened = options.all([bag])
     left, right = references(str(table), opened)
     assert [(left["touch"] - us).tolist(), (right["touch"] - us).tolist()] == [[20_000, 70_000], [30_000]]

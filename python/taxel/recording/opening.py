@@ -15,9 +15,10 @@ import numpy as np
 from taxel import _core, formats
 from taxel._base import arguments, limits
 from taxel._base.arguments import flag, instance, text, whole
-from taxel._base.errors import helped
+from taxel._base.errors import helped, refused
 from taxel._base.limits import opening
 from taxel._base.messages import warn
+from taxel._base.options import with_fields_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -46,19 +47,39 @@ from taxel.recording.without_layout import refuse_without_layout
 FEET = ("left", "right")
 
 
-def open_one(
-    path: str | os.PathLike[str],
-    *,
-    array: Array | Sequence[Array] | None = None,
-    layout: str | os.PathLike[str] | None = None,
-    pairing: str = "direct",
-    differences: bool = False,
-    topic: str | Sequence[str] | None = None,
-    field: str | Sequence[str] | None = None,
-    types: str | os.PathLike[str] | None = None,
-    ros: str | None = None,
-    limit: int | None = None,
-) -> Recording:
+@dataclass(frozen=True, kw_only=True)
+class SharedOptions:
+    """Hold how files are opened, as `open_one` documents it; only subclasses state the type of `array`."""
+
+    array: object = None
+    layout: str | os.PathLike[str] | None = None
+    topic: str | Sequence[str] | None = None
+    field: str | Sequence[str] | None = None
+    types: str | os.PathLike[str] | None = None
+    ros: str | None = None
+    limit: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenOptions(SharedOptions):
+    """Hold the keyword arguments of `open_one`, which documents each, and of `open_all`."""
+
+    array: Array | Sequence[Array] | None = None
+    pairing: str = "direct"
+    differences: bool = False
+
+    def within(self) -> AbstractContextManager[None]:
+        """Return a context in which no more is read than may be."""
+        return opening(None if self.limit is None else whole("limit", self.limit, 1, unit="bytes"))
+
+    @property
+    def topics(self) -> Topics:
+        """What of a ROS bag is opened."""
+        return Topics(self.topic, self.field, self.types, self.ros)
+
+
+@with_fields_of(OpenOptions)
+def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     r"""Open a recording.
 
     `taxel.open` is this function; `taxel.open_all` opens those of a folder.
@@ -75,10 +96,6 @@ def open_one(
     layout : path, optional
         The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
         ``layout.toml`` beside it, if there is one.
-    pairing : {"direct", "taxel"}
-        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
-    differences : bool
-        Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
     topic, field : str, or list of str, optional
         What of a ROS bag is opened as frames: a topic, and the path of a field of its messages, as "left.taxels"
         (default: the only one with numbers). Of lists each entry becomes a source, with its own `array` if that is a
@@ -88,6 +105,10 @@ def open_one(
     limit : int, bytes, 1 or more, optional
         How much may be read into memory; default: three quarters of what is available, and at most the sizes of
         docs/files.md.
+    pairing : {"direct", "taxel"}
+        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
+    differences : bool
+        Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
     Returns
     -------
@@ -117,30 +138,18 @@ def open_one(
     >>> taxel.open(place)
     Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
     """
-    how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
     place = Path(arguments.checked_path("path", path))
     if place.is_dir() and not is_bag(place):
         raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
-    every = _open(place, how)
+    every = _open(place, options)
     if len(every) != 1:
         names = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
         raise ProblemError(f"{place}: holds {len(every)} recordings ({names}); taxel.open_all opens each")
     return every[0]
 
 
-def open_all(
-    path: str | os.PathLike[str],
-    *,
-    array: Array | Sequence[Array] | None = None,
-    layout: str | os.PathLike[str] | None = None,
-    pairing: str = "direct",
-    differences: bool = False,
-    topic: str | Sequence[str] | None = None,
-    field: str | Sequence[str] | None = None,
-    types: str | os.PathLike[str] | None = None,
-    ros: str | None = None,
-    limit: int | None = None,
-) -> list[Recording]:
+@with_fields_of(OpenOptions)
+def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recording]:
     r"""Open all recordings of a folder, or all trials of a file.
 
     `taxel.open_all` is this function.
@@ -149,10 +158,12 @@ def open_all(
     ----------
     path : path
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
-    array, layout, pairing, differences, topic, field, types, ros
+    array, layout, topic, field, types, ros
         As of `taxel.open`.
     limit : int, bytes, 1 or more, optional
         As of `taxel.open`, for all recordings together.
+    pairing, differences
+        As of `taxel.open`.
 
     Returns
     -------
@@ -182,44 +193,21 @@ def open_all(
     [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 note),
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
-    how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
-    return _open(Path(arguments.checked_path("path", path)), how)
+    return _open(Path(arguments.checked_path("path", path)), options)
 
 
-def _open(place: Path, how: How) -> list[Recording]:
+def _open(place: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file."""
-    with how.within():
+    with options.within():
         if place.is_dir() and not is_bag(place):
-            return _folder(place, how)
+            return _folder(place, options)
         # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
         if place.exists() and (names := _formats(place)) and not _is_own(place):
             trials = _kept(formats.trials(place, names[0]))
-            return [_named_beside(place, Path(trial.name), _of(trial, place, names[0], how.layout)) for trial in trials]
-        return [_named_beside(place, Path(place.name), _open_one(place, how))]
-
-
-@dataclass(frozen=True)
-class How:
-    """Hold what says how files are opened; the fields are the arguments of `taxel.open`."""
-
-    array: Array | Sequence[Array] | None = None
-    layout: str | os.PathLike[str] | None = None
-    pairing: str = "direct"
-    differences: bool = False
-    topic: str | Sequence[str] | None = None
-    field: str | Sequence[str] | None = None
-    types: str | os.PathLike[str] | None = None
-    ros: str | None = None
-    limit: int | None = None
-
-    def within(self) -> AbstractContextManager[None]:
-        """Return a context in which no more is read than may be."""
-        return opening(None if self.limit is None else whole("limit", self.limit, 1, unit="bytes"))
-
-    @property
-    def topics(self) -> Topics:
-        """What of a ROS bag is opened."""
-        return Topics(self.topic, self.field, self.types, self.ros)
+            return [
+                _named_beside(place, Path(trial.name), _of(trial, place, names[0], options.layout)) for trial in trials
+            ]
+        return [_named_beside(place, Path(place.name), _open_one(place, options))]
 
 
 def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
@@ -244,36 +232,36 @@ def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
     -----
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel.
     """
-    said = How(**how)
-    with said.within():
-        return _open_one(Path(arguments.checked_path("path", path)), said)
+    options = OpenOptions(**how)
+    with options.within():
+        return _open_one(Path(arguments.checked_path("path", path)), options)
 
 
-def _open_one(place: Path, how: How) -> Recording:
+def _open_one(place: Path, options: OpenOptions) -> Recording:
     """Open one file as taxel writes it, a table of another program with a layout, or a ROS bag."""
-    text("pairing", how.pairing, ("direct", "taxel"))
-    flag("differences", how.differences)
-    said = _layout(place, how.layout)
+    text("pairing", options.pairing, ("direct", "taxel"))
+    flag("differences", options.differences)
+    said = _layout(place, options.layout)
     of_layout = {} if said is None else said.ros
     try:
         if said is None:
             refuse_without_layout(place)
         if said is not None and is_foreign(place, said):
-            if how.topics.are_given:
+            if options.topics.are_given:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
             contents = Contents.of(read_foreign(place, said))
-            if how.array is not None:
-                contents = Contents.of(_on_given(contents.main, instance("array", how.array, Array)))
+            if options.array is not None:
+                contents = Contents.of(_on_given(contents.main, instance("array", options.array, Array)))
         elif (kind := kind_of(place)) == "ros":
-            grid = said.grid() if how.array is None and said is not None else how.array
-            contents = read_ros(place, how.topics.but(of_layout), grid)
-        elif how.topics.are_given:
+            grid = said.grid() if options.array is None and said is not None else options.array
+            contents = read_ros(place, options.topics.but(of_layout), grid)
+        elif options.topics.are_given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
         else:
-            array = None if how.array is None else instance("array", how.array, Array)
-            contents = _read(place, kind, array, how.pairing, how.differences)
+            array = None if options.array is None else instance("array", options.array, Array)
+            contents = _read(place, kind, array, options.pairing, options.differences)
         return Recording(
-            with_sidecars(contents if said is None else laid_out(contents, said, given=how.layout is not None))
+            with_sidecars(contents if said is None else laid_out(contents, said, given=options.layout is not None))
         )
     except MemoryError:
         raise helped(
@@ -306,19 +294,19 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
     return Contents.of({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
 
 
-def _folder(folder: Path, how: How) -> list[Recording]:
+def _folder(folder: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
     inside = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
     files = sorted(inside, key=_order)
     recorded = [file for file in files if _is_own(file)]
-    if how.topic or not recorded:
+    if options.topic or not recorded:
         recorded = [file for file in files if file in recorded or is_bag(file)]
     if recorded:
-        _warn_of_tables(folder, recorded, files, how)
-        opened = [_kept_one(_open_one(file, how)) for file in recorded]
+        _warn_of_tables(folder, recorded, files, options)
+        opened = [_kept_one(_open_one(file, options)) for file in recorded]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
-    elif not (names := _formats(folder)) and (foreign := _laid_out_in(files, how.layout)):
-        pairs = [(file.relative_to(folder), _kept_one(_open_one(file, how))) for file in foreign]
+    elif not (names := _formats(folder)) and (foreign := _laid_out_in(files, options.layout)):
+        pairs = [(file.relative_to(folder), _kept_one(_open_one(file, options))) for file in foreign]
     else:
         if len(names) != 1:
             for file in files if not names else ():
@@ -332,7 +320,7 @@ def _folder(folder: Path, how: How) -> list[Recording]:
             )
             raise FormatError(f"{folder}: holds {problem}; {hint or there}")
         trials = sorted(_kept(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
-        pairs = [(Path(trial.name), _of(trial, folder, names[0], how.layout)) for trial in trials]
+        pairs = [(Path(trial.name), _of(trial, folder, names[0], options.layout)) for trial in trials]
     return _labelled(folder / LABELS, pairs)
 
 
@@ -360,17 +348,19 @@ def _size(table: object) -> int:
     return sum(column.nbytes for column in columns if isinstance(column, np.ndarray))
 
 
-def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], how: How) -> None:
+def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], options: OpenOptions) -> None:
     """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
     stems = {file.stem for file in recorded}
-    left = [file.name for file in _laid_out_in(files, how.layout) if file not in recorded and file.stem not in stems]
+    left = [
+        file.name for file in _laid_out_in(files, options.layout) if file not in recorded and file.stem not in stems
+    ]
     if left:
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
         kept = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
         warn(
             f"{folder}: {names} left out, as beside recordings ({kept}) tables and arrays are not read: convert them, "
             "or keep them in a folder of their own",
-            stacklevel=5,
+            stacklevel=6,
         )
 
 
@@ -563,6 +553,14 @@ def sensors(recording: Recording) -> list[Recording]:
     if not recording._contents.is_several:
         return [recording]
     return [source for source in recording.sources.values() if not source.is_stream]
+
+
+def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
+    """Return each sensor of recordings as one of its own; refuse what is no recording."""
+    given = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
+    if not len(given):
+        raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
+    return [recording for each in given for recording in sensors(instance(name, each, Recording))]
 
 
 def open_joined(path: str | os.PathLike[str], **how: Any) -> list[Recording]:

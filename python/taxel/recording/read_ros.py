@@ -102,7 +102,7 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     for name, topic in zip(_names(path, reads), reads, strict=True):
         told = tuple(_told(topic))
         for line in told:
-            warn(f"{path}: topic {topic.topic}: {line}", stacklevel=5)
+            warn(f"{path}: topic {topic.topic}: {line}", stacklevel=6)
         losses = Losses(
             known(
                 {
