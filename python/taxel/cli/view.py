@@ -87,7 +87,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         opened = files.opener.joined(file)
         if calibration is None:
             return opened
-        return [Recording(calibrated_by(sensor._contents, calibration)) for sensor in opened]
+        return [calibrated_by(sensor, calibration) for sensor in opened]
 
     # What was opened now, so that the errors are those of the command, is what the panel asks for first.
     opened = {first.absolute(): opens(first)}

@@ -126,7 +126,7 @@ class ShownFiles:
             recording, names, left_s = beginning
         else:
             (recording, names), left_s = self.opened(path, trial), None
-        if not recording._contents.is_several and recording.has_events:
+        if not recording.is_several and recording.has_events:
             return self._converted(recording), None
         return None, (*_frames(recording), recording.name if names else None, names, left_s)
 
@@ -184,7 +184,7 @@ class ShownFiles:
 
 def _sources(recording: Recording) -> dict[str, Recording]:
     """Return the sensors of a recording of frames: its sources, or itself."""
-    several = recording._contents.is_several
+    several = recording.is_several
     every = recording.sources if several else {recording.label or "board": recording}
     return {name: one for name, one in every.items() if not one.has_events and not one.is_stream} if several else every
 

@@ -48,12 +48,12 @@ def _between(of: S, sources: Mapping[str, Source], start: float, stop: float) ->
         match part:
             case parts.Origin() | parts.Sensor() | parts.Wire():
                 return part
-            case parts.Changes():
-                return parts.Changes(Once(lambda: part.events().between(start, stop)))
-            case parts.Readings():
+            case parts.BoardEvents():
+                return parts.BoardEvents(Once(lambda: part.events().between(start, stop)))
+            case parts.SourceFrames():
                 return replace(part, frames=Once(lambda: part.frames().between(start, stop)))
-            case parts.Lines():
-                return parts.Lines(
+            case parts.StreamColumns():
+                return parts.StreamColumns(
                     part.columns, part.samples.to(lambda samples: samples and samples.between(start, stop))
                 )
             case parts.Settings():
@@ -87,15 +87,15 @@ def _verdict(of: Source, sources: Mapping[str, Source]) -> Verdict | None:
     """
     if of.losses.verdict() is None:
         return None
-    said = verdict_of(of)
-    if said.stretch_of is not None:
-        return said
+    verdict = verdict_of(of)
+    if verdict.stretch_of is not None:
+        return verdict
     verdicts = [verdict_of(source).to_dict() for source in sources.values()]
     try:
         about = _ends(of.origin.path)
     except OSError:
         about = json.dumps([len(of.table), of.table.t[:1].tolist(), of.table.t[-1:].tolist()]).encode()
-    return said._as_stretch_of(hashlib.sha256(json.dumps(verdicts).encode() + about).hexdigest()[:16])
+    return verdict._as_stretch_of(hashlib.sha256(json.dumps(verdicts).encode() + about).hexdigest()[:16])
 
 
 def _ends(path: Path) -> bytes:

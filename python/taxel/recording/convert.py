@@ -115,8 +115,8 @@ def convert(
             write_h5(place, made, overwrite=overwrite)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                before = whole.sources if written.is_several else {made.origin.label: whole.main}
-                counts = {name: _counts(before[name], source) for name, source in written.sources.items()}
+                sources_before = whole.sources if written.is_several else {made.origin.label: whole.main}
+                counts = {name: _counts(sources_before[name], source) for name, source in written.sources.items()}
                 write_mcap(part, written, compression, counts)
                 lost += _read_otherwise(part, whole.main)
     return lost
@@ -151,7 +151,7 @@ def _contents(source: object) -> Contents:
 
 def _counts(of: Source, written: Source) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
-    samples = of.lines.samples() if isinstance(of, Stream) else None
+    samples = of.stream_columns.samples() if isinstance(of, Stream) else None
     if samples is not None:
         return {"received": len(samples)}
     received = len(written.wire.datagrams() or ()) if isinstance(written, Board) else len(written.table)

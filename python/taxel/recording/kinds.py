@@ -98,15 +98,15 @@ def kind_of(path: Path) -> str:
     if ending == "lsa":
         # Raw bytes may begin with anything.
         return ending
-    stranger = next((what for magic, what in _STRANGERS.items() if head.startswith(magic)), None)
+    stranger = next((kind for magic, kind in _STRANGERS.items() if head.startswith(magic)), None)
     expected = {"mcap": "the MCAP magic", "npz": "the magic of a .npz", "csv": "the names of columns"}
     expected["h5"] = "the magic of HDF5"
     if by_magic is not None:
         stranger = f"a .{by_magic} file; rename it"
     if stranger is not None:
         right = expected[ending] if ending else "a recording"
-        what, _, then = stranger.partition("; ")
-        raise FormatError(f"{path}, byte 0: starts with {begins} ({what}), not with {right}" + f"; {then}" * bool(then))
+        kind, _, then = stranger.partition("; ")
+        raise FormatError(f"{path}, byte 0: starts with {begins} ({kind}), not with {right}" + f"; {then}" * bool(then))
     if ending is None:
         raise FormatError(
             f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}; "

@@ -241,19 +241,19 @@ def _open_one(place: Path, options: OpenOptions) -> Recording:
     """Open one file as taxel writes it, a table of another program with a layout, or a ROS bag."""
     text("pairing", options.pairing, ("direct", "taxel"))
     flag("differences", options.differences)
-    said = _layout(place, options.layout)
-    of_layout = {} if said is None else said.ros
+    layout = _layout(place, options.layout)
+    of_layout = {} if layout is None else layout.ros
     try:
-        if said is None:
+        if layout is None:
             refuse_without_layout(place)
-        if said is not None and is_foreign(place, said):
+        if layout is not None and is_foreign(place, layout):
             if options.topics.are_given:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
-            contents = Contents.of(read_foreign(place, said))
+            contents = Contents.of(read_foreign(place, layout))
             if options.array is not None:
                 contents = Contents.of(_on_given(contents.main, instance("array", options.array, Array)))
         elif (kind := kind_of(place)) == "ros":
-            grid = said.grid() if options.array is None and said is not None else options.array
+            grid = layout.grid() if options.array is None and layout is not None else options.array
             contents = read_ros(place, options.topics.but(of_layout), grid)
         elif options.topics.are_given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
@@ -261,7 +261,7 @@ def _open_one(place: Path, options: OpenOptions) -> Recording:
             array = None if options.array is None else instance("array", options.array, Array)
             contents = _read(place, kind, array, options.pairing, options.differences)
         return Recording(
-            with_sidecars(contents if said is None else laid_out(contents, said, given=options.layout is not None))
+            with_sidecars(contents if layout is None else laid_out(contents, layout, given=options.layout is not None))
         )
     except MemoryError:
         raise helped(
@@ -314,11 +314,11 @@ def _folder(folder: Path, options: OpenOptions) -> list[Recording]:
             problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
             deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
             hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
-            there = (
+            known_kinds = (
                 f"there are {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
                 "layout file .npy, .txt and other arrays and tables (docs/files.md)"
             )
-            raise FormatError(f"{folder}: holds {problem}; {hint or there}")
+            raise FormatError(f"{folder}: holds {problem}; {hint or known_kinds}")
         trials = sorted(_kept(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
         pairs = [(Path(trial.name), _of(trial, folder, names[0], options.layout)) for trial in trials]
     return _labelled(folder / LABELS, pairs)
@@ -335,8 +335,8 @@ def _kept_one(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
     for source in recording._contents.sources.values():
         for table in (
-            source.changes.events if isinstance(source, Board) else None,
-            source.readings.frames if isinstance(source, FrameSource) else None,
+            source.board_events.events if isinstance(source, Board) else None,
+            source.source_frames.frames if isinstance(source, FrameSource) else None,
         ):
             limits.keep(0 if table is None or not table.is_read else _size(table()))
     return recording
@@ -356,10 +356,10 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
     ]
     if left:
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
-        kept = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
+        beside = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
         warn(
-            f"{folder}: {names} left out, as beside recordings ({kept}) tables and arrays are not read: convert them, "
-            "or keep them in a folder of their own",
+            f"{folder}: {names} left out, as beside recordings ({beside}) tables and arrays are not read: convert "
+            "them, or keep them in a folder of their own",
             stacklevel=6,
         )
 
@@ -372,8 +372,8 @@ def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recordin
     known = {labels.named(name) for name, _ in pairs}
     unknown = [name for name in labels.recordings if name not in known]
     if unknown:
-        there = ", ".join(str(name) for name, _ in pairs[:8])
-        raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {there}")
+        names = ", ".join(str(name) for name, _ in pairs[:8])
+        raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {names}")
     # The feet of one trial are one recording.
     count = len({trial_of(str(name), recording.label) for name, recording in pairs})
     if count > 1 and any(not row.recording for row in labels.rows):
@@ -408,16 +408,16 @@ def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = of.timing.usable()
     times = labels._of(name, lambda: clock, of.origin.label)
-    which, replaced, there = labels_of(of.origin), set[int | None](), set[object]()
+    which, replaced, labelled = labels_of(of.origin), set[int | None](), set[object]()
     if beside(of.origin.path).is_file():
         set_here = Labels(beside(of.origin.path))
-        replaced, there = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
+        replaced, labelled = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
     return sorted(
         (
             Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
             for label, every in times.items()
             for t in every
-            if t not in replaced and (label, int(t)) not in there
+            if t not in replaced and (label, int(t)) not in labelled
         ),
         key=lambda note: note.t or 0,
     )
@@ -437,7 +437,7 @@ def _layout(place: Path, given: str | os.PathLike[str] | Layout | None) -> Layou
     return None if file is None else Layout.read(file)
 
 
-def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | None) -> Recording:
+def _of(trial: Trial, place: Path, kind: str, given: str | os.PathLike[str] | None) -> Recording:
     """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
@@ -454,8 +454,8 @@ def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | N
             losses=parts.Losses(lost=known(_beside_frames(trial))),
         )
     )
-    said = _layout(place, layout)
-    return Recording(with_sidecars(contents if said is None else laid_out(contents, said, given=layout is not None)))
+    layout = _layout(place, given)
+    return Recording(with_sidecars(contents if layout is None else laid_out(contents, layout, given=given is not None)))
 
 
 def _beside_frames(trial: Trial) -> tuple[str, ...]:
@@ -470,11 +470,11 @@ def recordings_in(folder: Path, layout: str | os.PathLike[str] | None = None) ->
     Tables and arrays of other programs are those that `layout`, or a layout file beside them, describes; they count in
     a folder that holds nothing else.
     """
-    there = [file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir())]
-    bags = sorted((file for file in there if os.access(file, os.R_OK) and is_bag(file)), key=_order)
-    recorded = [file for file in there if file not in bags and _is_own(file)]
+    files = [file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir())]
+    bags = sorted((file for file in files if os.access(file, os.R_OK) and is_bag(file)), key=_order)
+    recorded = [file for file in files if file not in bags and _is_own(file)]
     others = [file for kind in formats.FORMATS.values() for file in kind.files(folder)]
-    found = recorded or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(there, layout))
+    found = recorded or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(files, layout))
     return [*sorted(found, key=_order), *bags]
 
 
@@ -573,8 +573,8 @@ def _formats(place: Path) -> list[str]:
 
 
 def _holds_own(folder: Path) -> bool:
-    there = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
-    return there and any(_is_own(file) for file in folder.iterdir())
+    is_readable = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
+    return is_readable and any(_is_own(file) for file in folder.iterdir())
 
 
 def _is_own(file: Path) -> bool:

@@ -35,11 +35,11 @@ def is_ours(path: Path) -> bool:
 
 def _holds(file: BinaryIO, word: bytes) -> bool:
     """Return whether a word is in a file."""
-    before = b""
+    overlap = b""
     while piece := file.read(_PIECE_BYTES):
-        if word in before + piece:
+        if word in overlap + piece:
             return True
-        before = piece[1 - len(word) :]
+        overlap = piece[1 - len(word) :]
     return False
 
 

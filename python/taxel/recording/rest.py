@@ -111,10 +111,10 @@ class Rest:
     @staticmethod
     def fall(path: Path | None = None) -> str:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
-        said = None if path is None else Layout.beside(path)
+        file = None if path is None else Layout.beside(path)
         with suppress(FormatError, OSError):
-            if said is not None and Layout.read(said).turned is not None:
-                return f"values fall from their rest as {said.name} turns them: leave falls out of it, if that is wrong"
+            if file is not None and Layout.read(file).turned is not None:
+                return f"values fall from their rest as {file.name} turns them: leave falls out of it, if that is wrong"
         where = "" if path is None else f" {or_given(path)}"
         return f"values fall from their rest: if less means more pressure, say falls = true in a layout file{where}"
 
@@ -292,8 +292,8 @@ def _of_rising(frames: Frames, scale: float, *, falls: bool = False) -> Rest:
 def _blocks(frames: Frames) -> list[FrameBlock]:
     """Return frames in blocks that a processor's cache holds."""
     taxels = frames.array.rows * frames.array.columns
-    values, each = frames.values.reshape(len(frames), taxels), max(1, _BLOCK // max(1, taxels))
-    return [(frames.t[k : k + each], values[k : k + each]) for k in range(0, len(frames), each)]
+    values, block = frames.values.reshape(len(frames), taxels), max(1, _BLOCK // max(1, taxels))
+    return [(frames.t[k : k + block], values[k : k + block]) for k in range(0, len(frames), block)]
 
 
 def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:
