@@ -88,8 +88,8 @@ def test_the_command_that_trains_in_a_shell_has_the_options_and_quotes_what_need
 
 def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
     bag, _ = palms(tmp_path, "grasp.bag")
-    opened_as, joined = [], TextOptions.joined
-    monkeypatch.setattr(TextOptions, "joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
+    opened_as, joined = [], TextOptions.open_joined
+    monkeypatch.setattr(TextOptions, "open_joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
     for shown in (bag, Path("grasp.bag")):
         monkeypatch.chdir(tmp_path)
         opened_as.clear()

@@ -84,7 +84,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         return None
 
     def opens(file: Path) -> list[Recording]:
-        opened = files.opener.joined(file)
+        opened = files.opener.open_joined(file)
         if calibration is None:
             return opened
         return [calibrated_by(sensor, calibration) for sensor in opened]

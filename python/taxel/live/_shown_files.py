@@ -24,7 +24,7 @@ from taxel.labels import Labels, beside
 from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.health import health
-from taxel.recording.opening import is_recording, open_joined
+from taxel.recording.opening import is_recording
 from taxel.recording.rest import flickering, loaded_from, of_frames, ticks_by_unit
 from taxel.recording.text_options import TextOptions
 
@@ -43,7 +43,7 @@ _Taxels = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Opening:
-    """Hold how a recording is opened that `open_joined` alone does not open as it should be.
+    """Hold how a recording is opened that needs options.
 
     Parameters
     ----------
@@ -56,13 +56,13 @@ class Opening:
         frames.
     """
 
-    opens: Callable[[Path], Sequence[Recording]] = open_joined
+    opens: Callable[[Path], Sequence[Recording]] = TextOptions().open_joined
     file: Path | None = None
     options: TextOptions = field(default_factory=TextOptions)
 
     def open(self, file: Path) -> Sequence[Recording]:
         """Open a file."""
-        return self.opens(file) if self.file in (None, file) else open_joined(file)
+        return self.opens(file) if self.file in (None, file) else TextOptions().open_joined(file)
 
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""

@@ -49,7 +49,7 @@ class Panel:
         can see the board and set registers, over a connection that is not encrypted.
     opens : function of a path, optional
         Opens the recording that is shown first, or of a folder each of its files, and returns its trials, and must heed
-        `options`; default: `TextOptions.joined`.
+        `options`; default: `TextOptions.open_joined`.
     options : taxel.recording.text_options.TextOptions, optional
         What the files do not hold themselves; the page trains on a file by them too. Labels of frames that have times
         by its `rate_hz` are saved in numbers of frames.
@@ -89,7 +89,7 @@ class Panel:
             if folder is not None:
                 raise refused("folder", ": is the recording's own")
             folder, opened = _shown(place, how.layout)
-            opens = how.joined if opens is None and how.given() else opens
+            opens = how.open_joined if opens is None and how.given() else opens
             shown = None if place.is_dir() and not is_bag(place) else folder / opened
         if how.rate_hz is not None:
             period_us("rate_hz", how.rate_hz)

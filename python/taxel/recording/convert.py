@@ -23,7 +23,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, Source, Stream, alone, source_from, together
 from taxel.recording.frames import as_frames, period_us
 from taxel.recording.kinds import ENDINGS
-from taxel.recording.opening import open_recording
+from taxel.recording.opening import OpenOptions, open_file
 from taxel.recording.parts import Wire
 from taxel.recording.recording import Recording
 from taxel.recording.stored import is_made, stored
@@ -141,7 +141,9 @@ def _write_lsa(place: Path, of: Source, overwrite: bool) -> None:
 
 def _contents(source: object) -> Contents:
     if isinstance(source, str | os.PathLike):
-        source = open_recording(source)
+        options = OpenOptions()
+        with options.within():
+            source = open_file(Path(checked_path("source", source)), options)
     if isinstance(source, Recording):
         return source._contents
     if not isinstance(source, Events | Frames):

@@ -37,7 +37,7 @@ _STRANGERS = {
 }
 
 
-def is_own_table(path: Path) -> bool:
+def is_table_of_taxel(path: Path) -> bool:
     """Return whether the first line of a .csv begins as taxel's own recordings do, which are separated by commas."""
     names = _columns(path)
     return names[:1] == [b"t_us"] and len(names) > 1 and b"label" not in names

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,12 +28,12 @@ from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording import parts
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, several, source_from
-from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_own_table, kind_of
+from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_table_of_taxel, kind_of
 from taxel.recording.layout import check_size, laid_out, on_array
 from taxel.recording.once import known
 from taxel.recording.read_csv import check_head, read_csv
-from taxel.recording.read_foreign import is_foreign, read_foreign
-from taxel.recording.read_h5 import is_ours, read_h5
+from taxel.recording.read_foreign import is_of_another_program, read_foreign
+from taxel.recording.read_h5 import is_h5_of_taxel, read_h5
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.read_npz import read_npz
@@ -141,7 +140,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     place = Path(arguments.checked_path("path", path))
     if place.is_dir() and not is_bag(place):
         raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
-    every = _open(place, options)
+    every = _open_place(place, options)
     if len(every) != 1:
         names = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
         raise ProblemError(f"{place}: holds {len(every)} recordings ({names}); taxel.open_all opens each")
@@ -193,51 +192,25 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 note),
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
-    return _open(Path(arguments.checked_path("path", path)), options)
+    return _open_place(Path(arguments.checked_path("path", path)), options)
 
 
-def _open(place: Path, options: OpenOptions) -> list[Recording]:
+def _open_place(place: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file."""
     with options.within():
         if place.is_dir() and not is_bag(place):
-            return _folder(place, options)
+            return _open_folder(place, options)
         # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
-        if place.exists() and (names := _formats(place)) and not _is_own(place):
-            trials = _kept(formats.trials(place, names[0]))
+        if place.exists() and (names := _formats_of(place)) and not _is_written_by_taxel(place):
+            trials = _counting_memory(formats.trials(place, names[0]))
             return [
-                _named_beside(place, Path(trial.name), _of(trial, place, names[0], options.layout)) for trial in trials
+                _named_beside(place, Path(trial.name), _recording_of(trial, place, names[0], options.layout))
+                for trial in trials
             ]
-        return [_named_beside(place, Path(place.name), _open_one(place, options))]
+        return [_named_beside(place, Path(place.name), open_file(place, options))]
 
 
-def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
-    """Open one .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, or a ROS bag; finished or not, whole or damaged.
-
-    Parameters
-    ----------
-    path : path
-    **how
-        The other arguments of `open_one`.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    FormatError : the file is of another kind, or damaged so that nothing can be read (names the place)
-    OSError : the file does not exist, or cannot be read
-
-    Notes
-    -----
-    A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel.
-    """
-    options = OpenOptions(**how)
-    with options.within():
-        return _open_one(Path(arguments.checked_path("path", path)), options)
-
-
-def _open_one(place: Path, options: OpenOptions) -> Recording:
+def open_file(place: Path, options: OpenOptions) -> Recording:
     """Open one file as taxel writes it, a table of another program with a layout, or a ROS bag."""
     text("pairing", options.pairing, ("direct", "taxel"))
     flag("differences", options.differences)
@@ -246,7 +219,7 @@ def _open_one(place: Path, options: OpenOptions) -> Recording:
     try:
         if layout is None:
             refuse_without_layout(place)
-        if layout is not None and is_foreign(place, layout):
+        if layout is not None and is_of_another_program(place, layout):
             if options.topics.are_given:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
             contents = Contents.of(read_foreign(place, layout))
@@ -294,44 +267,44 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
     return Contents.of({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
 
 
-def _folder(folder: Path, options: OpenOptions) -> list[Recording]:
+def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
     inside = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
     files = sorted(inside, key=_order)
-    recorded = [file for file in files if _is_own(file)]
+    recorded = [file for file in files if _is_written_by_taxel(file)]
     if options.topic or not recorded:
         recorded = [file for file in files if file in recorded or is_bag(file)]
     if recorded:
         _warn_of_tables(folder, recorded, files, options)
-        opened = [_kept_one(_open_one(file, options)) for file in recorded]
+        opened = [_count_memory(open_file(file, options)) for file in recorded]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
-    elif not (names := _formats(folder)) and (foreign := _laid_out_in(files, options.layout)):
-        pairs = [(file.relative_to(folder), _kept_one(_open_one(file, options))) for file in foreign]
+    elif not (names := _formats_of(folder)) and (foreign := _laid_out_in(files, options.layout)):
+        pairs = [(file.relative_to(folder), _count_memory(open_file(file, options))) for file in foreign]
     else:
         if len(names) != 1:
             for file in files if not names else ():
                 refuse_without_layout(file)
             problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
-            deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
+            deeper = sorted(inner.name for inner in folder.iterdir() if _holds_files_of_taxel(inner))
             hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
             known_kinds = (
                 f"there are {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
                 "layout file .npy, .txt and other arrays and tables (docs/files.md)"
             )
             raise FormatError(f"{folder}: holds {problem}; {hint or known_kinds}")
-        trials = sorted(_kept(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
-        pairs = [(Path(trial.name), _of(trial, folder, names[0], options.layout)) for trial in trials]
+        trials = sorted(_counting_memory(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
+        pairs = [(Path(trial.name), _recording_of(trial, folder, names[0], options.layout)) for trial in trials]
     return _labelled(folder / LABELS, pairs)
 
 
-def _kept(trials: Iterable[Trial]) -> Iterator[Trial]:
+def _counting_memory(trials: Iterable[Trial]) -> Iterator[Trial]:
     """Count the arrays of trials, which stay in memory while others are read."""
     for trial in trials:
         limits.keep(_size(trial.recorded))
         yield trial
 
 
-def _kept_one(recording: Recording) -> Recording:
+def _count_memory(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
     for source in recording._contents.sources.values():
         for table in (
@@ -425,7 +398,7 @@ def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
 
 def _laid_out_in(files: Sequence[Path], given: str | os.PathLike[str] | None) -> list[Path]:
     """Return the files of a folder that are of another program, and of which a layout says how to read them."""
-    foreign = (file for file in files if not file.name.endswith(".notes.csv") and is_foreign(file))
+    foreign = (file for file in files if not file.name.endswith(".notes.csv") and is_of_another_program(file))
     return [file for file in foreign if given is not None or Layout.beside(file) is not None]
 
 
@@ -437,7 +410,7 @@ def _layout(place: Path, given: str | os.PathLike[str] | Layout | None) -> Layou
     return None if file is None else Layout.read(file)
 
 
-def _of(trial: Trial, place: Path, kind: str, given: str | os.PathLike[str] | None) -> Recording:
+def _recording_of(trial: Trial, place: Path, kind: str, given: str | os.PathLike[str] | None) -> Recording:
     """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
@@ -472,7 +445,7 @@ def recordings_in(folder: Path, layout: str | os.PathLike[str] | None = None) ->
     """
     files = [file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir())]
     bags = sorted((file for file in files if os.access(file, os.R_OK) and is_bag(file)), key=_order)
-    recorded = [file for file in files if file not in bags and _is_own(file)]
+    recorded = [file for file in files if file not in bags and _is_written_by_taxel(file)]
     others = [file for kind in formats.FORMATS.values() for file in kind.files(folder)]
     found = recorded or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(files, layout))
     return [*sorted(found, key=_order), *bags]
@@ -486,9 +459,9 @@ def check_recording(file: Path, layout: str | os.PathLike[str] | None = None) ->
     FormatError : no recording (names the kind of file if it is known); an invalid layout file; a table or arrays of
         another program that no layout file describes
     """
-    if not _formats(file) and _layout(file, layout) is None:
+    if not _formats_of(file) and _layout(file, layout) is None:
         refuse_without_layout(file)
-    kind = _kind(file, layout)
+    kind = _format_or_kind(file, layout)
     if kind == "mcap":
         _core.RecordingReader(file, limits.memory(None), False)
     elif kind == "csv":
@@ -502,17 +475,17 @@ def is_recording(file: Path, layout: str | os.PathLike[str] | None = None) -> bo
     try:
         if file.suffix.lower() == ".csv" and is_label_table(file):
             return False
-        _kind(file, layout)
+        _format_or_kind(file, layout)
     except (FormatError, OSError):
         return False
     return True
 
 
-def _kind(file: Path, layout: str | os.PathLike[str] | None) -> str:
+def _format_or_kind(file: Path, layout: str | os.PathLike[str] | None) -> str:
     """Return the kind of a recording by its name, its first bytes, and its layout file."""
-    if names := _formats(file):
+    if names := _formats_of(file):
         return names[0]
-    return "foreign" if is_foreign(file) and _layout(file, layout) is not None else kind_of(file)
+    return "foreign" if is_of_another_program(file) and _layout(file, layout) is not None else kind_of(file)
 
 
 def joined(opened: Sequence[Recording]) -> list[Recording]:
@@ -563,30 +536,25 @@ def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordi
     return [recording for each in given for recording in sensors(instance(name, each, Recording))]
 
 
-def open_joined(path: str | os.PathLike[str], **how: Any) -> list[Recording]:
-    """Open a file or a folder as `open_all` does, with the feet of each trial joined."""
-    return joined(open_all(path, **how))
-
-
-def _formats(place: Path) -> list[str]:
+def _formats_of(place: Path) -> list[str]:
     return [name for name, kind in formats.FORMATS.items() if kind.files(place)]
 
 
-def _holds_own(folder: Path) -> bool:
+def _holds_files_of_taxel(folder: Path) -> bool:
     is_readable = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
-    return is_readable and any(_is_own(file) for file in folder.iterdir())
+    return is_readable and any(_is_written_by_taxel(file) for file in folder.iterdir())
 
 
-def _is_own(file: Path) -> bool:
+def _is_written_by_taxel(file: Path) -> bool:
     """Return whether a file is of a kind that taxel writes, by its ending and, for shared endings, by its content."""
     ending = file.suffix.lower()
     if not file.is_file():
         return False
     if ending == ".csv":
-        return is_own_table(file)
+        return is_table_of_taxel(file)
     if ending == ".npz":
-        return not _formats(file)
-    return is_ours(file) if ending == ".h5" else ending in ENDINGS
+        return not _formats_of(file)
+    return is_h5_of_taxel(file) if ending == ".h5" else ending in ENDINGS
 
 
 def _order(path: Path) -> list[tuple[bool, int, str]]:

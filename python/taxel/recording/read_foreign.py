@@ -32,10 +32,10 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.kinds import is_label_table, is_own_table
+from taxel.recording.kinds import is_label_table, is_table_of_taxel
 from taxel.recording.once import known
 from taxel.recording.parts import Losses, Origin
-from taxel.recording.read_h5 import is_ours
+from taxel.recording.read_h5 import is_h5_of_taxel
 
 #: The endings of tables of text, also compressed by gzip, and of files of arrays.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
@@ -58,7 +58,7 @@ _TIMES = re.compile(
 )
 
 
-def is_foreign(path: Path, layout: Layout | None = None) -> bool:
+def is_of_another_program(path: Path, layout: Layout | None = None) -> bool:
     """Return whether a file is a table or holds arrays that taxel did not write; false for a file that is not there.
 
     Arrays that a layout names are those of another program, also where they have names that taxel gives.
@@ -72,15 +72,15 @@ def is_foreign(path: Path, layout: Layout | None = None) -> bool:
         says = layout is not None and layout.data is not None and layout.data.array in names
         return "about" not in names and (says or not ("t" in names and names & {"x", "y", "p", "values"}))
     if ending == ".h5":
-        return not is_ours(path)
+        return not is_h5_of_taxel(path)
     if ending == ".csv":
-        return not (is_own_table(path) or is_label_table(path))
+        return not (is_table_of_taxel(path) or is_label_table(path))
     return True
 
 
 def is_lone_array(path: Path) -> bool:
     """Return whether a file that taxel did not write holds one array only, of the shape of frames."""
-    if path.suffix.lower() not in ARRAYS or not is_foreign(path):
+    if path.suffix.lower() not in ARRAYS or not is_of_another_program(path):
         return False
     shapes = shapes_of(path)
     return len(shapes) == 1 and all(len(shape) in (2, 3) for shape in shapes.values())

@@ -37,7 +37,7 @@ class TextOptions(SharedOptions):
     array: Sequence[str] | None = None
     rate_hz: float | None = None
 
-    def open(self, path: str | os.PathLike[str]) -> list[Recording]:
+    def open_trials(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
 
         Raises
@@ -66,8 +66,8 @@ class TextOptions(SharedOptions):
         """Return the options as words of a command line."""
         words: list[str] = []
         for name, value in self.given().items():
-            for each in value if isinstance(value, list | tuple) else [value]:
-                words += [f"--{name.replace('_', '-')}", str(each)]
+            for entry in value if isinstance(value, list | tuple) else [value]:
+                words += [f"--{name.replace('_', '-')}", str(entry)]
         return words
 
     def _names_topic(self, bag: Path) -> bool:
@@ -100,28 +100,29 @@ class TextOptions(SharedOptions):
         wire = of_size(self.array[0])
         return _laid_on(recording, Array(*stated.shape, wire.pitch_mm, stated.exists, wire.name))
 
-    def joined(self, path: str | os.PathLike[str]) -> list[Recording]:
+    def open_joined(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
-        return joined(self.open(path))
+        return joined(self.open_trials(path))
 
-    def all(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
+    def open_sensors(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
 
         Each sensor of a file with several is a recording of its own (`Recording.title`).
         """
-        return [of for path in several("paths", paths) for each in self.open(path) for of in sensors(each)]
+        trials = (trial for path in several("paths", paths) for trial in self.open_trials(path))
+        return [sensor for trial in trials for sensor in sensors(trial)]
 
     def _timed(self, recording: Recording) -> Recording:
         return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
 
-    def one(self, path: str | os.PathLike[str]) -> Recording:
+    def open_one(self, path: str | os.PathLike[str]) -> Recording:
         """Open a file that holds one recording, with its feet joined.
 
         Raises
         ------
         ProblemError : it holds several
         """
-        every = self.joined(path)
+        every = self.open_joined(path)
         if len(every) != 1:
             some = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
             raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")

@@ -26,7 +26,7 @@ from taxel.recording.read_foreign import (
     arrays_of,
     cells,
     ends_in_separator,
-    is_foreign,
+    is_of_another_program,
     listed,
     seconds_of,
     shapes_of,
@@ -53,7 +53,7 @@ def refuse_without_layout(path: Path) -> None:
             f"{path}: spike trains, as taxel encode writes them, no recording; taxel info describes them, and "
             "taxel.SpikeTrains.load reads them"
         )
-    if not is_foreign(path) or (path.suffix.lower() == ".npz" and not stored_names(path)):
+    if not is_of_another_program(path) or (path.suffix.lower() == ".npz" and not stored_names(path)):
         return
     if path.suffix.lower() in (".csv", ".h5", ".hdf5"):
         kind_of(path)  # refuses what is not of the kind that its name says

@@ -153,7 +153,7 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
     paths = [Path(path) for path in _needed(left, "recordings")]
     with collected() as warnings:
         progress(f"reading {', '.join(map(str, paths[:3]))}{' ...' * (len(paths) > 3)}", 0, 0)
-        recordings = [opener.one(path) for path in paths] if name in _JOINED else opener.all(paths)
+        recordings = [opener.open_one(path) for path in paths] if name in _JOINED else opener.open_sensors(paths)
         result = work(recordings, left, progress, save)
     found = result.to_dict()
     found["warnings"] = [*dict.fromkeys([*warnings, *found.get("warnings", [])])]
