@@ -18,7 +18,7 @@ from taxel.recording.frames import as_frames, calibrated
 from taxel.recording.merge import merged
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
-from taxel.recording.parts import StreamColumns, Timing
+from taxel.recording.parts import Columns, Timing
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
 from taxel.recording.stored import stored
@@ -50,15 +50,15 @@ def full(folder: Path, kind: type[Source]) -> Contents:
     one = replace(one, sensor=replace(one.sensor, side="left", heel="top"), losses=losses, wire=wire)
     header = {name: getattr(one, name) for name in ("origin", "sensor", "settings", "marks", "timing", "losses")}
     drawn = as_frames(one, 100)
-    readings, five = replace(drawn.source_frames, untimed=True, turned=255.0), np.arange(5)
+    readings, five = replace(drawn.frame_table, untimed=True, turned=255.0), np.arange(5)
     samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
     every: dict[type[Source], Source] = {
         Board: one,
-        Drawn: Drawn(source_frames=readings, wire=wire, **header),
-        FrameSource: FrameSource(source_frames=readings, **header),
+        Drawn: Drawn(frame_table=readings, wire=wire, **header),
+        FrameSource: FrameSource(frame_table=readings, **header),
         Stream: Stream(
-            source_frames=readings,
-            stream_columns=StreamColumns(tuple(f"c{k}" for k in range(10)), known(samples)),
+            frame_table=readings,
+            stream=Columns(tuple(f"c{k}" for k in range(10)), known(samples)),
             **header,
         ),
     }
@@ -73,16 +73,16 @@ def marked(of: Contents) -> Contents:
 
 
 #: The functions: from the contents before to those after, and the fields that they set anew, which other tests check.
-TABLE, TIMED = {"board_events.events", "source_frames.frames"}, {"marks.notes", "marks.detections", "marks.zeroings"}
+TABLE, TIMED = {"event_table.events", "frame_table.frames"}, {"marks.notes", "marks.detections", "marks.zeroings"}
 NAMED = {"origin.path", "origin.name", "origin.kind", "origin.label", "origin.source"}
 FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
     "between": (
         lambda of, _: between(of, 1000.0, 200_000.0),
-        {*TABLE, *TIMED, "settings.held", "timing.stretch", "stream_columns.samples", "losses.verdict"},
+        {*TABLE, *TIMED, "settings.held", "timing.stretch", "stream.samples", "losses.verdict"},
     ),
     "region": (
         lambda of, _: region(of, slice(1, 5), slice(None)),
-        {*TABLE, "sensor.array", "sensor.calibration", "settings.held", "marks.zeroings", "stream_columns.columns"},
+        {*TABLE, "sensor.array", "sensor.calibration", "settings.held", "marks.zeroings", "stream.columns"},
     ),
     "merge": (
         lambda of, _: merged([of, of], gap=0 if isinstance(of.main, FrameSource) else None),

@@ -33,7 +33,7 @@ __all__ = [
     "with_losses",
 ]  # fmt: skip
 
-P = TypeVar("P", parts.Wire, parts.StreamColumns)
+P = TypeVar("P", parts.Wire, parts.Columns)
 S = TypeVar("S", bound="Source")
 
 
@@ -65,37 +65,37 @@ class Source(ABC):
     @property
     def columns(self) -> tuple[str, ...] | None:
         """The names of the columns of a stream of numbers; None for a sensor."""
-        return self.stream_columns.columns if isinstance(self, Stream) else None
+        return self.stream.columns if isinstance(self, Stream) else None
 
     @property
     def untimed(self) -> bool:
         """Whether its frames are numbered."""
-        return isinstance(self, FrameSource) and self.source_frames.untimed
+        return isinstance(self, FrameSource) and self.frame_table.untimed
 
 
 @dataclass(frozen=True, eq=False)
 class Board(Source):
     """Hold what a board sent."""
 
-    board_events: parts.BoardEvents
+    event_table: parts.EventTable
     wire: parts.Wire = field(default_factory=parts.Wire)
 
     @property
     def table(self) -> Events:
         """The events."""
-        return self.board_events.events()
+        return self.event_table.events()
 
 
 @dataclass(frozen=True, eq=False)
 class FrameSource(Source):
     """Hold frames."""
 
-    source_frames: parts.SourceFrames
+    frame_table: parts.FrameTable
 
     @property
     def table(self) -> Frames:
         """The frames."""
-        return self.source_frames.frames()
+        return self.frame_table.frames()
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ class Drawn(FrameSource):
 class Stream(FrameSource):
     """Hold a stream of numbers, whose lines are frames of one row."""
 
-    stream_columns: parts.StreamColumns
+    stream: parts.Columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,20 +183,20 @@ def source_from(
     table : Events or Frames
     origin : Origin, optional
     untimed, turned : bool, float
-        As of `SourceFrames`.
+        As of `FrameTable`.
     columns : sequence of str
-        Of a stream of numbers, as of `StreamColumns`.
+        Of a stream of numbers, as of `Columns`.
     **header
         Its other parts; default: a sensor of the table's array alone.
     """
     origin = parts.Origin() if origin is None else origin
     sensor = header.pop("sensor", None) or parts.Sensor(table.array)
     if isinstance(table, Events):
-        return Board(origin, sensor, parts.BoardEvents(known(table)), **header)
-    readings = parts.SourceFrames(known(table), untimed, turned)
+        return Board(origin, sensor, parts.EventTable(known(table)), **header)
+    frame_table = parts.FrameTable(known(table), untimed, turned)
     if columns:
-        return Stream(origin, sensor, readings, parts.StreamColumns(tuple(columns)), **header)
-    return FrameSource(origin, sensor, readings, **header)
+        return Stream(origin, sensor, frame_table, parts.Columns(tuple(columns)), **header)
+    return FrameSource(origin, sensor, frame_table, **header)
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +294,7 @@ def together(sources: Mapping[str, Source]) -> bool:
     """Return whether sources share one clock: frames without arrival times, as those of two feet."""
     return all(
         not source.has_events
-        and not (isinstance(source, Stream) and source.stream_columns.samples.holds())
+        and not (isinstance(source, Stream) and source.stream.samples.holds())
         and not source.timing.clock.holds()
         for source in sources.values()
     )

@@ -153,7 +153,7 @@ def _contents(source: object) -> Contents:
 
 def _counts(of: Source, written: Source) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
-    samples = of.stream_columns.samples() if isinstance(of, Stream) else None
+    samples = of.stream.samples() if isinstance(of, Stream) else None
     if samples is not None:
         return {"received": len(samples)}
     received = len(written.wire.datagrams() or ()) if isinstance(written, Board) else len(written.table)

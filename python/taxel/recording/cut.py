@@ -135,18 +135,18 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
                 return parts.Settings(held, part.registers, part.register_changes)
             case parts.Marks():
                 return replace(part, zeroings=Once(lambda: zeroings(part.zeroings())))
-            case parts.BoardEvents():
-                return parts.BoardEvents(Once(lambda: events(part.events())))
-            case parts.SourceFrames():
+            case parts.EventTable():
+                return parts.EventTable(Once(lambda: events(part.events())))
+            case parts.FrameTable():
                 return replace(part, frames=Once(lambda: part.frames().region(columns, rows)))
-            case parts.StreamColumns():
-                return parts.StreamColumns(part.columns[left:right])
+            case parts.Columns():
+                return parts.Columns(part.columns[left:right])
             case parts.Wire():
                 return None
             case _:
                 assert_never(part)
 
-    return Contents.of(applied(of.main, rule, lambda: [*of.main.part(parts.StreamColumns).received(), *of.others()]))
+    return Contents.of(applied(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
 
 
 def _cropped(

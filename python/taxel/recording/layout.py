@@ -22,7 +22,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, FrameSource, S, Source, Stream, alone
 from taxel.recording.frames import times_at
 from taxel.recording.once import known
-from taxel.recording.parts import BoardEvents, SourceFrames
+from taxel.recording.parts import EventTable, FrameTable
 
 #: Units that say nothing: what a table or a stream of numbers holds.
 _UNSAID = ("counts", "as sent")
@@ -55,9 +55,9 @@ def on_array(of: S, array: Array) -> S:
 
     same = replace(of, sensor=replace(of.sensor, array=array))
     if isinstance(same, Board):
-        return replace(same, board_events=BoardEvents(same.board_events.events.to(events)))
+        return replace(same, event_table=EventTable(same.event_table.events.to(events)))
     if isinstance(same, FrameSource):
-        return replace(same, source_frames=replace(same.source_frames, frames=same.source_frames.frames.to(frames)))
+        return replace(same, frame_table=replace(same.frame_table, frames=same.frame_table.frames.to(frames)))
     return same
 
 
@@ -102,7 +102,7 @@ def _laid_out(of: Source, layout: Layout, *, given: bool) -> Source:
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz):
             raise FormatError(f"{layout.place}: {name} holds events; falls, unit and rate_hz are of frames")
         return same
-    was = same.source_frames.turned
+    was = same.frame_table.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
         falls = "false" if layout.turned is None else f"{layout.turned:g}"
         raise FormatError(
@@ -112,7 +112,7 @@ def _laid_out(of: Source, layout: Layout, *, given: bool) -> Source:
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
     frames = _read(same.table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
     untimed = same.untimed and layout.rate_hz is None
-    return replace(same, source_frames=SourceFrames(known(frames), untimed, was if full is None else full))
+    return replace(same, frame_table=FrameTable(known(frames), untimed, was if full is None else full))
 
 
 def _array(of: Source, layout: Layout) -> Array:

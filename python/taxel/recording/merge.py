@@ -97,7 +97,7 @@ def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: 
     merging = _Merging(sources, tables, shifts, lefts, array, beside)
     lost = [line for source in sources for line in source.losses.lost()]
     for recording, source in zip(recordings, sources, strict=True):
-        lost += [*source.part(parts.Wire).lines(), *source.part(parts.StreamColumns).received(), *recording.others()]
+        lost += [*source.part(parts.Wire).lines(), *source.part(parts.Columns).received(), *recording.others()]
     merged = merging.source()
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
     return Contents.of(with_losses(merged, known((*lost, *merging.lost))))
@@ -129,12 +129,12 @@ class _Merging:
         if self.sources[0].has_events:
             tables = [table for table in self.tables if isinstance(table, Events)]
             return Board(
-                board_events=parts.BoardEvents(known(_events(tables, self.shifts, self.array, self.lefts))), **header
+                event_table=parts.EventTable(known(_events(tables, self.shifts, self.array, self.lefts))), **header
             )
         columns = self.columns()
         if columns is None:
-            return FrameSource(source_frames=self.source_frames(), **header)
-        return Stream(source_frames=self.source_frames(), stream_columns=parts.StreamColumns(columns), **header)
+            return FrameSource(frame_table=self.frame_table(), **header)
+        return Stream(frame_table=self.frame_table(), stream=parts.Columns(columns), **header)
 
     def agreed(self, values: Iterable[T], empty: T, line: str, same: Callable[[T, T], bool] = operator.eq) -> T:
         """Return the common value if all recordings agree, else the empty value; then a line says so."""
@@ -147,12 +147,12 @@ class _Merging:
 
     def columns(self) -> tuple[str, ...] | None:
         """Return the names of the columns."""
-        columns_of_parts = [part.columns for part in self.sources]
+        columns = [part.columns for part in self.sources]
         if not self.beside:
-            return self.agreed(columns_of_parts, None, "the names of the columns")
+            return self.agreed(columns, None, "the names of the columns")
         return (
-            tuple(name for names in columns_of_parts for name in names or ())
-            if any(names is not None for names in columns_of_parts)
+            tuple(name for names in columns for name in names or ())
+            if any(names is not None for names in columns)
             else None
         )
 
@@ -179,12 +179,10 @@ class _Merging:
 
     def settings(self) -> parts.Settings:
         """Merge registers that are equal, and the values that the taxels held at the beginning."""
-        settings_of_parts = [part.settings for part in self.sources]
-        registers = [settings.registers() for settings in settings_of_parts]
+        settings = [source.settings for source in self.sources]
+        registers = [part.registers() for part in settings]
         held = _beside_held(self.sources, self.array, self.lefts) if self.beside else self.held()
-        changes = self.agreed(
-            (settings.register_changes() for settings in settings_of_parts), (), "the settings of the registers"
-        )
+        changes = self.agreed((part.register_changes() for part in settings), (), "the settings of the registers")
         return parts.Settings(
             held=known(held),
             registers=known(self.agreed(registers, None, "the board's registers", _same_registers)),
@@ -222,34 +220,26 @@ class _Merging:
 
     def losses(self) -> parts.Losses:
         """Merge what was lost; counts only if they are equal."""
-        losses_of_parts = [part.losses for part in self.sources]
+        losses = [source.losses for source in self.sources]
         verdict = None
-        if any(losses.verdict() is not None for losses in losses_of_parts):
+        if any(part.verdict() is not None for part in losses):
             verdict = Verdict._together(_of_files(self.sources, self.shifts))
         return parts.Losses(
-            counts=known(
-                self.agreed(
-                    (losses.counts() for losses in losses_of_parts), {}, "what each received and lost, by cause"
-                )
-            ),
+            counts=known(self.agreed((part.counts() for part in losses), {}, "what each received and lost, by cause")),
             verdict=known(verdict),
             remarks=named([(part.origin.name, part.losses.remarks) for part in self.sources]),
-            truncated=any(losses.truncated for losses in losses_of_parts),
-            rebuilt=known(
-                self.agreed(
-                    (losses.rebuilt() for losses in losses_of_parts), {}, "what reading each had to put up with"
-                )
-            ),
+            truncated=any(part.truncated for part in losses),
+            rebuilt=known(self.agreed((part.rebuilt() for part in losses), {}, "what reading each had to put up with")),
         )
 
-    def source_frames(self) -> parts.SourceFrames:
+    def frame_table(self) -> parts.FrameTable:
         """Merge frames."""
         tables = [table for table in self.tables if isinstance(table, Frames)]
-        frames_of_parts = [part.source_frames for part in self.sources if isinstance(part, FrameSource)]
-        return parts.SourceFrames(
+        frames = [source.frame_table for source in self.sources if isinstance(source, FrameSource)]
+        return parts.FrameTable(
             known(_frames(tables, self.shifts, self.array, self.beside)),
-            all(readings.untimed for readings in frames_of_parts),
-            self.agreed((readings.turned for readings in frames_of_parts), None, "whether readings were turned"),
+            all(part.untimed for part in frames),
+            self.agreed((part.turned for part in frames), None, "whether readings were turned"),
         )
 
     def zeroings(self) -> tuple[Zeroing, ...]:

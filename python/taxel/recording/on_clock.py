@@ -129,13 +129,13 @@ def _moved(of: Source, name: str, times: Times | None) -> Source:
                 return parts.Timing(part.clock.to(clock), name, part.stretch)
             case parts.Losses():
                 return replace(part, verdict=part.verdict.to(verdict))
-            case parts.BoardEvents():
-                return parts.BoardEvents(part.events.to(events))
-            case parts.SourceFrames():
+            case parts.EventTable():
+                return parts.EventTable(part.events.to(events))
+            case parts.FrameTable():
                 return replace(part, frames=part.frames.to(frames))
-            case parts.StreamColumns():
-                return parts.StreamColumns(part.columns)
+            case parts.Columns():
+                return parts.Columns(part.columns)
             case _:
                 assert_never(part)
 
-    return applied(of, rule, of.part(parts.StreamColumns).received)
+    return applied(of, rule, of.part(parts.Columns).received)

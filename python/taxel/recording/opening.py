@@ -308,8 +308,8 @@ def _count_memory(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
     for source in recording._contents.sources.values():
         for table in (
-            source.board_events.events if isinstance(source, Board) else None,
-            source.source_frames.frames if isinstance(source, FrameSource) else None,
+            source.event_table.events if isinstance(source, Board) else None,
+            source.frame_table.frames if isinstance(source, FrameSource) else None,
         ):
             limits.keep(0 if table is None or not table.is_read else _size(table()))
     return recording
@@ -533,7 +533,7 @@ def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordi
     given = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
     if not len(given):
         raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
-    return [recording for each in given for recording in sensors(instance(name, each, Recording))]
+    return [recording for entry in given for recording in sensors(instance(name, entry, Recording))]
 
 
 def _formats_of(place: Path) -> list[str]:

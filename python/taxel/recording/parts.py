@@ -28,16 +28,7 @@ from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = [
-    "BoardEvents",
-    "Losses",
-    "Marks",
-    "Origin",
-    "Part",
-    "Sensor",
-    "Settings",
-    "SourceFrames",
-    "StreamColumns",
-    "Timing",
+    "Columns", "EventTable", "FrameTable", "Losses", "Marks", "Origin", "Part", "Sensor", "Settings", "Timing",
     "Wire",
 ]  # fmt: skip
 
@@ -206,7 +197,7 @@ class Losses:
 
 
 @dataclass(frozen=True, eq=False)
-class BoardEvents:
+class EventTable:
     """Hold the changes at taxels of a board."""
 
     events: Once[Events]
@@ -217,7 +208,7 @@ class BoardEvents:
 
 
 @dataclass(frozen=True, eq=False)
-class SourceFrames:
+class FrameTable:
     """Hold frames.
 
     Parameters
@@ -273,7 +264,7 @@ class Wire:
 
 
 @dataclass(frozen=True, eq=False)
-class StreamColumns:
+class Columns:
     """Hold the lines of a stream of numbers.
 
     Parameters
@@ -297,4 +288,4 @@ class StreamColumns:
 
 
 #: A function has a rule for each of these types: `match` them, and end with `assert_never`.
-Part = Origin | Sensor | Settings | Marks | Timing | Losses | BoardEvents | SourceFrames | Wire | StreamColumns
+Part = Origin | Sensor | Settings | Marks | Timing | Losses | EventTable | FrameTable | Wire | Columns

@@ -218,12 +218,12 @@ def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[n
         base[taxel[begins]] = np.where(np.isnan(base[taxel[begins]]), value[begins], base[taxel[begins]])
         above = value - base[taxel]
         now = np.where(above > of.above, above, 0.0)
-        before = np.concatenate([[0.0], now[:-1]])
-        before[begins] = load[taxel[begins]]
+        earlier = np.concatenate([[0.0], now[:-1]])
+        earlier[begins] = load[taxel[begins]]
         load[taxel[begins]] = now[np.append(begins[1:], len(now)) - 1]
-        steps = {"peak": above, "total": now - before}
+        steps = {"peak": above, "total": now - earlier}
         if of.area is not None:
-            steps["area"] = areas[taxel] * ((now > 0) - 1.0 * (before > 0))
+            steps["area"] = areas[taxel] * ((now > 0) - 1.0 * (earlier > 0))
         # Only what is there once all of a moment's events are read.
         last = np.append(np.diff(t) > 0, True)
         frame = np.searchsorted(drawn.t, t, side="right") - 1

@@ -245,17 +245,17 @@ def found(
     released, less, quiet, in_quiet = known.copy(), np.zeros(taxels), np.zeros(taxels), known.copy()
     first = 0
     for t, values in blocks():
-        each = np.ones((len(t), 1), np.int64) if stands_for is None else stands_for[first : first + len(t), None]
+        weights = np.ones((len(t), 1), np.int64) if stands_for is None else stands_for[first : first + len(t), None]
         first += len(t)
         load = begins - values if falls else values - begins
         far = load < -LOADED_TICKS / scale
-        released += (far * each).sum(axis=0)
-        less -= (np.where(far, load, 0.0) * each).sum(axis=0)
-        there = ~np.isnan(load)
-        known += (there * each).sum(axis=0)
+        released += (far * weights).sum(axis=0)
+        less -= (np.where(far, load, 0.0) * weights).sum(axis=0)
+        is_known = ~np.isnan(load)
+        known += (is_known * weights).sum(axis=0)
         within = slice(*np.searchsorted(t, rest.quiet))
-        quiet += (np.where(there, load, 0.0) * each)[within].sum(axis=0)
-        in_quiet += (there * each)[within].sum(axis=0)
+        quiet += (np.where(is_known, load, 0.0) * weights)[within].sum(axis=0)
+        in_quiet += (is_known * weights)[within].sum(axis=0)
     loaded = released > LOADED_SHARE * known
     begins[loaded] = np.nan
     if np.isnan(begins).all():

@@ -110,7 +110,7 @@ def _arrivals(of: Source) -> list[str]:
 
 def _table(of: Source, _: Path) -> _Kept:
     """Return what a .npz or a .h5 holds: all but the raw datagrams."""
-    wire, stream = of.part(parts.Wire), of.part(parts.StreamColumns)
+    wire, stream = of.part(parts.Wire), of.part(parts.Columns)
 
     def rule(part: parts.Part) -> parts.Part | None:
         match part:
@@ -121,14 +121,14 @@ def _table(of: Source, _: Path) -> _Kept:
                 | parts.Settings()
                 | parts.Marks()
                 | parts.Losses()
-                | parts.BoardEvents()
-                | parts.SourceFrames()
+                | parts.EventTable()
+                | parts.FrameTable()
             ):
                 return part
             case parts.Wire():
                 return parts.Wire()
-            case parts.StreamColumns():
-                return parts.StreamColumns(part.columns)
+            case parts.Columns():
+                return parts.Columns(part.columns)
             case parts.Timing():
                 return None
             case _:
@@ -149,7 +149,7 @@ def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
 
 def _csv(of: Source, place: Path) -> _Kept:
     """Return what a .csv holds: events without markers, or frames without their unit."""
-    beside, is_turned = Layout.beside(place), isinstance(of, FrameSource) and of.source_frames.turned is not None
+    beside, is_turned = Layout.beside(place), isinstance(of, FrameSource) and of.frame_table.turned is not None
     if is_turned and beside is not None and Layout.read(beside).turned is not None:
         raise ProblemError(
             f"{place}: the readings were turned already, which a .csv cannot state, and {beside} beside it would turn "
@@ -204,7 +204,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     is_file, lines = of.origin.kind != "events", of.losses.damage()
     # Of what recordings were merged stands in `source`.
     converted = [f"converted from {of.origin.name}"] if is_file and of.origin.kind != "merged" else []
-    samples = of.stream_columns.samples() if isinstance(of, Stream) else None
+    samples = of.stream.samples() if isinstance(of, Stream) else None
     events = None if isinstance(of, FrameSource) else known(_board(of, place).table)
     clock = of.timing.usable()
     wire = _wire(of, clock, lines) if isinstance(of, Board) else parts.Wire()
@@ -224,10 +224,10 @@ def _mcap(of: Source, place: Path) -> _Kept:
         match part:
             case parts.Origin():
                 return replace(part, source=part.source or part.name or ("events" if of.has_events else "frames"))
-            case parts.Sensor() | parts.Settings() | parts.Marks() | parts.SourceFrames() | parts.StreamColumns():
+            case parts.Sensor() | parts.Settings() | parts.Marks() | parts.FrameTable() | parts.Columns():
                 return part
-            case parts.BoardEvents():
-                return parts.BoardEvents(events or part.events)
+            case parts.EventTable():
+                return parts.EventTable(events or part.events)
             case parts.Timing():
                 lines.extend(part.lines())
                 return parts.Timing(known(clock))

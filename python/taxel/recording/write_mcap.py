@@ -51,7 +51,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     OSError : the disk is full ...
     """
     whole = contents.main
-    samples = whole.stream_columns.samples() if isinstance(whole, Stream) else None
+    samples = whole.stream.samples() if isinstance(whole, Stream) else None
     if samples is not None:
         header = {**samples.about, "sources": [], **_provenance(whole)}
         writer = RecordingWriter(part, json.dumps(header), compression, True)
@@ -129,7 +129,7 @@ def _write_frames(
                 "unit": source.table.unit,
                 "clock": not source.untimed,
                 "columns": source.columns or (),
-                "turned": source.source_frames.turned,
+                "turned": source.frame_table.turned,
             },
         }
         for name, source in sources.items()
@@ -176,7 +176,7 @@ def _low_rate(of: FrameSource) -> tuple[Frames, tuple[float, str, str]]:
     few = Frames(frames.values[first], frames.t[first], unit=frames.unit, array=frames.array)
     if not len(few):
         return few, (1.0, "none", few.unit)
-    recording = Recording(Contents.of(replace(of, source_frames=replace(of.source_frames, frames=known(few)))))
+    recording = Recording(Contents.of(replace(of, frame_table=replace(of.frame_table, frames=known(few)))))
     above, _, rest = cast("tuple[Frames, float, Rest]", above_rest(recording))
     return above, (1.0 / ticks_by_unit(few), _RESTS.get(rest.source, rest.source), above.unit)
 
