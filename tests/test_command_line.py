@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import time
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,9 @@ from shell import call
 
 import taxel
 from taxel.cli._commands import OWN, added
+from taxel.cli._opening import FileOptions
 from taxel.live import send
+from taxel.recording.text_options import TextOptions
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -320,3 +323,7 @@ def test_labels_of_a_recording_that_is_not_there_are_left_out_with_one_warning(h
         assert code == 0
         assert error.count("left out") == (said is not None), error
         assert said is None or said in error
+
+
+def test_each_option_of_opening_is_typed_by_its_name() -> None:
+    assert {option.name for option in fields(FileOptions)} == {option.name for option in fields(TextOptions)}

@@ -25,7 +25,7 @@ from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Labels
-from taxel.recording import open_recording
+from taxel.recording import open_one
 from taxel.recording.convert import convert
 from taxel.simulate import Act, Contact, Scene, Silence, play, truth
 from taxel.spikes import to_ms, to_us
@@ -119,7 +119,7 @@ class Drop(NamedTuple):
 
 
 def _opened(path: Path, table: Labels, contacts: list[Contact], kind: int) -> Drop:
-    recording = open_recording(path)
+    recording = open_one(path)
     events = recording.events
     started = next(t for t, start in events.markers if start)
     tare = Tare.take(events, stop_us=started)

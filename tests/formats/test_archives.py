@@ -33,7 +33,7 @@ def table(path: Path) -> None:
 KINDS: dict[str, tuple[Callable[[Path], None], Callable[[Path], object]]] = {
     "spikes": (spikes, taxel.SpikeTrains.load),
     "poses": (poses, lambda path: [t.frames for t in taxel.formats.FORMATS["popu"].trials(path)]),
-    "table": (table, lambda path: taxel.recording.open_recording(path).events),
+    "table": (table, lambda path: taxel.open(path).events),
 }
 
 

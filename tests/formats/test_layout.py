@@ -15,7 +15,7 @@ import taxel
 from taxel import Array, Events, FormatError, Frames, Places
 from taxel.cli import app
 from taxel.formats.layout import Layout, packaged
-from taxel.recording.open_options import OpenOptions
+from taxel.recording.text_options import TextOptions
 
 from .making import write_gaitpdb
 from .tables import VALUES, lines, table
@@ -519,11 +519,11 @@ def test_a_taxel_may_be_named_by_the_letter_t(tmp_path: Path) -> None:
 def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: Path) -> None:
     palm = tmp_path / "palm.npy"
     np.save(palm, VALUES.reshape(3, 2, 3))
-    opened = OpenOptions(rate_hz=100.0).one(palm)
+    opened = TextOptions(rate_hz=100.0).open_one(palm)
     assert opened.frames().t.tolist() == [0, 10_000, 20_000]
     assert opened.array.shape == (2, 3)
     np.save(palm, VALUES)
-    assert OpenOptions(rate_hz=100.0, array=["2x3"]).one(palm).array.shape == (2, 3)
+    assert TextOptions(rate_hz=100.0, array=["2x3"]).open_one(palm).array.shape == (2, 3)
     refused = CliRunner().invoke(app, ["info", str(palm)])
     assert ", or rate_hz, says what it is" in str(refused.exception)
 

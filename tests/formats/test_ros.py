@@ -21,7 +21,7 @@ import taxel
 from taxel import FormatError, ProblemError
 from taxel.formats import ros
 from taxel.formats.ros.reading import _times
-from taxel.recording.open_options import OpenOptions
+from taxel.recording.text_options import TextOptions
 from taxel.tasks.labels import references
 
 from . import bags
@@ -558,8 +558,8 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
     bag = bags.write(tmp_path / "pick.mcap", several)
     table = tmp_path / "labels.csv"
     table.write_text("recording,source,label,t_us\n" + "".join(f"{names[s]}touch,{us + t}\n" for s, t in rows))
-    options = OpenOptions(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
-    opened = options.all([bag])
+    options = TextOptions(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
+    opened = options.open_sensors([bag])
     left, right = references(str(table), opened)
     assert [(left["touch"] - us).tolist(), (right["touch"] - us).tolist()] == [[20_000, 70_000], [30_000]]
     table.write_text(table.read_text() + "pick"[: 4 * (names["left"][0] != ",")] + f",/grip/thumb,touch,{us}\n")
@@ -569,4 +569,4 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
     assert [one["touch"].tolist() for one in references(str(table), opened)] == [[us + 20_000]] * 2
     other = bags.write(tmp_path / "other.mcap", several)
     with pytest.raises(ProblemError, match="names no recording, and there are 2; must have the column recording"):
-        references(str(table), options.all([bag, other]))
+        references(str(table), options.open_sensors([bag, other]))

@@ -21,7 +21,7 @@ from taxel import Array, Events, Neuron, Readout, wire
 from taxel.cli import app, main
 from taxel.encode import ContactArea
 from taxel.live import Live, send
-from taxel.recording.open_options import OpenOptions
+from taxel.recording.text_options import TextOptions
 from taxel.simulate import Board, Scene, emulate
 from taxel.wire import Registers
 
@@ -64,7 +64,7 @@ def test_taxel_record_keeps_the_registers_of_a_sensor_of_ones_own(tmp_path: Path
     assert registers.frame_us == pytest.approx(2000, rel=1e-3)
     # No pitch is stated.
     assert taxel.open(file).array.pitch_mm is None
-    assert OpenOptions(array=["4x4"]).one(file).array.pitch_mm is None
+    assert TextOptions(array=["4x4"]).open_one(file).array.pitch_mm is None
 
 
 @pytest.mark.parametrize("which", [("record", "own.mcap"), ("live", "--panel")])

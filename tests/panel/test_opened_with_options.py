@@ -23,8 +23,8 @@ from taxel import Array, Calibration, Frames
 from taxel.cli._opening import FileOptions
 from taxel.cli.view import _opening
 from taxel.live import Panel
-from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import recordings_in
+from taxel.recording.text_options import TextOptions
 
 KINDS = ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")
 
@@ -88,8 +88,8 @@ def test_the_command_that_trains_in_a_shell_has_the_options_and_quotes_what_need
 
 def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
     bag, _ = palms(tmp_path, "grasp.bag")
-    opened_as, joined = [], OpenOptions.joined
-    monkeypatch.setattr(OpenOptions, "joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
+    opened_as, joined = [], TextOptions.open_joined
+    monkeypatch.setattr(TextOptions, "open_joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
     for shown in (bag, Path("grasp.bag")):
         monkeypatch.chdir(tmp_path)
         opened_as.clear()
@@ -263,7 +263,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
     (folder / "layout.toml" if beside else layout).write_text(text)
     given = {} if beside else {"layout": layout}
     for name in TABLES:
-        with Panel(folder / name, options=OpenOptions(**given)) as panel, Client(panel) as page:
+        with Panel(folder / name, options=TextOptions(**given)) as panel, Client(panel) as page:
             shown_alike(page, [name], values)
     assert [one.name for one in taxel.open_all(folder, **given)] == list(TABLES)
     (folder / "labels.csv").write_text("recording,label,t_us\npalm,contact,100000\n")

@@ -180,7 +180,7 @@ def same(recording: taxel.Recording, m: Model, where: str) -> None:
     assert (frames.unit, recording.side, recording.heel, recording.timed) == (m.unit, m.side, m.heel, True), where
     one = recording._contents.main
     assert isinstance(one, FrameSource)
-    assert one.readings.turned == m.turned, where
+    assert one.frame_table.turned == m.turned, where
     assert (recording.columns if recording.is_stream else None) == m.columns, where
     assert sorted((n.text, str(n.t)) for n in recording.notes) == sorted((text, str(t)) for text, t in m.notes), where
     assert [(d.label, d.t, d.known) for d in recording.detections] == m.found, where

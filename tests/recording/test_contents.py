@@ -18,7 +18,7 @@ from taxel.recording.frames import as_frames, calibrated
 from taxel.recording.merge import merged
 from taxel.recording.on_clock import on_clock
 from taxel.recording.once import known
-from taxel.recording.parts import Lines, Timing
+from taxel.recording.parts import Columns, Timing
 from taxel.recording.raw import Samples
 from taxel.recording.recording import with_notes
 from taxel.recording.stored import stored
@@ -50,13 +50,17 @@ def full(folder: Path, kind: type[Source]) -> Contents:
     one = replace(one, sensor=replace(one.sensor, side="left", heel="top"), losses=losses, wire=wire)
     header = {name: getattr(one, name) for name in ("origin", "sensor", "settings", "marks", "timing", "losses")}
     drawn = as_frames(one, 100)
-    readings, five = replace(drawn.readings, untimed=True, turned=255.0), np.arange(5)
+    readings, five = replace(drawn.frame_table, untimed=True, turned=255.0), np.arange(5)
     samples = Samples({}, five, five.astype(np.uint64), five, five[:, None] * 1.0)
     every: dict[type[Source], Source] = {
         Board: one,
-        Drawn: Drawn(readings=readings, wire=wire, **header),
-        FrameSource: FrameSource(readings=readings, **header),
-        Stream: Stream(readings=readings, lines=Lines(tuple(f"c{k}" for k in range(10)), known(samples)), **header),
+        Drawn: Drawn(frame_table=readings, wire=wire, **header),
+        FrameSource: FrameSource(frame_table=readings, **header),
+        Stream: Stream(
+            frame_table=readings,
+            stream=Columns(tuple(f"c{k}" for k in range(10)), known(samples)),
+            **header,
+        ),
     }
     own = every[kind]
     return Contents(own, {"board": own, "other": replace(own, origin=replace(own.origin, label="other"))})
@@ -69,16 +73,16 @@ def marked(of: Contents) -> Contents:
 
 
 #: The functions: from the contents before to those after, and the fields that they set anew, which other tests check.
-TABLE, TIMED = {"changes.events", "readings.frames"}, {"marks.notes", "marks.detections", "marks.zeroings"}
+TABLE, TIMED = {"event_table.events", "frame_table.frames"}, {"marks.notes", "marks.detections", "marks.zeroings"}
 NAMED = {"origin.path", "origin.name", "origin.kind", "origin.label", "origin.source"}
 FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
     "between": (
         lambda of, _: between(of, 1000.0, 200_000.0),
-        {*TABLE, *TIMED, "settings.held", "timing.stretch", "lines.samples", "losses.verdict"},
+        {*TABLE, *TIMED, "settings.held", "timing.stretch", "stream.samples", "losses.verdict"},
     ),
     "region": (
         lambda of, _: region(of, slice(1, 5), slice(None)),
-        {*TABLE, "sensor.array", "sensor.calibration", "settings.held", "marks.zeroings", "lines.columns"},
+        {*TABLE, "sensor.array", "sensor.calibration", "settings.held", "marks.zeroings", "stream.columns"},
     ),
     "merge": (
         lambda of, _: merged([of, of], gap=0 if isinstance(of.main, FrameSource) else None),

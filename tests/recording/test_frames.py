@@ -25,8 +25,9 @@ from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
 from taxel.recording.contents import Contents, Source, alone, source_from
 from taxel.recording.once import known
-from taxel.recording.opening import joined, open_joined
+from taxel.recording.opening import joined
 from taxel.recording.parts import Losses, Marks, Origin
+from taxel.recording.text_options import TextOptions
 
 WHOLE = st.integers(0, 65_535).map(float)
 ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True, allow_infinity=False), st.sampled_from([-0.0, 65_536.0]))
@@ -339,7 +340,7 @@ def test_a_folder_of_many_trials_becomes_a_folder_of_recordings(
     write_pedar(source)
     assert call(capsys, "convert", source, out)[0] == 0
     names = sorted(file.name for file in out.iterdir())
-    assert len(names) == len(open_joined(source)) == 2
+    assert len(names) == len(TextOptions().open_joined(source)) == 2
     assert "again.mcap" in names
     assert list(taxel.open(out / "again.mcap").sources) == ["left", "right"]
 

@@ -19,7 +19,7 @@ from taxel._base import h5_file
 from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.recording import read_h5
-from taxel.recording.read_h5 import is_ours
+from taxel.recording.read_h5 import is_h5_of_taxel
 
 from .making import some_events
 
@@ -208,8 +208,10 @@ def test_the_library_is_not_asked_whose_a_file_without_our_name_is(tmp_path: Pat
     with h5py.File(tmp_path / "subj000.h5", "w") as theirs:
         theirs["img000"] = np.ones((3, 3, 3), np.uint16)
     (tmp_path / "empty.h5").write_bytes(b"")
-    assert [is_ours(tmp_path / f"{name}.h5") for name in ("ours", "subj000", "empty", "none")] == [True] + 3 * [False]
+    assert [is_h5_of_taxel(tmp_path / f"{name}.h5") for name in ("ours", "subj000", "empty", "none")] == [True] + 3 * [
+        False
+    ]
     asked: list[Path] = []
     monkeypatch.setattr(read_h5, "H5File", lambda path: contextlib.nullcontext(asked.append(path)))
-    assert [is_ours(tmp_path / f"{name}.h5") for name in ("subj000", "empty", "none")] == 3 * [False]
+    assert [is_h5_of_taxel(tmp_path / f"{name}.h5") for name in ("subj000", "empty", "none")] == 3 * [False]
     assert not asked

@@ -91,7 +91,7 @@ def test_missing_files_and_folders_are_oserrors(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         taxel.open(tmp_path / "nothing.mcap")
     with pytest.raises(IsADirectoryError):
-        taxel.recording.open_recording(tmp_path)
+        taxel.convert(tmp_path, tmp_path / "a.npz")
 
 
 @pytest.mark.parametrize("path", [3, None, b"a.mcap", 1.5, ["a.mcap"], "", "a\0b"])

@@ -8,7 +8,7 @@ import numpy as np
 
 import taxel
 from sound.things import ARRAY, BYTES, Sound, fresh, method, plain
-from taxel.recording.open_options import OpenOptions
+from taxel.recording.text_options import TextOptions
 
 
 def listen(**arguments: Any) -> None:
@@ -93,7 +93,7 @@ SOUND: dict[str, Sound] = {
         port=0,
         host="127.0.0.1",
         opens=taxel.open_all,
-        options=OpenOptions(rate_hz=100.0),
+        options=TextOptions(rate_hz=100.0),
     ),
     "taxel.live.send": plain(
         taxel.live.send,

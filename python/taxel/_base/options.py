@@ -9,7 +9,7 @@ from dataclasses import field, fields
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 _P = ParamSpec("_P")
-_Self = TypeVar("_Self")
+_First = TypeVar("_First")
 _Options = TypeVar("_Options")
 _Result = TypeVar("_Result")
 
@@ -43,17 +43,19 @@ def with_options(options: Callable[_P, _Options]) -> Callable[[Callable[[_Option
 
 def with_fields_of(
     options: Callable[_P, _Options],
-) -> Callable[[Callable[[_Self, _Options], None]], Callable[Concatenate[_Self, _P], None]]:
-    """Make a constructor with a dataclass of options accept the fields of that dataclass as arguments."""
+) -> Callable[[Callable[[_First, _Options], _Result]], Callable[Concatenate[_First, _P], _Result]]:
+    """Make a function of one argument and a dataclass of options accept the fields of that dataclass as arguments."""
 
-    def decorate(begin: Callable[[_Self, _Options], None]) -> Callable[Concatenate[_Self, _P], None]:
-        def init(self: _Self, /, *arguments: _P.args, **keywords: _P.kwargs) -> None:
-            begin(self, options(*arguments, **keywords))
+    def decorate(work: Callable[[_First, _Options], _Result]) -> Callable[Concatenate[_First, _P], _Result]:
+        def call(*arguments: Any, **keywords: Any) -> _Result:
+            given = signature.bind(*arguments, **keywords)
+            return work(given.args[0], options(*given.args[1:], **given.kwargs))
 
-        functools.update_wrapper(init, begin)
-        itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-        parameters = inspect.signature(options).parameters.values()
-        init.__signature__ = inspect.Signature([itself, *parameters])  # type: ignore[attr-defined]
-        return init
+        functools.update_wrapper(call, work)
+        stated = inspect.signature(work)
+        parameters = [next(iter(stated.parameters.values())), *inspect.signature(options).parameters.values()]
+        signature = stated.replace(parameters=parameters)
+        call.__signature__ = signature  # type: ignore[attr-defined]
+        return call
 
     return decorate

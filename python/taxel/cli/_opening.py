@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from taxel.recording.open_options import OpenOptions
+    from taxel.recording.text_options import TextOptions
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ class FileOptions:
     ] = None
 
     @property
-    def opener(self) -> OpenOptions:
+    def opener(self) -> TextOptions:
         """What opens files by these options."""
-        from taxel.recording.open_options import OpenOptions  # noqa: PLC0415  the command line starts quickly
+        from taxel.recording.text_options import TextOptions  # noqa: PLC0415  the command line starts quickly
 
-        return OpenOptions(**vars(self))
+        return TextOptions(**vars(self))

@@ -74,7 +74,7 @@ def calibrate(
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {start} and --to {stop} s: --from must not be after --to")
     options = taxel.tasks.CalibrateOptions(law, assignments(set_ or []), table, unit, each, exponent, tare, date, note)
-    opened = files.opener.one(recording)
+    opened = files.opener.open_one(recording)
     place = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)
     with progress(as_json):

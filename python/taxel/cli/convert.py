@@ -58,7 +58,7 @@ def convert(
         try_whole(target, overwrite=overwrite)
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {source}", 0, 0)
-        opened = [of_source(recording, part) for recording in files.opener.joined(source)]
+        opened = [of_source(recording, part) for recording in files.opener.open_joined(source)]
         if target.suffix and len(opened) > 1:
             raise ProblemError(
                 f"{source}: holds {len(opened)} recordings; {target} must be a folder, without an ending"

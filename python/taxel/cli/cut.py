@@ -60,7 +60,7 @@ def cut(
     """
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {plain(start)} --to {plain(stop)}: the part must not end before it begins")
-    whole = of_source(files.opener.one(recording), source)
+    whole = of_source(files.opener.open_one(recording), source)
     parts = taxel.cut(
         whole,
         start_us=float("-inf") if start is None else start * 1e6,

@@ -66,7 +66,7 @@ def detect(
     loaded = taxel.detect.load(readout)
     with progress(as_json) as update:
         update(f"reading {recording}", 0, 0)
-        opened = files.opener.all([recording])
+        opened = files.opener.open_sensors([recording])
         found = taxel.tasks.detect(loaded, opened, truth, options, progress=update)
     if csv is not None:
         write_whole(csv, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)

@@ -41,7 +41,7 @@ def encode(
     options = taxel.tasks.EncodeOptions(encoder, assignments(values or []), tare)
     with progress(as_json) as update:
         update(f"reading {recording}", 0, 0)
-        encoded = taxel.tasks.encode(files.opener.one(recording), options, progress=update)
+        encoded = taxel.tasks.encode(files.opener.open_one(recording), options, progress=update)
     encoded.trains.save(out, overwrite=overwrite)
     say_warnings(encoded.warnings)
     result = {"recording": str(recording), **encoded.to_dict(), "written": str(out)}

@@ -87,7 +87,7 @@ def info(
         if file.exists() and is_bag(file) and not files.opener._names_topic(file):
             say(*listed(file, topics(file, files.types, files.ros), as_json))
             return
-        every = files.opener.open(file)
+        every = files.opener.open_trials(file)
         recording = every[0]
         if len(every) > 1 or len(recording.sources) > 1:
             if picture is not None or table is not None:

@@ -96,7 +96,7 @@ def information(
             opened = []
             for path in recordings:
                 update(f"reading {path}", 0, 0)
-                opened += files.opener.all([path])
+                opened += files.opener.open_sensors([path])
 
             def show(what: str, done: int, of: int) -> None:
                 nonlocal trials

@@ -41,7 +41,7 @@ def merge(
 
     Example: taxel merge left.mcap right.mcap -o both.mcap --beside
     """
-    opened = [files.opener.one(path) for path in recordings]
+    opened = [files.opener.open_one(path) for path in recordings]
     parts = opened if label is None else [part for each in opened for part in taxel.cut(each, label=label)]
     merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6, beside=beside)
     lost = taxel.convert(merged, out, overwrite=overwrite)

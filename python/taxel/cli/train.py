@@ -113,7 +113,7 @@ def train(
     options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, search, window_ms)
     with progress(as_json) as update:
         update(f"reading {', '.join(map(str, recordings[:3]))}" + " ..." * (len(recordings) > 3), 0, 0)
-        opened = files.opener.all(recordings)
+        opened = files.opener.open_sensors(recordings)
         _try_rules(rule, labels, opened, overwrite=overwrite)
         training = taxel.train(opened, labels, options, progress=update)
         training.readout.save(out, overwrite=overwrite)

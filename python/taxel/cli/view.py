@@ -84,10 +84,10 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         return None
 
     def opens(file: Path) -> list[Recording]:
-        opened = files.opener.joined(file)
+        opened = files.opener.open_joined(file)
         if calibration is None:
             return opened
-        return [Recording(calibrated_by(sensor._contents, calibration)) for sensor in opened]
+        return [calibrated_by(sensor, calibration) for sensor in opened]
 
     # What was opened now, so that the errors are those of the command, is what the panel asks for first.
     opened = {first.absolute(): opens(first)}

@@ -24,9 +24,9 @@ from taxel.labels import Labels, beside
 from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.health import health
-from taxel.recording.open_options import OpenOptions
-from taxel.recording.opening import is_recording, open_joined
+from taxel.recording.opening import is_recording
 from taxel.recording.rest import flickering, loaded_from, of_frames, ticks_by_unit
+from taxel.recording.text_options import TextOptions
 
 #: Of a text table of more bytes than this the beginning is shown first, of so many bytes.
 _LARGE, _BEGINNING = 8 << 20, 1 << 19
@@ -43,7 +43,7 @@ _Taxels = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Opening:
-    """Hold how a recording is opened that `open_joined` alone does not open as it should be.
+    """Hold how a recording is opened that needs options.
 
     Parameters
     ----------
@@ -51,26 +51,26 @@ class Opening:
         Opens a file, with the feet of each trial joined.
     file : path, optional
         The file that is opened so; default: each file.
-    options : OpenOptions
+    options : TextOptions
         Those by which it is opened so. Labels of numbered frames that have times by its `rate_hz` are in numbers of
         frames.
     """
 
-    opens: Callable[[Path], Sequence[Recording]] = open_joined
+    opens: Callable[[Path], Sequence[Recording]] = TextOptions().open_joined
     file: Path | None = None
-    options: OpenOptions = field(default_factory=OpenOptions)
+    options: TextOptions = field(default_factory=TextOptions)
 
     def open(self, file: Path) -> Sequence[Recording]:
         """Open a file."""
-        return self.opens(file) if self.file in (None, file) else open_joined(file)
+        return self.opens(file) if self.file in (None, file) else TextOptions().open_joined(file)
 
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""
         return is_recording(file, self.options_of(file).layout)
 
-    def options_of(self, file: Path) -> OpenOptions:
+    def options_of(self, file: Path) -> TextOptions:
         """Return the options by which a file is opened."""
-        return self.options if self.file in (None, file) else OpenOptions()
+        return self.options if self.file in (None, file) else TextOptions()
 
     def unit_us(self, table: Path) -> float:
         """Return how many us a unit of time in a table of labels is."""
@@ -126,7 +126,7 @@ class ShownFiles:
             recording, names, left_s = beginning
         else:
             (recording, names), left_s = self.opened(path, trial), None
-        if not recording._contents.is_several and recording.has_events:
+        if not recording.is_several and recording.has_events:
             return self._converted(recording), None
         return None, (*_frames(recording), recording.name if names else None, names, left_s)
 
@@ -184,7 +184,7 @@ class ShownFiles:
 
 def _sources(recording: Recording) -> dict[str, Recording]:
     """Return the sensors of a recording of frames: its sources, or itself."""
-    several = recording._contents.is_several
+    several = recording.is_several
     every = recording.sources if several else {recording.label or "board": recording}
     return {name: one for name, one in every.items() if not one.has_events and not one.is_stream} if several else every
 

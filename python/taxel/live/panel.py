@@ -22,8 +22,8 @@ from taxel.live._shown_files import Opening
 from taxel.live.live import Live
 from taxel.recording import Recording
 from taxel.recording.frames import period_us
-from taxel.recording.open_options import OpenOptions
 from taxel.recording.opening import check_recording, recordings_in
+from taxel.recording.text_options import TextOptions
 from taxel.tare import Tare
 
 
@@ -49,8 +49,8 @@ class Panel:
         can see the board and set registers, over a connection that is not encrypted.
     opens : function of a path, optional
         Opens the recording that is shown first, or of a folder each of its files, and returns its trials, and must heed
-        `options`; default: `OpenOptions.joined`.
-    options : taxel.recording.open_options.OpenOptions, optional
+        `options`; default: `TextOptions.open_joined`.
+    options : taxel.recording.text_options.TextOptions, optional
         What the files do not hold themselves; the page trains on a file by them too. Labels of frames that have times
         by its `rate_hz` are saved in numbers of frames.
 
@@ -75,13 +75,13 @@ class Panel:
         port: int = 0,
         host: str = "127.0.0.1",
         opens: Callable[[Path], Sequence[Recording]] | None = None,
-        options: OpenOptions | None = None,
+        options: TextOptions | None = None,
     ) -> None:
         # Locked while one `Live` replaces another.
         self._restarting = threading.Lock()
         self._live = shows if isinstance(shows, Live) else None
         opened, shown = None, None
-        how = OpenOptions() if options is None else instance("options", options, OpenOptions)
+        how = TextOptions() if options is None else instance("options", options, TextOptions)
         if self._live is None:
             place = Path(checked_path("shows", shows))
             if control is not None:
@@ -89,7 +89,7 @@ class Panel:
             if folder is not None:
                 raise refused("folder", ": is the recording's own")
             folder, opened = _shown(place, how.layout)
-            opens = how.joined if opens is None and how.given() else opens
+            opens = how.open_joined if opens is None and how.given() else opens
             shown = None if place.is_dir() and not is_bag(place) else folder / opened
         if how.rate_hz is not None:
             period_us("rate_hz", how.rate_hz)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from taxel import _core
-from taxel.recording import open_recording
+from taxel.recording import open_one
 from taxel.recording.read_mcap import DOUBTS, STEPS
 from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
@@ -68,7 +68,7 @@ def summary_of(ended: _core.Ended) -> Summary:
     verdict = Verdict._from(ended.verdict)
     # Of these the file has its own times.
     if {*DOUBTS, *STEPS} & {*verdict.damaged, *verdict.noted} and path is not None and path.suffix == ".mcap":
-        verdict = open_recording(path).verdict
+        verdict = open_one(path).verdict
     return Summary(ended.counters, verdict, path, tare)
 
 

@@ -7,7 +7,7 @@ from taxel.recording.cut import cut
 from taxel.recording.health import Health, health
 from taxel.recording.kinds import ENDINGS, kind_of_file
 from taxel.recording.merge import merge
-from taxel.recording.opening import open_all, open_one, open_recording
+from taxel.recording.opening import open_all, open_one
 from taxel.recording.raw import Datagrams
 from taxel.recording.recording import Recording
 from taxel.recording.verdict import Verdict
@@ -28,5 +28,4 @@ __all__ = [
     "merge",
     "open_all",
     "open_one",
-    "open_recording",
 ]

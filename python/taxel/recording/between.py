@@ -48,12 +48,12 @@ def _between(of: S, sources: Mapping[str, Source], start: float, stop: float) ->
         match part:
             case parts.Origin() | parts.Sensor() | parts.Wire():
                 return part
-            case parts.Changes():
-                return parts.Changes(Once(lambda: part.events().between(start, stop)))
-            case parts.Readings():
+            case parts.EventTable():
+                return parts.EventTable(Once(lambda: part.events().between(start, stop)))
+            case parts.FrameTable():
                 return replace(part, frames=Once(lambda: part.frames().between(start, stop)))
-            case parts.Lines():
-                return parts.Lines(
+            case parts.Columns():
+                return parts.Columns(
                     part.columns, part.samples.to(lambda samples: samples and samples.between(start, stop))
                 )
             case parts.Settings():
@@ -87,15 +87,15 @@ def _verdict(of: Source, sources: Mapping[str, Source]) -> Verdict | None:
     """
     if of.losses.verdict() is None:
         return None
-    said = verdict_of(of)
-    if said.stretch_of is not None:
-        return said
+    verdict = verdict_of(of)
+    if verdict.stretch_of is not None:
+        return verdict
     verdicts = [verdict_of(source).to_dict() for source in sources.values()]
     try:
         about = _ends(of.origin.path)
     except OSError:
         about = json.dumps([len(of.table), of.table.t[:1].tolist(), of.table.t[-1:].tolist()]).encode()
-    return said._as_stretch_of(hashlib.sha256(json.dumps(verdicts).encode() + about).hexdigest()[:16])
+    return verdict._as_stretch_of(hashlib.sha256(json.dumps(verdicts).encode() + about).hexdigest()[:16])
 
 
 def _ends(path: Path) -> bytes:
@@ -163,9 +163,9 @@ def _held_at(of: Source, start: float) -> NDArray[np.uint16] | None:
     held, events = of.settings.held(), of.table if isinstance(of, Board) else None
     if events is None or events.intensity is None or events.present is None:
         return held
-    before = events.between(-np.inf, start)
-    if before.present is None or not before.present.any():
+    earlier = events.between(-np.inf, start)
+    if earlier.present is None or not earlier.present.any():
         return held
     begins = np.full(of.sensor.array.shape, UNKNOWN, np.uint16) if held is None else held
-    values = _core.HeldValues(before._parts(), None, begins.astype(np.float32).reshape(-1))
-    return values.at(np.array([before.t.max()])).astype(np.uint16).reshape(of.sensor.array.shape)
+    values = _core.HeldValues(earlier._parts(), None, begins.astype(np.float32).reshape(-1))
+    return values.at(np.array([earlier.t.max()])).astype(np.uint16).reshape(of.sensor.array.shape)

@@ -33,7 +33,7 @@ __all__ = [
     "with_losses",
 ]  # fmt: skip
 
-P = TypeVar("P", parts.Wire, parts.Lines)
+P = TypeVar("P", parts.Wire, parts.Columns)
 S = TypeVar("S", bound="Source")
 
 
@@ -65,37 +65,37 @@ class Source(ABC):
     @property
     def columns(self) -> tuple[str, ...] | None:
         """The names of the columns of a stream of numbers; None for a sensor."""
-        return self.lines.columns if isinstance(self, Stream) else None
+        return self.stream.columns if isinstance(self, Stream) else None
 
     @property
     def untimed(self) -> bool:
         """Whether its frames are numbered."""
-        return isinstance(self, FrameSource) and self.readings.untimed
+        return isinstance(self, FrameSource) and self.frame_table.untimed
 
 
 @dataclass(frozen=True, eq=False)
 class Board(Source):
     """Hold what a board sent."""
 
-    changes: parts.Changes
+    event_table: parts.EventTable
     wire: parts.Wire = field(default_factory=parts.Wire)
 
     @property
     def table(self) -> Events:
         """The events."""
-        return self.changes.events()
+        return self.event_table.events()
 
 
 @dataclass(frozen=True, eq=False)
 class FrameSource(Source):
     """Hold frames."""
 
-    readings: parts.Readings
+    frame_table: parts.FrameTable
 
     @property
     def table(self) -> Frames:
         """The frames."""
-        return self.readings.frames()
+        return self.frame_table.frames()
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ class Drawn(FrameSource):
 class Stream(FrameSource):
     """Hold a stream of numbers, whose lines are frames of one row."""
 
-    lines: parts.Lines
+    stream: parts.Columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,13 +152,13 @@ def applied(of: S, rule: Callable[[parts.Part], parts.Part | None], lines: Calla
     lines : function that returns lines, optional
         What else is lost.
     """
-    before = parts_of(of)
-    after = {name: rule(part) for name, part in before.items()}
-    gone = [before[name] for name, part in after.items() if part is None]
+    old_parts = parts_of(of)
+    after = {name: rule(part) for name, part in old_parts.items()}
+    gone = [old_parts[name] for name, part in after.items() if part is None]
     # Only a part whose fields have defaults may be lost.
-    none: Callable[[str], Any] = lambda name: type(before[name])()  # type: ignore[call-arg]  # noqa: E731
-    kept: dict[str, Any] = {name: none(name) if part is None else part for name, part in after.items()}
-    return with_losses(replace(of, **kept), lambda: [*(line for part in gone for line in part.lines()), *lines()])
+    none: Callable[[str], Any] = lambda name: type(old_parts[name])()  # type: ignore[call-arg]  # noqa: E731
+    changed: dict[str, Any] = {name: none(name) if part is None else part for name, part in after.items()}
+    return with_losses(replace(of, **changed), lambda: [*(line for part in gone for line in part.lines()), *lines()])
 
 
 def with_losses(of: S, lines: Callable[[], Iterable[str]]) -> S:
@@ -183,20 +183,20 @@ def source_from(
     table : Events or Frames
     origin : Origin, optional
     untimed, turned : bool, float
-        As of `Readings`.
+        As of `FrameTable`.
     columns : sequence of str
-        Of a stream of numbers, as of `Lines`.
+        Of a stream of numbers, as of `Columns`.
     **header
         Its other parts; default: a sensor of the table's array alone.
     """
     origin = parts.Origin() if origin is None else origin
     sensor = header.pop("sensor", None) or parts.Sensor(table.array)
     if isinstance(table, Events):
-        return Board(origin, sensor, parts.Changes(known(table)), **header)
-    readings = parts.Readings(known(table), untimed, turned)
+        return Board(origin, sensor, parts.EventTable(known(table)), **header)
+    frame_table = parts.FrameTable(known(table), untimed, turned)
     if columns:
-        return Stream(origin, sensor, readings, parts.Lines(tuple(columns)), **header)
-    return FrameSource(origin, sensor, readings, **header)
+        return Stream(origin, sensor, frame_table, parts.Columns(tuple(columns)), **header)
+    return FrameSource(origin, sensor, frame_table, **header)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,9 +278,9 @@ def several(sources: Mapping[str, Source]) -> Several:
 
 def _verdict(sources: Mapping[str, Source]) -> Verdict | None:
     """Return what several sources lost, as far as they say it."""
-    said = [(name, source.losses.verdict()) for name, source in sources.items()]
-    each = [(name, verdict) for name, verdict in said if verdict is not None]
-    return Verdict._of_sources(each) if each else None
+    verdicts = [(name, source.losses.verdict()) for name, source in sources.items()]
+    known_verdicts = [(name, verdict) for name, verdict in verdicts if verdict is not None]
+    return Verdict._of_sources(known_verdicts) if known_verdicts else None
 
 
 def named(remarks: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[str, ...]:
@@ -294,7 +294,7 @@ def together(sources: Mapping[str, Source]) -> bool:
     """Return whether sources share one clock: frames without arrival times, as those of two feet."""
     return all(
         not source.has_events
-        and not (isinstance(source, Stream) and source.lines.samples.holds())
+        and not (isinstance(source, Stream) and source.stream.samples.holds())
         and not source.timing.clock.holds()
         for source in sources.values()
     )

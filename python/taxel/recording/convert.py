@@ -23,7 +23,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, Source, Stream, alone, source_from, together
 from taxel.recording.frames import as_frames, period_us
 from taxel.recording.kinds import ENDINGS
-from taxel.recording.opening import open_recording
+from taxel.recording.opening import OpenOptions, open_file
 from taxel.recording.parts import Wire
 from taxel.recording.recording import Recording
 from taxel.recording.stored import is_made, stored
@@ -115,8 +115,8 @@ def convert(
             write_h5(place, made, overwrite=overwrite)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                before = whole.sources if written.is_several else {made.origin.label: whole.main}
-                counts = {name: _counts(before[name], source) for name, source in written.sources.items()}
+                sources_before = whole.sources if written.is_several else {made.origin.label: whole.main}
+                counts = {name: _counts(sources_before[name], source) for name, source in written.sources.items()}
                 write_mcap(part, written, compression, counts)
                 lost += _read_otherwise(part, whole.main)
     return lost
@@ -141,7 +141,9 @@ def _write_lsa(place: Path, of: Source, overwrite: bool) -> None:
 
 def _contents(source: object) -> Contents:
     if isinstance(source, str | os.PathLike):
-        source = open_recording(source)
+        options = OpenOptions()
+        with options.within():
+            source = open_file(Path(checked_path("source", source)), options)
     if isinstance(source, Recording):
         return source._contents
     if not isinstance(source, Events | Frames):
@@ -151,7 +153,7 @@ def _contents(source: object) -> Contents:
 
 def _counts(of: Source, written: Source) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
-    samples = of.lines.samples() if isinstance(of, Stream) else None
+    samples = of.stream.samples() if isinstance(of, Stream) else None
     if samples is not None:
         return {"received": len(samples)}
     received = len(written.wire.datagrams() or ()) if isinstance(written, Board) else len(written.table)

@@ -135,18 +135,18 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
                 return parts.Settings(held, part.registers, part.register_changes)
             case parts.Marks():
                 return replace(part, zeroings=Once(lambda: zeroings(part.zeroings())))
-            case parts.Changes():
-                return parts.Changes(Once(lambda: events(part.events())))
-            case parts.Readings():
+            case parts.EventTable():
+                return parts.EventTable(Once(lambda: events(part.events())))
+            case parts.FrameTable():
                 return replace(part, frames=Once(lambda: part.frames().region(columns, rows)))
-            case parts.Lines():
-                return parts.Lines(part.columns[left:right])
+            case parts.Columns():
+                return parts.Columns(part.columns[left:right])
             case parts.Wire():
                 return None
             case _:
                 assert_never(part)
 
-    return Contents.of(applied(of.main, rule, lambda: [*of.main.part(parts.Lines).received(), *of.others()]))
+    return Contents.of(applied(of.main, rule, lambda: [*of.main.part(parts.Columns).received(), *of.others()]))
 
 
 def _cropped(

@@ -60,7 +60,7 @@ def json_of(of: Source) -> str:
         "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in of.marks.zeroings()],
         "columns": of.columns,
         "untimed": of.untimed,
-        "turned": of.readings.turned if isinstance(of, FrameSource) else None,
+        "turned": of.frame_table.turned if isinstance(of, FrameSource) else None,
         "truncated": losses.truncated,
         "rebuilt": dict(losses.rebuilt()),
         "lost": losses.lost(),

@@ -80,7 +80,7 @@ def as_frames(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz"
     if period is not None and of.untimed:
         raise ProblemError(f"{of.origin.path}: its frames have no times, so they have no rate; see recording.at_rate")
     if isinstance(of, FrameSource):
-        return replace(of, readings=replace(of.readings, frames=Once(lambda: _resampled(of.table, period))))
+        return replace(of, frame_table=replace(of.frame_table, frames=Once(lambda: _resampled(of.table, period))))
     if not isinstance(of, Board):
         # Reading the events raises the error that lists the sources.
         _ = of.table
@@ -88,7 +88,7 @@ def as_frames(of: Source, rate_hz: float | None = None, *, name: str = "rate_hz"
     # The first frame includes the held values.
     header["settings"] = parts.Settings(known(None), of.settings.registers, of.settings.register_changes)
     frames = Once(lambda: _drawn(of, period))
-    return Drawn(of.origin, of.sensor, parts.Readings(frames), of.part(parts.Wire), **header)
+    return Drawn(of.origin, of.sensor, parts.FrameTable(frames), of.part(parts.Wire), **header)
 
 
 def _drawn(of: Source, period: int | None) -> Frames:
@@ -133,8 +133,8 @@ def _at_rate(of: Source, rate_hz: float) -> Source:
     def notes(before: tuple[Note, ...]) -> tuple[Note, ...]:
         return tuple(replace(n, t=None if n.t is None else round(n.t * 1e6 / rate_hz)) for n in before)
 
-    readings = parts.Readings(of.readings.frames.to(frames), untimed=False, turned=of.readings.turned)
-    return replace(of, readings=readings, marks=replace(of.marks, notes=of.marks.notes.to(notes)))
+    frame_table = parts.FrameTable(of.frame_table.frames.to(frames), untimed=False, turned=of.frame_table.turned)
+    return replace(of, frame_table=frame_table, marks=replace(of.marks, notes=of.marks.notes.to(notes)))
 
 
 def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = None) -> FrameSource:
@@ -161,10 +161,10 @@ def calibrated(of: Source, rate_hz: float | None = None, rest: Tare | None = Non
     drawn = as_frames(of, rate_hz)
     made = replace(
         drawn,
-        readings=replace(drawn.readings, frames=known(calibration.apply(drawn.table, rest))),
+        frame_table=replace(drawn.frame_table, frames=known(calibration.apply(drawn.table, rest))),
         settings=replace(drawn.settings, held=known(None)),
         sensor=replace(drawn.sensor, calibration=known(None)),
     )
     if not isinstance(made, Stream):
         return made
-    return with_losses(replace(made, lines=parts.Lines(made.lines.columns)), made.lines.received)
+    return with_losses(replace(made, stream=parts.Columns(made.stream.columns)), made.stream.received)

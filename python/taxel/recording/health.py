@@ -204,9 +204,9 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
     activity, of = statistics.activity, statistics.touches
     silent = exists & (activity == 0)
 
-    def where(told: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def where(selected: NDArray[np.bool_]) -> NDArray[np.bool_]:
         grid = np.zeros(array.shape, bool)
-        grid.reshape(-1)[of.taxels[told]] = True
+        grid.reshape(-1)[of.taxels[selected]] = True
         return grid
 
     enough = where(of.touches >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)

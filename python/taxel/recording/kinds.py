@@ -37,7 +37,7 @@ _STRANGERS = {
 }
 
 
-def is_own_table(path: Path) -> bool:
+def is_table_of_taxel(path: Path) -> bool:
     """Return whether the first line of a .csv begins as taxel's own recordings do, which are separated by commas."""
     names = _columns(path)
     return names[:1] == [b"t_us"] and len(names) > 1 and b"label" not in names
@@ -98,15 +98,15 @@ def kind_of(path: Path) -> str:
     if ending == "lsa":
         # Raw bytes may begin with anything.
         return ending
-    stranger = next((what for magic, what in _STRANGERS.items() if head.startswith(magic)), None)
+    stranger = next((kind for magic, kind in _STRANGERS.items() if head.startswith(magic)), None)
     expected = {"mcap": "the MCAP magic", "npz": "the magic of a .npz", "csv": "the names of columns"}
     expected["h5"] = "the magic of HDF5"
     if by_magic is not None:
         stranger = f"a .{by_magic} file; rename it"
     if stranger is not None:
         right = expected[ending] if ending else "a recording"
-        what, _, then = stranger.partition("; ")
-        raise FormatError(f"{path}, byte 0: starts with {begins} ({what}), not with {right}" + f"; {then}" * bool(then))
+        kind, _, then = stranger.partition("; ")
+        raise FormatError(f"{path}, byte 0: starts with {begins} ({kind}), not with {right}" + f"; {then}" * bool(then))
     if ending is None:
         raise FormatError(
             f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}; "

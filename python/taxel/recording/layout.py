@@ -22,7 +22,7 @@ from taxel.frames import Frames
 from taxel.recording.contents import Board, Contents, FrameSource, S, Source, Stream, alone
 from taxel.recording.frames import times_at
 from taxel.recording.once import known
-from taxel.recording.parts import Changes, Readings
+from taxel.recording.parts import EventTable, FrameTable
 
 #: Units that say nothing: what a table or a stream of numbers holds.
 _UNSAID = ("counts", "as sent")
@@ -55,9 +55,9 @@ def on_array(of: S, array: Array) -> S:
 
     same = replace(of, sensor=replace(of.sensor, array=array))
     if isinstance(same, Board):
-        return replace(same, changes=Changes(same.changes.events.to(events)))
+        return replace(same, event_table=EventTable(same.event_table.events.to(events)))
     if isinstance(same, FrameSource):
-        return replace(same, readings=replace(same.readings, frames=same.readings.frames.to(frames)))
+        return replace(same, frame_table=replace(same.frame_table, frames=same.frame_table.frames.to(frames)))
     return same
 
 
@@ -102,15 +102,17 @@ def _laid_out(of: Source, layout: Layout, *, given: bool) -> Source:
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz):
             raise FormatError(f"{layout.place}: {name} holds events; falls, unit and rate_hz are of frames")
         return same
-    was = same.readings.turned
+    was = same.frame_table.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
-        said = "false" if layout.turned is None else f"{layout.turned:g}"
-        raise FormatError(f"{layout.place}: says falls = {said}; the readings of {name} were turned by falls = {was:g}")
+        falls = "false" if layout.turned is None else f"{layout.turned:g}"
+        raise FormatError(
+            f"{layout.place}: says falls = {falls}; the readings of {name} were turned by falls = {was:g}"
+        )
     full = layout.turned if was is None else None
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
     frames = _read(same.table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
     untimed = same.untimed and layout.rate_hz is None
-    return replace(same, readings=Readings(known(frames), untimed, was if full is None else full))
+    return replace(same, frame_table=FrameTable(known(frames), untimed, was if full is None else full))
 
 
 def _array(of: Source, layout: Layout) -> Array:
@@ -124,8 +126,8 @@ def _array(of: Source, layout: Layout) -> Array:
     if min(held.shape) > 1 and array.shape != held.shape:
         raise ProblemError(f"says {array.rows} x {array.columns} taxels; the file says {held.rows} x {held.columns}")
     if not array._is_measured:
-        kept = held if array.shape == held.shape else replace(array, pitch_mm=held.pitch_mm, name=held.name)
-        return kept if held.places is None or array.shape == held.shape else array
+        with_names = held if array.shape == held.shape else replace(array, pitch_mm=held.pitch_mm, name=held.name)
+        return with_names if held.places is None or array.shape == held.shape else array
     along = held.places is not None and kind in _ALONG and held.places == _places_along(of)
     if held._is_measured and not along and (held.pitch_mm, held.places) != (array.pitch_mm, array.places):
         raise ProblemError(f"says taxels {array._apart()}; the file says {held._apart()}")

@@ -97,7 +97,7 @@ def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: 
     merging = _Merging(sources, tables, shifts, lefts, array, beside)
     lost = [line for source in sources for line in source.losses.lost()]
     for recording, source in zip(recordings, sources, strict=True):
-        lost += [*source.part(parts.Wire).lines(), *source.part(parts.Lines).received(), *recording.others()]
+        lost += [*source.part(parts.Wire).lines(), *source.part(parts.Columns).received(), *recording.others()]
     merged = merging.source()
     # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
     return Contents.of(with_losses(merged, known((*lost, *merging.lost))))
@@ -128,11 +128,13 @@ class _Merging:
         }
         if self.sources[0].has_events:
             tables = [table for table in self.tables if isinstance(table, Events)]
-            return Board(changes=parts.Changes(known(_events(tables, self.shifts, self.array, self.lefts))), **header)
+            return Board(
+                event_table=parts.EventTable(known(_events(tables, self.shifts, self.array, self.lefts))), **header
+            )
         columns = self.columns()
         if columns is None:
-            return FrameSource(readings=self.readings(), **header)
-        return Stream(readings=self.readings(), lines=parts.Lines(columns), **header)
+            return FrameSource(frame_table=self.frame_table(), **header)
+        return Stream(frame_table=self.frame_table(), stream=parts.Columns(columns), **header)
 
     def agreed(self, values: Iterable[T], empty: T, line: str, same: Callable[[T, T], bool] = operator.eq) -> T:
         """Return the common value if all recordings agree, else the empty value; then a line says so."""
@@ -145,11 +147,13 @@ class _Merging:
 
     def columns(self) -> tuple[str, ...] | None:
         """Return the names of the columns."""
-        each = [part.columns for part in self.sources]
+        columns = [part.columns for part in self.sources]
         if not self.beside:
-            return self.agreed(each, None, "the names of the columns")
+            return self.agreed(columns, None, "the names of the columns")
         return (
-            tuple(name for names in each for name in names or ()) if any(names is not None for names in each) else None
+            tuple(name for names in columns for name in names or ())
+            if any(names is not None for names in columns)
+            else None
         )
 
     def sensor(self) -> parts.Sensor:
@@ -175,10 +179,10 @@ class _Merging:
 
     def settings(self) -> parts.Settings:
         """Merge registers that are equal, and the values that the taxels held at the beginning."""
-        each = [part.settings for part in self.sources]
-        registers = [settings.registers() for settings in each]
+        settings = [source.settings for source in self.sources]
+        registers = [part.registers() for part in settings]
         held = _beside_held(self.sources, self.array, self.lefts) if self.beside else self.held()
-        changes = self.agreed((settings.register_changes() for settings in each), (), "the settings of the registers")
+        changes = self.agreed((part.register_changes() for part in settings), (), "the settings of the registers")
         return parts.Settings(
             held=known(held),
             registers=known(self.agreed(registers, None, "the board's registers", _same_registers)),
@@ -216,30 +220,26 @@ class _Merging:
 
     def losses(self) -> parts.Losses:
         """Merge what was lost; counts only if they are equal."""
-        each = [part.losses for part in self.sources]
+        losses = [source.losses for source in self.sources]
         verdict = None
-        if any(losses.verdict() is not None for losses in each):
+        if any(part.verdict() is not None for part in losses):
             verdict = Verdict._together(_of_files(self.sources, self.shifts))
         return parts.Losses(
-            counts=known(
-                self.agreed((losses.counts() for losses in each), {}, "what each received and lost, by cause")
-            ),
+            counts=known(self.agreed((part.counts() for part in losses), {}, "what each received and lost, by cause")),
             verdict=known(verdict),
             remarks=named([(part.origin.name, part.losses.remarks) for part in self.sources]),
-            truncated=any(losses.truncated for losses in each),
-            rebuilt=known(
-                self.agreed((losses.rebuilt() for losses in each), {}, "what reading each had to put up with")
-            ),
+            truncated=any(part.truncated for part in losses),
+            rebuilt=known(self.agreed((part.rebuilt() for part in losses), {}, "what reading each had to put up with")),
         )
 
-    def readings(self) -> parts.Readings:
+    def frame_table(self) -> parts.FrameTable:
         """Merge frames."""
         tables = [table for table in self.tables if isinstance(table, Frames)]
-        each = [part.readings for part in self.sources if isinstance(part, FrameSource)]
-        return parts.Readings(
+        frames = [source.frame_table for source in self.sources if isinstance(source, FrameSource)]
+        return parts.FrameTable(
             known(_frames(tables, self.shifts, self.array, self.beside)),
-            all(readings.untimed for readings in each),
-            self.agreed((readings.turned for readings in each), None, "whether readings were turned"),
+            all(part.untimed for part in frames),
+            self.agreed((part.turned for part in frames), None, "whether readings were turned"),
         )
 
     def zeroings(self) -> tuple[Zeroing, ...]:
@@ -314,16 +314,20 @@ def _of_files(sources: Sequence[Source], shifts: Sequence[int]) -> list[tuple[st
     files: dict[str, Any] = {}
     verdicts: dict[Any, dict[Any, dict[Verdict, tuple[str, Verdict]]]] = {}
     for part, shift in zip(sources, shifts, strict=True):
-        said = verdict_of(part)
-        file = id(said) if part.origin.kind == "merged" else part.origin.path
-        if said.stretch_of is not None:
-            file = files.setdefault(said.stretch_of, said.stretch_of if part.origin.kind == "merged" else file)
-        source = part.origin.label if said.stretch_of is not None else (part.origin.name, part.origin.label)
-        verdicts.setdefault(file, {}).setdefault(source, {}).setdefault(said, (part.origin.name, said._later(shift)))
+        verdict = verdict_of(part)
+        file = id(verdict) if part.origin.kind == "merged" else part.origin.path
+        if verdict.stretch_of is not None:
+            file = files.setdefault(verdict.stretch_of, verdict.stretch_of if part.origin.kind == "merged" else file)
+        source = part.origin.label if verdict.stretch_of is not None else (part.origin.name, part.origin.label)
+        verdicts.setdefault(file, {}).setdefault(source, {}).setdefault(
+            verdict, (part.origin.name, verdict._later(shift))
+        )
     of_files = []
     for of_file in verdicts.values():
-        each = [(next(iter(spans.values()))[0], Verdict._of_stretches(spans.values())) for spans in of_file.values()]
-        of_files.append((each[0][0], Verdict._of_sources(each)))
+        of_sources = [
+            (next(iter(spans.values()))[0], Verdict._of_stretches(spans.values())) for spans in of_file.values()
+        ]
+        of_files.append((of_sources[0][0], Verdict._of_sources(of_sources)))
     return of_files
 
 
@@ -403,11 +407,11 @@ def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[i
     if any(table.intensity is not None for table in tables):
         none = [np.zeros(len(table), np.uint16) for table in tables]
         held = [table.intensity if table.intensity is not None else z for table, z in zip(tables, none, strict=True)]
-        there = [
+        present = [
             table.present if table.present is not None else z.astype(bool)
             for table, z in zip(tables, none, strict=True)
         ]
-        more = {"intensity": np.concatenate(held)[order], "present": np.concatenate(there)[order]}
+        more = {"intensity": np.concatenate(held)[order], "present": np.concatenate(present)[order]}
     repaired = repaired_of(tables)
     if repaired is not None:
         more["repaired"] = repaired[order]

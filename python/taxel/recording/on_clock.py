@@ -111,10 +111,10 @@ def _moved(of: Source, name: str, times: Times | None) -> Source:
         return None if before is None else Clock(times(before.board_us), before.arrived_ns)
 
     def verdict(before: Verdict | None) -> Verdict | None:
-        told = verdict_of(of)
-        doubtful, steps = told.doubtful_after_us, told.steps_back
+        own_verdict = verdict_of(of)
+        doubtful, steps = own_verdict.doubtful_after_us, own_verdict.steps_back
         after = steps[0]["after_us"] if doubtful is None and steps else doubtful
-        return before if after is None else told._later(time(after) - after)
+        return before if after is None else own_verdict._later(time(after) - after)
 
     def rule(part: parts.Part) -> parts.Part:  # noqa: PLR0911  one a type
         match part:
@@ -129,13 +129,13 @@ def _moved(of: Source, name: str, times: Times | None) -> Source:
                 return parts.Timing(part.clock.to(clock), name, part.stretch)
             case parts.Losses():
                 return replace(part, verdict=part.verdict.to(verdict))
-            case parts.Changes():
-                return parts.Changes(part.events.to(events))
-            case parts.Readings():
+            case parts.EventTable():
+                return parts.EventTable(part.events.to(events))
+            case parts.FrameTable():
                 return replace(part, frames=part.frames.to(frames))
-            case parts.Lines():
-                return parts.Lines(part.columns)
+            case parts.Columns():
+                return parts.Columns(part.columns)
             case _:
                 assert_never(part)
 
-    return applied(of, rule, of.part(parts.Lines).received)
+    return applied(of, rule, of.part(parts.Columns).received)

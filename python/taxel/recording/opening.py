@@ -8,16 +8,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from taxel import _core, formats
 from taxel._base import arguments, limits
 from taxel._base.arguments import flag, instance, text, whole
-from taxel._base.errors import helped
+from taxel._base.errors import helped, refused
 from taxel._base.limits import opening
 from taxel._base.messages import warn
+from taxel._base.options import with_fields_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -28,12 +28,12 @@ from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording import parts
 from taxel.recording.contents import Board, Contents, FrameSource, Source, Stream, several, source_from
-from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_own_table, kind_of
+from taxel.recording.kinds import ENDINGS, LABELS, is_label_table, is_table_of_taxel, kind_of
 from taxel.recording.layout import check_size, laid_out, on_array
 from taxel.recording.once import known
 from taxel.recording.read_csv import check_head, read_csv
-from taxel.recording.read_foreign import is_foreign, read_foreign
-from taxel.recording.read_h5 import is_ours, read_h5
+from taxel.recording.read_foreign import is_of_another_program, read_foreign
+from taxel.recording.read_h5 import is_h5_of_taxel, read_h5
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.read_npz import read_npz
@@ -46,19 +46,39 @@ from taxel.recording.without_layout import refuse_without_layout
 FEET = ("left", "right")
 
 
-def open_one(
-    path: str | os.PathLike[str],
-    *,
-    array: Array | Sequence[Array] | None = None,
-    layout: str | os.PathLike[str] | None = None,
-    pairing: str = "direct",
-    differences: bool = False,
-    topic: str | Sequence[str] | None = None,
-    field: str | Sequence[str] | None = None,
-    types: str | os.PathLike[str] | None = None,
-    ros: str | None = None,
-    limit: int | None = None,
-) -> Recording:
+@dataclass(frozen=True, kw_only=True)
+class SharedOptions:
+    """Hold how files are opened, as `open_one` documents it; only subclasses state the type of `array`."""
+
+    array: object = None
+    layout: str | os.PathLike[str] | None = None
+    topic: str | Sequence[str] | None = None
+    field: str | Sequence[str] | None = None
+    types: str | os.PathLike[str] | None = None
+    ros: str | None = None
+    limit: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenOptions(SharedOptions):
+    """Hold the keyword arguments of `open_one`, which documents each, and of `open_all`."""
+
+    array: Array | Sequence[Array] | None = None
+    pairing: str = "direct"
+    differences: bool = False
+
+    def within(self) -> AbstractContextManager[None]:
+        """Return a context in which no more is read than may be."""
+        return opening(None if self.limit is None else whole("limit", self.limit, 1, unit="bytes"))
+
+    @property
+    def topics(self) -> Topics:
+        """What of a ROS bag is opened."""
+        return Topics(self.topic, self.field, self.types, self.ros)
+
+
+@with_fields_of(OpenOptions)
+def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     r"""Open a recording.
 
     `taxel.open` is this function; `taxel.open_all` opens those of a folder.
@@ -75,10 +95,6 @@ def open_one(
     layout : path, optional
         The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
         ``layout.toml`` beside it, if there is one.
-    pairing : {"direct", "taxel"}
-        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
-    differences : bool
-        Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
     topic, field : str, or list of str, optional
         What of a ROS bag is opened as frames: a topic, and the path of a field of its messages, as "left.taxels"
         (default: the only one with numbers). Of lists each entry becomes a source, with its own `array` if that is a
@@ -88,6 +104,10 @@ def open_one(
     limit : int, bytes, 1 or more, optional
         How much may be read into memory; default: three quarters of what is available, and at most the sizes of
         docs/files.md.
+    pairing : {"direct", "taxel"}
+        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
+    differences : bool
+        Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
     Returns
     -------
@@ -117,30 +137,18 @@ def open_one(
     >>> taxel.open(place)
     Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
     """
-    how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
     place = Path(arguments.checked_path("path", path))
     if place.is_dir() and not is_bag(place):
         raise ProblemError(f"{place}: a folder; taxel.open_all opens its recordings")
-    every = _open(place, how)
+    every = _open_place(place, options)
     if len(every) != 1:
         names = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
         raise ProblemError(f"{place}: holds {len(every)} recordings ({names}); taxel.open_all opens each")
     return every[0]
 
 
-def open_all(
-    path: str | os.PathLike[str],
-    *,
-    array: Array | Sequence[Array] | None = None,
-    layout: str | os.PathLike[str] | None = None,
-    pairing: str = "direct",
-    differences: bool = False,
-    topic: str | Sequence[str] | None = None,
-    field: str | Sequence[str] | None = None,
-    types: str | os.PathLike[str] | None = None,
-    ros: str | None = None,
-    limit: int | None = None,
-) -> list[Recording]:
+@with_fields_of(OpenOptions)
+def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recording]:
     r"""Open all recordings of a folder, or all trials of a file.
 
     `taxel.open_all` is this function.
@@ -149,10 +157,12 @@ def open_all(
     ----------
     path : path
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as of `taxel.open`.
-    array, layout, pairing, differences, topic, field, types, ros
+    array, layout, topic, field, types, ros
         As of `taxel.open`.
     limit : int, bytes, 1 or more, optional
         As of `taxel.open`, for all recordings together.
+    pairing, differences
+        As of `taxel.open`.
 
     Returns
     -------
@@ -182,98 +192,49 @@ def open_all(
     [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 note),
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
-    how = How(array, layout, pairing, differences, topic, field, types, ros, limit)
-    return _open(Path(arguments.checked_path("path", path)), how)
+    return _open_place(Path(arguments.checked_path("path", path)), options)
 
 
-def _open(place: Path, how: How) -> list[Recording]:
+def _open_place(place: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file."""
-    with how.within():
+    with options.within():
         if place.is_dir() and not is_bag(place):
-            return _folder(place, how)
+            return _open_folder(place, options)
         # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
-        if place.exists() and (names := _formats(place)) and not _is_own(place):
-            trials = _kept(formats.trials(place, names[0]))
-            return [_named_beside(place, Path(trial.name), _of(trial, place, names[0], how.layout)) for trial in trials]
-        return [_named_beside(place, Path(place.name), _open_one(place, how))]
+        if place.exists() and (names := _formats_of(place)) and not _is_written_by_taxel(place):
+            trials = _counting_memory(formats.trials(place, names[0]))
+            return [
+                _named_beside(place, Path(trial.name), _recording_of(trial, place, names[0], options.layout))
+                for trial in trials
+            ]
+        return [_named_beside(place, Path(place.name), open_file(place, options))]
 
 
-@dataclass(frozen=True)
-class How:
-    """Hold what says how files are opened; the fields are the arguments of `taxel.open`."""
-
-    array: Array | Sequence[Array] | None = None
-    layout: str | os.PathLike[str] | None = None
-    pairing: str = "direct"
-    differences: bool = False
-    topic: str | Sequence[str] | None = None
-    field: str | Sequence[str] | None = None
-    types: str | os.PathLike[str] | None = None
-    ros: str | None = None
-    limit: int | None = None
-
-    def within(self) -> AbstractContextManager[None]:
-        """Return a context in which no more is read than may be."""
-        return opening(None if self.limit is None else whole("limit", self.limit, 1, unit="bytes"))
-
-    @property
-    def topics(self) -> Topics:
-        """What of a ROS bag is opened."""
-        return Topics(self.topic, self.field, self.types, self.ros)
-
-
-def open_recording(path: str | os.PathLike[str], **how: Any) -> Recording:
-    """Open one .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, or a ROS bag; finished or not, whole or damaged.
-
-    Parameters
-    ----------
-    path : path
-    **how
-        The other arguments of `open_one`.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    FormatError : the file is of another kind, or damaged so that nothing can be read (names the place)
-    OSError : the file does not exist, or cannot be read
-
-    Notes
-    -----
-    A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel.
-    """
-    said = How(**how)
-    with said.within():
-        return _open_one(Path(arguments.checked_path("path", path)), said)
-
-
-def _open_one(place: Path, how: How) -> Recording:
+def open_file(place: Path, options: OpenOptions) -> Recording:
     """Open one file as taxel writes it, a table of another program with a layout, or a ROS bag."""
-    text("pairing", how.pairing, ("direct", "taxel"))
-    flag("differences", how.differences)
-    said = _layout(place, how.layout)
-    of_layout = {} if said is None else said.ros
+    text("pairing", options.pairing, ("direct", "taxel"))
+    flag("differences", options.differences)
+    layout = _layout(place, options.layout)
+    of_layout = {} if layout is None else layout.ros
     try:
-        if said is None:
+        if layout is None:
             refuse_without_layout(place)
-        if said is not None and is_foreign(place, said):
-            if how.topics.are_given:
+        if layout is not None and is_of_another_program(place, layout):
+            if options.topics.are_given:
                 raise ProblemError(f"{place}: no ROS bag; topic, field, types and ros are of one")
-            contents = Contents.of(read_foreign(place, said))
-            if how.array is not None:
-                contents = Contents.of(_on_given(contents.main, instance("array", how.array, Array)))
+            contents = Contents.of(read_foreign(place, layout))
+            if options.array is not None:
+                contents = Contents.of(_on_given(contents.main, instance("array", options.array, Array)))
         elif (kind := kind_of(place)) == "ros":
-            grid = said.grid() if how.array is None and said is not None else how.array
-            contents = read_ros(place, how.topics.but(of_layout), grid)
-        elif how.topics.are_given:
+            grid = layout.grid() if options.array is None and layout is not None else options.array
+            contents = read_ros(place, options.topics.but(of_layout), grid)
+        elif options.topics.are_given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
         else:
-            array = None if how.array is None else instance("array", how.array, Array)
-            contents = _read(place, kind, array, how.pairing, how.differences)
+            array = None if options.array is None else instance("array", options.array, Array)
+            contents = _read(place, kind, array, options.pairing, options.differences)
         return Recording(
-            with_sidecars(contents if said is None else laid_out(contents, said, given=how.layout is not None))
+            with_sidecars(contents if layout is None else laid_out(contents, layout, given=options.layout is not None))
         )
     except MemoryError:
         raise helped(
@@ -306,49 +267,49 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
     return Contents.of({"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array))
 
 
-def _folder(folder: Path, how: How) -> list[Recording]:
+def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
     inside = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
     files = sorted(inside, key=_order)
-    recorded = [file for file in files if _is_own(file)]
-    if how.topic or not recorded:
+    recorded = [file for file in files if _is_written_by_taxel(file)]
+    if options.topic or not recorded:
         recorded = [file for file in files if file in recorded or is_bag(file)]
     if recorded:
-        _warn_of_tables(folder, recorded, files, how)
-        opened = [_kept_one(_open_one(file, how)) for file in recorded]
+        _warn_of_tables(folder, recorded, files, options)
+        opened = [_count_memory(open_file(file, options)) for file in recorded]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
-    elif not (names := _formats(folder)) and (foreign := _laid_out_in(files, how.layout)):
-        pairs = [(file.relative_to(folder), _kept_one(_open_one(file, how))) for file in foreign]
+    elif not (names := _formats_of(folder)) and (foreign := _laid_out_in(files, options.layout)):
+        pairs = [(file.relative_to(folder), _count_memory(open_file(file, options))) for file in foreign]
     else:
         if len(names) != 1:
             for file in files if not names else ():
                 refuse_without_layout(file)
             problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
-            deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
+            deeper = sorted(inner.name for inner in folder.iterdir() if _holds_files_of_taxel(inner))
             hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
-            there = (
+            known_kinds = (
                 f"there are {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
                 "layout file .npy, .txt and other arrays and tables (docs/files.md)"
             )
-            raise FormatError(f"{folder}: holds {problem}; {hint or there}")
-        trials = sorted(_kept(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
-        pairs = [(Path(trial.name), _of(trial, folder, names[0], how.layout)) for trial in trials]
+            raise FormatError(f"{folder}: holds {problem}; {hint or known_kinds}")
+        trials = sorted(_counting_memory(formats.trials(folder, names[0])), key=lambda trial: _order(Path(trial.name)))
+        pairs = [(Path(trial.name), _recording_of(trial, folder, names[0], options.layout)) for trial in trials]
     return _labelled(folder / LABELS, pairs)
 
 
-def _kept(trials: Iterable[Trial]) -> Iterator[Trial]:
+def _counting_memory(trials: Iterable[Trial]) -> Iterator[Trial]:
     """Count the arrays of trials, which stay in memory while others are read."""
     for trial in trials:
         limits.keep(_size(trial.recorded))
         yield trial
 
 
-def _kept_one(recording: Recording) -> Recording:
+def _count_memory(recording: Recording) -> Recording:
     """Count the arrays of a recording as far as they are read already."""
     for source in recording._contents.sources.values():
         for table in (
-            source.changes.events if isinstance(source, Board) else None,
-            source.readings.frames if isinstance(source, FrameSource) else None,
+            source.event_table.events if isinstance(source, Board) else None,
+            source.frame_table.frames if isinstance(source, FrameSource) else None,
         ):
             limits.keep(0 if table is None or not table.is_read else _size(table()))
     return recording
@@ -360,17 +321,19 @@ def _size(table: object) -> int:
     return sum(column.nbytes for column in columns if isinstance(column, np.ndarray))
 
 
-def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], how: How) -> None:
+def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], options: OpenOptions) -> None:
     """Warn of tables and arrays with a layout that are left out beside recordings, but for those converted to one."""
     stems = {file.stem for file in recorded}
-    left = [file.name for file in _laid_out_in(files, how.layout) if file not in recorded and file.stem not in stems]
+    left = [
+        file.name for file in _laid_out_in(files, options.layout) if file not in recorded and file.stem not in stems
+    ]
     if left:
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
-        kept = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
+        beside = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
         warn(
-            f"{folder}: {names} left out, as beside recordings ({kept}) tables and arrays are not read: convert them, "
-            "or keep them in a folder of their own",
-            stacklevel=5,
+            f"{folder}: {names} left out, as beside recordings ({beside}) tables and arrays are not read: convert "
+            "them, or keep them in a folder of their own",
+            stacklevel=6,
         )
 
 
@@ -382,8 +345,8 @@ def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recordin
     known = {labels.named(name) for name, _ in pairs}
     unknown = [name for name in labels.recordings if name not in known]
     if unknown:
-        there = ", ".join(str(name) for name, _ in pairs[:8])
-        raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {there}")
+        names = ", ".join(str(name) for name, _ in pairs[:8])
+        raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {names}")
     # The feet of one trial are one recording.
     count = len({trial_of(str(name), recording.label) for name, recording in pairs})
     if count > 1 and any(not row.recording for row in labels.rows):
@@ -418,16 +381,16 @@ def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = of.timing.usable()
     times = labels._of(name, lambda: clock, of.origin.label)
-    which, replaced, there = labels_of(of.origin), set[int | None](), set[object]()
+    which, replaced, labelled = labels_of(of.origin), set[int | None](), set[object]()
     if beside(of.origin.path).is_file():
         set_here = Labels(beside(of.origin.path))
-        replaced, there = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
+        replaced, labelled = set_here._replaced(*which), {(row.text, row.t) for row in set_here._rows(*which)}
     return sorted(
         (
             Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
             for label, every in times.items()
             for t in every
-            if t not in replaced and (label, int(t)) not in there
+            if t not in replaced and (label, int(t)) not in labelled
         ),
         key=lambda note: note.t or 0,
     )
@@ -435,7 +398,7 @@ def _notes(labels: Labels, name: Path, of: Source) -> list[Note]:
 
 def _laid_out_in(files: Sequence[Path], given: str | os.PathLike[str] | None) -> list[Path]:
     """Return the files of a folder that are of another program, and of which a layout says how to read them."""
-    foreign = (file for file in files if not file.name.endswith(".notes.csv") and is_foreign(file))
+    foreign = (file for file in files if not file.name.endswith(".notes.csv") and is_of_another_program(file))
     return [file for file in foreign if given is not None or Layout.beside(file) is not None]
 
 
@@ -447,7 +410,7 @@ def _layout(place: Path, given: str | os.PathLike[str] | Layout | None) -> Layou
     return None if file is None else Layout.read(file)
 
 
-def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | None) -> Recording:
+def _recording_of(trial: Trial, place: Path, kind: str, given: str | os.PathLike[str] | None) -> Recording:
     """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
@@ -464,8 +427,8 @@ def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | N
             losses=parts.Losses(lost=known(_beside_frames(trial))),
         )
     )
-    said = _layout(place, layout)
-    return Recording(with_sidecars(contents if said is None else laid_out(contents, said, given=layout is not None)))
+    layout = _layout(place, given)
+    return Recording(with_sidecars(contents if layout is None else laid_out(contents, layout, given=given is not None)))
 
 
 def _beside_frames(trial: Trial) -> tuple[str, ...]:
@@ -480,11 +443,11 @@ def recordings_in(folder: Path, layout: str | os.PathLike[str] | None = None) ->
     Tables and arrays of other programs are those that `layout`, or a layout file beside them, describes; they count in
     a folder that holds nothing else.
     """
-    there = [file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir())]
-    bags = sorted((file for file in there if os.access(file, os.R_OK) and is_bag(file)), key=_order)
-    recorded = [file for file in there if file not in bags and _is_own(file)]
+    files = [file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir())]
+    bags = sorted((file for file in files if os.access(file, os.R_OK) and is_bag(file)), key=_order)
+    recorded = [file for file in files if file not in bags and _is_written_by_taxel(file)]
     others = [file for kind in formats.FORMATS.values() for file in kind.files(folder)]
-    found = recorded or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(there, layout))
+    found = recorded or [file for file in others if file not in bags] or ([] if bags else _laid_out_in(files, layout))
     return [*sorted(found, key=_order), *bags]
 
 
@@ -496,9 +459,9 @@ def check_recording(file: Path, layout: str | os.PathLike[str] | None = None) ->
     FormatError : no recording (names the kind of file if it is known); an invalid layout file; a table or arrays of
         another program that no layout file describes
     """
-    if not _formats(file) and _layout(file, layout) is None:
+    if not _formats_of(file) and _layout(file, layout) is None:
         refuse_without_layout(file)
-    kind = _kind(file, layout)
+    kind = _format_or_kind(file, layout)
     if kind == "mcap":
         _core.RecordingReader(file, limits.memory(None), False)
     elif kind == "csv":
@@ -512,17 +475,17 @@ def is_recording(file: Path, layout: str | os.PathLike[str] | None = None) -> bo
     try:
         if file.suffix.lower() == ".csv" and is_label_table(file):
             return False
-        _kind(file, layout)
+        _format_or_kind(file, layout)
     except (FormatError, OSError):
         return False
     return True
 
 
-def _kind(file: Path, layout: str | os.PathLike[str] | None) -> str:
+def _format_or_kind(file: Path, layout: str | os.PathLike[str] | None) -> str:
     """Return the kind of a recording by its name, its first bytes, and its layout file."""
-    if names := _formats(file):
+    if names := _formats_of(file):
         return names[0]
-    return "foreign" if is_foreign(file) and _layout(file, layout) is not None else kind_of(file)
+    return "foreign" if is_of_another_program(file) and _layout(file, layout) is not None else kind_of(file)
 
 
 def joined(opened: Sequence[Recording]) -> list[Recording]:
@@ -565,30 +528,33 @@ def sensors(recording: Recording) -> list[Recording]:
     return [source for source in recording.sources.values() if not source.is_stream]
 
 
-def open_joined(path: str | os.PathLike[str], **how: Any) -> list[Recording]:
-    """Open a file or a folder as `open_all` does, with the feet of each trial joined."""
-    return joined(open_all(path, **how))
+def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
+    """Return each sensor of recordings as one of its own; refuse what is no recording."""
+    given = [recordings] if isinstance(recordings, Recording) else arguments.several(name, recordings)
+    if not len(given):
+        raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
+    return [recording for entry in given for recording in sensors(instance(name, entry, Recording))]
 
 
-def _formats(place: Path) -> list[str]:
+def _formats_of(place: Path) -> list[str]:
     return [name for name, kind in formats.FORMATS.items() if kind.files(place)]
 
 
-def _holds_own(folder: Path) -> bool:
-    there = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
-    return there and any(_is_own(file) for file in folder.iterdir())
+def _holds_files_of_taxel(folder: Path) -> bool:
+    is_readable = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
+    return is_readable and any(_is_written_by_taxel(file) for file in folder.iterdir())
 
 
-def _is_own(file: Path) -> bool:
+def _is_written_by_taxel(file: Path) -> bool:
     """Return whether a file is of a kind that taxel writes, by its ending and, for shared endings, by its content."""
     ending = file.suffix.lower()
     if not file.is_file():
         return False
     if ending == ".csv":
-        return is_own_table(file)
+        return is_table_of_taxel(file)
     if ending == ".npz":
-        return not _formats(file)
-    return is_ours(file) if ending == ".h5" else ending in ENDINGS
+        return not _formats_of(file)
+    return is_h5_of_taxel(file) if ending == ".h5" else ending in ENDINGS
 
 
 def _order(path: Path) -> list[tuple[bool, int, str]]:

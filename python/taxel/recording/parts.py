@@ -28,7 +28,7 @@ from taxel.recording.verdict import Verdict
 from taxel.wire import Registers
 
 __all__ = [
-    "Changes", "Lines", "Losses", "Marks", "Origin", "Part", "Readings", "Sensor", "Settings", "Timing",
+    "Columns", "EventTable", "FrameTable", "Losses", "Marks", "Origin", "Part", "Sensor", "Settings", "Timing",
     "Wire",
 ]  # fmt: skip
 
@@ -197,7 +197,7 @@ class Losses:
 
 
 @dataclass(frozen=True, eq=False)
-class Changes:
+class EventTable:
     """Hold the changes at taxels of a board."""
 
     events: Once[Events]
@@ -208,7 +208,7 @@ class Changes:
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class FrameTable:
     """Hold frames.
 
     Parameters
@@ -264,7 +264,7 @@ class Wire:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class Columns:
     """Hold the lines of a stream of numbers.
 
     Parameters
@@ -288,4 +288,4 @@ class Lines:
 
 
 #: A function has a rule for each of these types: `match` them, and end with `assert_never`.
-Part = Origin | Sensor | Settings | Marks | Timing | Losses | Changes | Readings | Wire | Lines
+Part = Origin | Sensor | Settings | Marks | Timing | Losses | EventTable | FrameTable | Wire | Columns

@@ -95,9 +95,9 @@ class Series:
     def of(cls, frames: Frames, above: float, rest: Rest) -> Series:
         """Return the series of frames above rest."""
         array = frames.array
-        each = max(1, _BLOCK // max(1, array.rows * array.columns))
+        block = max(1, _BLOCK // max(1, array.rows * array.columns))
         # A block at a time, because the centre's weights have 64 bits.
-        blocks = [frames[k : k + each] for k in range(0, len(frames), each)] or [frames]
+        blocks = [frames[k : k + block] for k in range(0, len(frames), block)] or [frames]
 
         def over(of: Callable[[Frames], NDArray[np.float64]]) -> NDArray[np.float64]:
             return np.concatenate([of(block) for block in blocks])
@@ -163,13 +163,13 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
 
 def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
     floor = ContactArea().above
-    n, each = len(drawn.t), drawn.areas(array)
+    n, areas = len(drawn.t), drawn.areas(array)
     area, peak, total, centre = np.zeros(n), np.zeros(n), np.zeros(n), np.full((n, 2), np.nan)
     places = None if array.is_channels else [axis.reshape(-1)[drawn.taxels] for axis in array.positions()]
     for first, over in drawn.above(rest):
         loaded = over > np.float64(floor)
         part = slice(first, first + len(over))
-        area[part] = np.where(loaded, each, 0.0).sum(axis=1)
+        area[part] = np.where(loaded, areas, 0.0).sum(axis=1)
         weights = np.where(loaded, over, 0.0).astype(np.float64)
         peak[part], total[part] = over.max(axis=1), weights.sum(axis=1)
         if places is None:
@@ -191,7 +191,7 @@ def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[n
     assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
     events = events if np.all(np.diff(events.t) >= 0) else events.sorted()
     assert events.present is not None and events.intensity is not None  # noqa: PT018  the same events
-    size, each = len(drawn.taxels), drawn.areas(events.array)
+    size, areas = len(drawn.taxels), drawn.areas(events.array)
     column = np.zeros(events.array.rows * events.array.columns, np.uint16 if size <= 1 << 16 else np.uint32)
     column[drawn.taxels] = np.arange(size)
     base = np.where(np.isnan(rest.values) & (rest.source not in ("quiet", "none")), np.inf, rest.values)
@@ -200,17 +200,17 @@ def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[n
     held = np.where(drawn.since <= drawn.t[0], drawn.held.at(drawn.t[:1]).reshape(-1), np.nan)
     base = np.where(np.isnan(base), held, base)
     load = np.where(held - base > of.above, held - base, 0.0)
-    sums = {"total": float(load.sum())} | ({} if of.area is None else {"area": float(each @ (load > 0))})
+    sums = {"total": float(load.sum())} | ({} if of.area is None else {"area": float(areas @ (load > 0))})
     offs, seen = dict.fromkeys(sums, 0.0), -1
     found: dict[str, list[tuple[float, int]]] = {name: [] for name in ("peak", *sums)}
     later = int(np.searchsorted(events.t, drawn.t[0], side="right"))
     for first in range(later, len(events), _EVENTS):
         part = slice(first, first + _EVENTS)
-        there = events.present[part]
-        t, values = events.t[part][there], events.intensity[part][there].astype(np.float64)
+        is_present = events.present[part]
+        t, values = events.t[part][is_present], events.intensity[part][is_present].astype(np.float64)
         if not len(t):
             continue
-        of_taxel = column[events.array.index(events.x[part][there], events.y[part][there])]
+        of_taxel = column[events.array.index(events.x[part][is_present], events.y[part][is_present])]
         order = np.argsort(of_taxel, kind="stable")
         taxel, value = of_taxel[order], values[order]
         begins = np.flatnonzero(np.diff(taxel, prepend=-1))
@@ -218,12 +218,12 @@ def _moments(events: Events, drawn: _Drawn, rest: Rest, of: Series) -> NDArray[n
         base[taxel[begins]] = np.where(np.isnan(base[taxel[begins]]), value[begins], base[taxel[begins]])
         above = value - base[taxel]
         now = np.where(above > of.above, above, 0.0)
-        before = np.concatenate([[0.0], now[:-1]])
-        before[begins] = load[taxel[begins]]
+        earlier = np.concatenate([[0.0], now[:-1]])
+        earlier[begins] = load[taxel[begins]]
         load[taxel[begins]] = now[np.append(begins[1:], len(now)) - 1]
-        steps = {"peak": above, "total": now - before}
+        steps = {"peak": above, "total": now - earlier}
         if of.area is not None:
-            steps["area"] = each[taxel] * ((now > 0) - 1.0 * (before > 0))
+            steps["area"] = areas[taxel] * ((now > 0) - 1.0 * (earlier > 0))
         # Only what is there once all of a moment's events are read.
         last = np.append(np.diff(t) > 0, True)
         frame = np.searchsorted(drawn.t, t, side="right") - 1
@@ -276,10 +276,10 @@ class _Drawn:
     def of(cls, recording: Recording) -> _Drawn:
         events = recording.events
         assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
-        there = np.flatnonzero(events.present)
-        taxels, column = np.unique(events.array.index(events.x[there], events.y[there]), return_inverse=True)
+        present = np.flatnonzero(events.present)
+        taxels, column = np.unique(events.array.index(events.x[present], events.y[present]), return_inverse=True)
         since = np.full(len(taxels), np.iinfo(np.int64).max)
-        np.minimum.at(since, column, events.t[there])
+        np.minimum.at(since, column, events.t[present])
         begins, held = None, recording._contents.main.settings.held()
         if held is not None:
             known = held.reshape(-1)[taxels] != UNKNOWN
@@ -342,13 +342,13 @@ class _Drawn:
         times, _ = self.sampled
         shown = np.isin(times, self.t)
         size = self.box[0] * self.box[1]
-        each = max(1, _BLOCK // max(1, size))
-        for first in range(0, len(times), each):
-            t = times[first : first + each]
+        block = max(1, _BLOCK // max(1, size))
+        for first in range(0, len(times), block):
+            t = times[first : first + block]
             held = self.held.at(t).reshape(-1, len(self.taxels))
             values = np.full((len(t), size), np.nan, np.float32)
             values[:, self.places] = np.where(t[:, None] >= self.since, held, np.float32(np.nan))
-            yield shown[first : first + each], (t, values)
+            yield shown[first : first + block], (t, values)
 
     def found(self) -> Rest:
         """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""

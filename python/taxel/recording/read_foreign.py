@@ -32,10 +32,10 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import ISO, UNITS_US, Data, Layout, Table, as_size
 from taxel.frames import Frames
 from taxel.recording.contents import Source, source_from
-from taxel.recording.kinds import is_label_table, is_own_table
+from taxel.recording.kinds import is_label_table, is_table_of_taxel
 from taxel.recording.once import known
 from taxel.recording.parts import Losses, Origin
-from taxel.recording.read_h5 import is_ours
+from taxel.recording.read_h5 import is_h5_of_taxel
 
 #: The endings of tables of text, also compressed by gzip, and of files of arrays.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
@@ -58,7 +58,7 @@ _TIMES = re.compile(
 )
 
 
-def is_foreign(path: Path, layout: Layout | None = None) -> bool:
+def is_of_another_program(path: Path, layout: Layout | None = None) -> bool:
     """Return whether a file is a table or holds arrays that taxel did not write; false for a file that is not there.
 
     Arrays that a layout names are those of another program, also where they have names that taxel gives.
@@ -72,18 +72,18 @@ def is_foreign(path: Path, layout: Layout | None = None) -> bool:
         says = layout is not None and layout.data is not None and layout.data.array in names
         return "about" not in names and (says or not ("t" in names and names & {"x", "y", "p", "values"}))
     if ending == ".h5":
-        return not is_ours(path)
+        return not is_h5_of_taxel(path)
     if ending == ".csv":
-        return not (is_own_table(path) or is_label_table(path))
+        return not (is_table_of_taxel(path) or is_label_table(path))
     return True
 
 
 def is_lone_array(path: Path) -> bool:
     """Return whether a file that taxel did not write holds one array only, of the shape of frames."""
-    if path.suffix.lower() not in ARRAYS or not is_foreign(path):
+    if path.suffix.lower() not in ARRAYS or not is_of_another_program(path):
         return False
-    there = shapes_of(path)
-    return len(there) == 1 and all(len(shape) in (2, 3) for shape in there.values())
+    shapes = shapes_of(path)
+    return len(shapes) == 1 and all(len(shape) in (2, 3) for shape in shapes.values())
 
 
 def read_foreign(path: Path, layout: Layout) -> Source:
@@ -112,8 +112,8 @@ def read_foreign(path: Path, layout: Layout) -> Source:
     try:
         taxels = math.prod(values.shape[1:])
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
-            what = counted(taxels, "column") if is_table else f"frames of {' x '.join(map(str, values.shape[1:]))}"
-            raise FormatError(f"{path}: {what}; {layout.place} says {layout.rows} x {layout.columns} taxels")
+            size = counted(taxels, "column") if is_table else f"frames of {' x '.join(map(str, values.shape[1:]))}"
+            raise FormatError(f"{path}: {size}; {layout.place} says {layout.rows} x {layout.columns} taxels")
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
         array = layout.array(
             taxels, grid or Array(1, taxels, name=path.stem, names=read.names if any(read.names or ()) else None)
@@ -145,11 +145,11 @@ def unit_of(name: str) -> str | None:
     return None if found is None else (found["within"] or found["after"] or "").lower()
 
 
-def listed(there: Mapping[str, tuple[int, ...]]) -> str:
+def listed(shapes: Mapping[str, tuple[int, ...]]) -> str:
     """Return the names and shapes of the first arrays, those that could hold frames before the others."""
-    first = sorted(there.items(), key=lambda entry: len(entry[1]) not in (2, 3))[:8]
-    said = [f"{_short(name) or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
-    return (", ".join(said) or "no numbers") + " ..." * (len(there) > 8)
+    first = sorted(shapes.items(), key=lambda entry: len(entry[1]) not in (2, 3))[:8]
+    names = [f"{_short(name) or 'an array'} ({' x '.join(map(str, shape)) or 'one number'})" for name, shape in first]
+    return (", ".join(names) or "no numbers") + " ..." * (len(shapes) > 8)
 
 
 def _short(name: str) -> str:
@@ -219,12 +219,12 @@ def _table(path: Path, layout: Layout) -> _Read:
         rows = (_with_seconds(row, column, path, line) for line, row in enumerate(rows, first))
     if left:
         rows = (_without(row, left, len(names), path, line) for line, row in enumerate(rows, first))
-    kept = [name for k, name in enumerate(names) if k not in left]
+    read_names = [name for k, name in enumerate(names) if k not in left]
     lost = ", ".join(names[k] or f"column {k + 1}" for k in sorted(left))
     lines_of_lost = (f"columns that are no taxels: {lost}",) if lost else ()
     at = None if column is None else column - sum(k < column for k in left)
-    values, t = _read(rows, path, first, kept, at, how)
-    taxel_names = [name for k, name in enumerate(kept) if k != at] if named else None
+    values, t = _read(rows, path, first, read_names, at, how)
+    taxel_names = [name for k, name in enumerate(read_names) if k != at] if named else None
     return _Read(values, t, first, taxel_names, lines_of_lost)
 
 
@@ -351,13 +351,13 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str], named
     # Quotes are no part of a name.
     name = column.strip("\"'")
     if name not in names:
-        there = (
+        known_names = (
             ", ".join(map(short, names[:8])) + " ..." * (len(names) > 8)
             if named
             else "no names, so give its number from 1"
         )
         of = " of times" if key == "time_column" else ""
-        raise FormatError(f"{path.name}: no column {shown(name)}{of}; there are {there}")
+        raise FormatError(f"{path.name}: no column {shown(name)}{of}; there are {known_names}")
     return names.index(name)
 
 
@@ -369,17 +369,17 @@ def _data(path: Path, how: Data) -> _Read:
             right = f"a size is said by {size}" if size else "leave it out"
             raise FormatError(f"{path}: one array without a name; the layout says [data] {key}: {right}")
         arrays = {"": read_array(path, np.float32)}
-        there: list[str] = [""]
-        wanted = there
+        stored_names: list[str] = [""]
+        wanted = stored_names
     else:
         every = shapes_of(path)
-        there = list(every)
-        if how.array is None and len(there) != 1:
+        stored_names = list(every)
+        if how.array is None and len(stored_names) != 1:
             raise FormatError(f"{path}: holds {listed(every)}; say which in the layout: [data] array")
         # A path within a .h5 may begin at its root.
         named = [name if name in every else name.strip("/") for name in (how.array, how.time) if name is not None]
-        wanted = [there[0], *named] if how.array is None else named
-        missing = next((name for name in wanted if name not in there), None)
+        wanted = [stored_names[0], *named] if how.array is None else named
+        missing = next((name for name in wanted if name not in stored_names), None)
         if missing is not None:
             if (why := _left_out_of(path).get(missing)) is not None:
                 raise FormatError(f"{path}, {missing}: {why}")
@@ -390,7 +390,7 @@ def _data(path: Path, how: Data) -> _Read:
             count, frames = math.prod(every[wanted[1]]), math.prod(every[wanted[0]][:1])
             raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}")
         arrays = arrays_of(path, wanted, frames=wanted[0])
-    values, unread = arrays[wanted[0]], ", ".join(name for name in there if name not in wanted)
+    values, unread = arrays[wanted[0]], ", ".join(name for name in stored_names if name not in wanted)
     lost = (f"other arrays of the file: {unread}",) if unread else ()
     if values.dtype.kind not in "uifb" or values.ndim not in (2, 3) or 0 in values.shape:
         shape = " x ".join(map(str, values.shape))

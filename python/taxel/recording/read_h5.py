@@ -20,7 +20,7 @@ from taxel.recording.write_npz import TEXTS
 _PIECE_BYTES = 1 << 20
 
 
-def is_ours(path: Path) -> bool:
+def is_h5_of_taxel(path: Path) -> bool:
     """Return whether a .h5 has the layout that `taxel convert` writes; false for a file that is not HDF5."""
     try:
         # The name of an attribute is in the file as it is: without it the library, which begins slowly, is not asked.
@@ -35,11 +35,11 @@ def is_ours(path: Path) -> bool:
 
 def _holds(file: BinaryIO, word: bytes) -> bool:
     """Return whether a word is in a file."""
-    before = b""
+    overlap = b""
     while piece := file.read(_PIECE_BYTES):
-        if word in before + piece:
+        if word in overlap + piece:
             return True
-        before = piece[1 - len(word) :]
+        overlap = piece[1 - len(word) :]
     return False
 
 

@@ -10,7 +10,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.recording.contents import Board
 from taxel.recording.once import known
-from taxel.recording.parts import Changes, Losses, Origin, Sensor, Wire
+from taxel.recording.parts import EventTable, Losses, Origin, Sensor, Wire
 from taxel.recording.verdict import Verdict
 
 
@@ -42,4 +42,4 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Board
     )
     events = known(Events._from_parts(read.events, array))
     wire = Wire(payload=read.payload, differences=differences)
-    return Board(Origin(path, path.name, "lsa"), Sensor(array), Changes(events), wire, losses=losses)
+    return Board(Origin(path, path.name, "lsa"), Sensor(array), EventTable(events), wire, losses=losses)

@@ -107,7 +107,7 @@ class _Source:
         return Board(
             self.origin,
             self.sensor,
-            parts.Changes(Once(lambda: Events._from_parts(decoded().events, self.array))),
+            parts.EventTable(Once(lambda: Events._from_parts(decoded().events, self.array))),
             parts.Wire(
                 datagrams=Once(lambda: Datagrams(**self.reader().datagrams()), arrived),
                 version_2=Once(lambda: bool(decoded().version_2["intact"])),
@@ -153,11 +153,11 @@ class _Source:
             return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
 
         turned = _stated(path, "turned", turned_of, about.get("turned"))
-        readings = parts.Readings(Once(frames), not about.get("clock", True), turned)
+        frame_table = parts.FrameTable(Once(frames), not about.get("clock", True), turned)
         header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
         if not about.get("columns"):
-            return FrameSource(self.origin, self.sensor, readings, **header)
-        return Stream(self.origin, self.sensor, readings, parts.Lines(tuple(about["columns"])), **header)
+            return FrameSource(self.origin, self.sensor, frame_table, **header)
+        return Stream(self.origin, self.sensor, frame_table, parts.Columns(tuple(about["columns"])), **header)
 
     def stream(self) -> Stream:
         """Return the contents of a stream of numbers, whose lines are frames of one row."""
@@ -182,8 +182,8 @@ class _Source:
         return Stream(
             self.origin,
             self.sensor,
-            parts.Readings(Once(frames)),
-            parts.Lines(names, Once(samples, lambda: self.remarks().samples > 0)),
+            parts.FrameTable(Once(frames)),
+            parts.Columns(names, Once(samples, lambda: self.remarks().samples > 0)),
             timing=parts.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
             losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read().found),
             marks=self.marks(),
@@ -250,8 +250,8 @@ class _Source:
         """Return the numbers of received and lost datagrams and lines of a stream, by cause."""
         found, counts = read.found["damage"], self.counted() or self.remarks().counts or {}
         # What was in no line is not in the file.
-        said = {cause: max(n, counts.get("decoder", {}).get(cause, 0)) for cause, n in found.items()}
-        return {"samples": len(read.t), **said, "received": self.counted().get("received"), **self.rebuilt()}
+        lost = {cause: max(n, counts.get("decoder", {}).get(cause, 0)) for cause, n in found.items()}
+        return {"samples": len(read.t), **lost, "received": self.counted().get("received"), **self.rebuilt()}
 
     def counted(self) -> dict[str, Any]:
         """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""

@@ -46,16 +46,16 @@ def chosen(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
     FormatError : columns that do not fit each other, or too many markers
     """
     others = (*_OF_EVENTS[1:], "markers") if {"values", "t"} <= shapes.keys() else ("values", "unit")
-    there = {name: shapes[name] for name in (*COLUMNS, DIGEST) if name in shapes and name not in others}
-    for name, shape in there.items():
-        if (right := _wrong_shape(name, there)) is not None:
+    read_shapes = {name: shapes[name] for name in (*COLUMNS, DIGEST) if name in shapes and name not in others}
+    for name, shape in read_shapes.items():
+        if (right := _wrong_shape(name, read_shapes)) is not None:
             raise FormatError(f"{path}: {name} has shape {shape}: must be {right}")
-    return list(there)
+    return list(read_shapes)
 
 
-def _wrong_shape(name: str, there: Mapping[str, tuple[int, ...]]) -> str | None:
+def _wrong_shape(name: str, shapes: Mapping[str, tuple[int, ...]]) -> str | None:
     """Return what the shape of a column must be, if it is another; None if it is right."""
-    shape, frames = there[name], there.get("values")
+    shape, frames = shapes[name], shapes.get("values")
     if name in TEXTS:
         return "one text" if shape else None
     if name == DIGEST:
@@ -69,7 +69,7 @@ def _wrong_shape(name: str, there: Mapping[str, tuple[int, ...]]) -> str | None:
     if frames is not None:
         is_right = name == "values" or shape == frames[:1]
         return None if is_right else f"a time for each of {counted(math.prod(frames[:1]), 'frame')}"
-    is_right = len(shape) == 1 and shape == there.get("t", shape)
+    is_right = len(shape) == 1 and shape == shapes.get("t", shape)
     return None if is_right else "one value an event, as many as t has"
 
 

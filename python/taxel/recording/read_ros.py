@@ -50,9 +50,9 @@ class Topics:
         """Whether any of them is."""
         return any(option is not None for option in (self.topic, self.field, self.types, self.ros))
 
-    def but(self, said: Mapping[str, Any]) -> Topics:
+    def but(self, of_layout: Mapping[str, Any]) -> Topics:
         """Return what is given, and what a layout says of the rest."""
-        return replace(self, **{name: value for name, value in said.items() if getattr(self, name) is None})
+        return replace(self, **{name: value for name, value in of_layout.items() if getattr(self, name) is None})
 
     @property
     def folder(self) -> Path | None:
@@ -100,9 +100,9 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
     sources: dict[str, Source] = {}
     for name, topic in zip(_names(path, reads), reads, strict=True):
-        told = tuple(_told(topic))
-        for line in told:
-            warn(f"{path}: topic {topic.topic}: {line}", stacklevel=5)
+        left_out = tuple(_lines_of_losses(topic))
+        for line in left_out:
+            warn(f"{path}: topic {topic.topic}: {line}", stacklevel=6)
         losses = Losses(
             known(
                 {
@@ -112,7 +112,9 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
                 }
             ),
             remarks=() if topic.has_stamps else ("at the bag's times, as its messages have no header",),
-            lost=known((*told, f"other topics of the bag: {', '.join(topic.unread)}") if topic.unread else told),
+            lost=known(
+                (*left_out, f"other topics of the bag: {', '.join(topic.unread)}") if topic.unread else left_out
+            ),
         )
         source = topic.topic + f".{topic.field}" * bool(topic.field) + f" ({topic.type})"
         frames = Frames(
@@ -138,7 +140,7 @@ def _names(path: Path, reads: Sequence[Read]) -> list[str]:
     return names
 
 
-def _told(topic: Read) -> Iterator[str]:
+def _lines_of_losses(topic: Read) -> Iterator[str]:
     """Yield what was left out, and how many of the stamps were wrong."""
     if topic.left_out:
         whole = counted(topic.left_out + len(topic.t), "message")

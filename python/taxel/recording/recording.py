@@ -221,6 +221,17 @@ class Recording:
         return self._contents.main.timing.stretch is not None
 
     @property
+    def stretch(self) -> tuple[int, int] | None:
+        """The first time and the end of a part by time, us; None of a whole."""
+        stretch = self._contents.main.timing.stretch
+        return None if stretch is None else stretch()
+
+    @property
+    def is_several(self) -> bool:
+        """Whether its events or frames are those of its `sources` alone."""
+        return self._contents.is_several
+
+    @property
     def has_events(self) -> bool:
         """Whether the file holds events (else frames)."""
         return self._contents.main.has_events
@@ -486,9 +497,9 @@ class Recording:
         contents = self._contents
         if contents.is_several:
             return escaped(f"Recording({self.name}: {len(contents.sources)} sources: {', '.join(contents.sources)})")
-        what = contents.main.table
+        table = contents.main.table
         noun = "event" if self.has_events else "frame"
-        time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) and self.timed else "no time"
+        time = f"{int(table.t.min())} to {int(table.t.max())} us" if len(table) and self.timed else "no time"
         more = [counted(len(self.notes), "note")] * bool(self.notes)
         more += [counted(len(self.detections), "detection")] * bool(len(self.detections))
         more += [counted(len(self.zeroings), "zeroed taxel")] * bool(self.zeroings)
@@ -498,7 +509,7 @@ class Recording:
         )
         more += [f"beside {', '.join(others)}"] * bool(others)
         size = f"{self.array.rows} x {self.array.columns} taxels"
-        return escaped(f"Recording({self.name}: {', '.join([counted(len(what), noun), time, size, *more])})")
+        return escaped(f"Recording({self.name}: {', '.join([counted(len(table), noun), time, size, *more])})")
 
 
 def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:

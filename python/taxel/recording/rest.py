@@ -111,10 +111,10 @@ class Rest:
     @staticmethod
     def fall(path: Path | None = None) -> str:
         """Return what to do of values that fall; of the recording of a path it names the layout file."""
-        said = None if path is None else Layout.beside(path)
+        file = None if path is None else Layout.beside(path)
         with suppress(FormatError, OSError):
-            if said is not None and Layout.read(said).turned is not None:
-                return f"values fall from their rest as {said.name} turns them: leave falls out of it, if that is wrong"
+            if file is not None and Layout.read(file).turned is not None:
+                return f"values fall from their rest as {file.name} turns them: leave falls out of it, if that is wrong"
         where = "" if path is None else f" {or_given(path)}"
         return f"values fall from their rest: if less means more pressure, say falls = true in a layout file{where}"
 
@@ -245,17 +245,17 @@ def found(
     released, less, quiet, in_quiet = known.copy(), np.zeros(taxels), np.zeros(taxels), known.copy()
     first = 0
     for t, values in blocks():
-        each = np.ones((len(t), 1), np.int64) if stands_for is None else stands_for[first : first + len(t), None]
+        weights = np.ones((len(t), 1), np.int64) if stands_for is None else stands_for[first : first + len(t), None]
         first += len(t)
         load = begins - values if falls else values - begins
         far = load < -LOADED_TICKS / scale
-        released += (far * each).sum(axis=0)
-        less -= (np.where(far, load, 0.0) * each).sum(axis=0)
-        there = ~np.isnan(load)
-        known += (there * each).sum(axis=0)
+        released += (far * weights).sum(axis=0)
+        less -= (np.where(far, load, 0.0) * weights).sum(axis=0)
+        is_known = ~np.isnan(load)
+        known += (is_known * weights).sum(axis=0)
         within = slice(*np.searchsorted(t, rest.quiet))
-        quiet += (np.where(there, load, 0.0) * each)[within].sum(axis=0)
-        in_quiet += (there * each)[within].sum(axis=0)
+        quiet += (np.where(is_known, load, 0.0) * weights)[within].sum(axis=0)
+        in_quiet += (is_known * weights)[within].sum(axis=0)
     loaded = released > LOADED_SHARE * known
     begins[loaded] = np.nan
     if np.isnan(begins).all():
@@ -292,8 +292,8 @@ def _of_rising(frames: Frames, scale: float, *, falls: bool = False) -> Rest:
 def _blocks(frames: Frames) -> list[FrameBlock]:
     """Return frames in blocks that a processor's cache holds."""
     taxels = frames.array.rows * frames.array.columns
-    values, each = frames.values.reshape(len(frames), taxels), max(1, _BLOCK // max(1, taxels))
-    return [(frames.t[k : k + each], values[k : k + each]) for k in range(0, len(frames), each)]
+    values, block = frames.values.reshape(len(frames), taxels), max(1, _BLOCK // max(1, taxels))
+    return [(frames.t[k : k + block], values[k : k + block]) for k in range(0, len(frames), block)]
 
 
 def _fall(frames: Frames, quiet_us: tuple[int, int], scale: float) -> bool:

@@ -12,6 +12,7 @@ from taxel.recording.contents import Contents, FrameSource, Source, Stream, alon
 from taxel.recording.frames import calibrated
 from taxel.recording.once import Once, known
 from taxel.recording.parts import Origin
+from taxel.recording.recording import Recording
 
 
 def with_sidecars(of: Contents) -> Contents:
@@ -36,10 +37,10 @@ def _notes(of: Source) -> tuple[Note, ...]:
     """
     labels, which = Labels(beside(of.origin.path)), labels_of(of.origin)
     replaced = labels._replaced(*which)
-    kept = tuple(note for note in of.marks.notes() if note.t is None or note.t not in replaced)
-    noted = {(note.text, note.t) for note in kept}
+    notes = tuple(note for note in of.marks.notes() if note.t is None or note.t not in replaced)
+    noted = {(note.text, note.t) for note in notes}
     more = sorted((row for row in labels._rows(*which) if (row.text, row.t) not in noted), key=lambda row: row.t or 0)
-    return kept + tuple(Note(row.text, row.t, row.at_ns) for row in more)
+    return notes + tuple(Note(row.text, row.t, row.at_ns) for row in more)
 
 
 def labels_of(origin: Origin) -> tuple[Path, str, str]:
@@ -66,7 +67,7 @@ def calibration_beside(path: Path, of: Source) -> Once[Calibration | None]:
     return Once(read, lambda: has_calibration(path))
 
 
-def calibrated_by(of: Contents, place: Path) -> Contents:
+def calibrated_by(recording: Recording, place: Path) -> Recording:
     """Return a recording, or each sensor of one with several, as frames in N or kPa by a calibration file.
 
     Raises
@@ -81,7 +82,8 @@ def calibrated_by(of: Contents, place: Path) -> Contents:
         calibration: Once[Calibration | None] = known(_fitting(place, source))
         return calibrated(replace(source, sensor=replace(source.sensor, calibration=calibration)))
 
-    return alone({name: with_calibration(source) for name, source in of.sources.items()})
+    sources = recording._contents.sources
+    return Recording(alone({name: with_calibration(source) for name, source in sources.items()}))
 
 
 def _fitting(place: Path, of: Source) -> Calibration:

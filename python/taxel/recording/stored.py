@@ -58,16 +58,16 @@ def stored(of: Contents, place: Path) -> Contents:
     """
     ending, main = place.suffix.lower(), of.main
     if of.is_several and ending == ".mcap" and together(of.sources):
-        each = {name: _stored(source, ending, place) for name, source in of.sources.items()}
-        each = {name: _named(source, f"{place.name} {name}", name) for name, source in each.items()}
-        return Contents(several(each), each)
+        sources = {name: _stored(source, ending, place) for name, source in of.sources.items()}
+        sources = {name: _named(source, f"{place.name} {name}", name) for name, source in sources.items()}
+        return Contents(several(sources), sources)
     if of.is_several:
         # Reading the events raises the error that lists the sources.
         _ = main.table
-    kept = _stored(main, ending, place)
+    source = _stored(main, ending, place)
     if not isinstance(main, FrameSource) or ending != ".mcap":
-        kept = _named(kept, place.name, "board")
-    return Contents.of(with_losses(kept, of.others))
+        source = _named(source, place.name, "board")
+    return Contents.of(with_losses(source, of.others))
 
 
 def _named(of: Source, name: str, label: str) -> Source:
@@ -76,18 +76,18 @@ def _named(of: Source, name: str, label: str) -> Source:
 
 def _stored(of: Source, ending: str, place: Path) -> Source:
     """Return what a file can hold of a source."""
-    kept, lines = {".mcap": _mcap, ".lsa": _lsa, ".csv": _csv, ".npz": _table, ".h5": _table}[ending](of, place)
+    source, lines = {".mcap": _mcap, ".lsa": _lsa, ".csv": _csv, ".npz": _table, ".h5": _table}[ending](of, place)
     beside = calibration_beside(place, of)
-    kept = replace(
-        kept,
-        origin=replace(kept.origin, path=place, name=place.name, kind=ENDINGS[ending]),
-        sensor=replace(kept.sensor, calibration=beside),
+    source = replace(
+        source,
+        origin=replace(source.origin, path=place, name=place.name, kind=ENDINGS[ending]),
+        sensor=replace(source.sensor, calibration=beside),
         # A part that is written to a file becomes a recording of its own.
-        timing=replace(kept.timing, stretch=None),
+        timing=replace(source.timing, stretch=None),
     )
     alone = of.sensor.calibration.holds() and not beside.holds()
     return with_losses(
-        kept, lambda: [*lines, *["the calibration, a file of its own: lay a copy beside the new one"] * alone]
+        source, lambda: [*lines, *["the calibration, a file of its own: lay a copy beside the new one"] * alone]
     )
 
 
@@ -110,26 +110,31 @@ def _arrivals(of: Source) -> list[str]:
 
 def _table(of: Source, _: Path) -> _Kept:
     """Return what a .npz or a .h5 holds: all but the raw datagrams."""
-    wire, lines = of.part(parts.Wire), of.part(parts.Lines)
+    wire, stream = of.part(parts.Wire), of.part(parts.Columns)
 
     def rule(part: parts.Part) -> parts.Part | None:
         match part:
             case parts.Origin():
                 return replace(part, source=part.source or part.name)
             case (
-                parts.Sensor() | parts.Settings() | parts.Marks() | parts.Losses() | parts.Changes() | parts.Readings()
+                parts.Sensor()
+                | parts.Settings()
+                | parts.Marks()
+                | parts.Losses()
+                | parts.EventTable()
+                | parts.FrameTable()
             ):
                 return part
             case parts.Wire():
                 return parts.Wire()
-            case parts.Lines():
-                return parts.Lines(part.columns)
+            case parts.Columns():
+                return parts.Columns(part.columns)
             case parts.Timing():
                 return None
             case _:
                 assert_never(part)
 
-    return applied(of, rule), [*_arrivals(of), *wire.lines(with_times=True), *lines.received()]
+    return applied(of, rule), [*_arrivals(of), *wire.lines(with_times=True), *stream.received()]
 
 
 def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
@@ -144,7 +149,7 @@ def _bare(of: Source, table: Events | Frames, wire: Iterable[str]) -> _Kept:
 
 def _csv(of: Source, place: Path) -> _Kept:
     """Return what a .csv holds: events without markers, or frames without their unit."""
-    beside, is_turned = Layout.beside(place), isinstance(of, FrameSource) and of.readings.turned is not None
+    beside, is_turned = Layout.beside(place), isinstance(of, FrameSource) and of.frame_table.turned is not None
     if is_turned and beside is not None and Layout.read(beside).turned is not None:
         raise ProblemError(
             f"{place}: the readings were turned already, which a .csv cannot state, and {beside} beside it would turn "
@@ -163,8 +168,8 @@ def _csv(of: Source, place: Path) -> _Kept:
     else:
         lost += [f"the unit ({whole.unit})"] * (whole.unit != "counts")
         table = Frames(whole.values[:, : array.rows, : array.columns], whole.t, array=array)
-    kept, lines = _bare(of, table, of.part(parts.Wire).lines(with_times=True))
-    return kept, [*lines, *lost]
+    source, lines = _bare(of, table, of.part(parts.Wire).lines(with_times=True))
+    return source, [*lines, *lost]
 
 
 def _lsa(of: Source, place: Path) -> _Kept:
@@ -189,9 +194,9 @@ def _lsa(of: Source, place: Path) -> _Kept:
         lost.append(f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)")
     elif (again.t != events.t // STAMP_US * STAMP_US).any():
         lost.append("whole turns of 6.5536 s in times")
-    kept, lines = _bare(of, events, of_wire)
-    assert isinstance(kept, Board)  # of events
-    return replace(kept, wire=parts.Wire(payload=payload)), [*lines, *lost]
+    source, lines = _bare(of, events, of_wire)
+    assert isinstance(source, Board)  # of events
+    return replace(source, wire=parts.Wire(payload=payload)), [*lines, *lost]
 
 
 def _mcap(of: Source, place: Path) -> _Kept:
@@ -199,7 +204,7 @@ def _mcap(of: Source, place: Path) -> _Kept:
     is_file, lines = of.origin.kind != "events", of.losses.damage()
     # Of what recordings were merged stands in `source`.
     converted = [f"converted from {of.origin.name}"] if is_file and of.origin.kind != "merged" else []
-    samples = of.lines.samples() if isinstance(of, Stream) else None
+    samples = of.stream.samples() if isinstance(of, Stream) else None
     events = None if isinstance(of, FrameSource) else known(_board(of, place).table)
     clock = of.timing.usable()
     wire = _wire(of, clock, lines) if isinstance(of, Board) else parts.Wire()
@@ -219,10 +224,10 @@ def _mcap(of: Source, place: Path) -> _Kept:
         match part:
             case parts.Origin():
                 return replace(part, source=part.source or part.name or ("events" if of.has_events else "frames"))
-            case parts.Sensor() | parts.Settings() | parts.Marks() | parts.Readings() | parts.Lines():
+            case parts.Sensor() | parts.Settings() | parts.Marks() | parts.FrameTable() | parts.Columns():
                 return part
-            case parts.Changes():
-                return parts.Changes(events or part.events)
+            case parts.EventTable():
+                return parts.EventTable(events or part.events)
             case parts.Timing():
                 lines.extend(part.lines())
                 return parts.Timing(known(clock))

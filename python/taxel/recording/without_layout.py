@@ -26,7 +26,7 @@ from taxel.recording.read_foreign import (
     arrays_of,
     cells,
     ends_in_separator,
-    is_foreign,
+    is_of_another_program,
     listed,
     seconds_of,
     shapes_of,
@@ -53,7 +53,7 @@ def refuse_without_layout(path: Path) -> None:
             f"{path}: spike trains, as taxel encode writes them, no recording; taxel info describes them, and "
             "taxel.SpikeTrains.load reads them"
         )
-    if not is_foreign(path) or (path.suffix.lower() == ".npz" and not stored_names(path)):
+    if not is_of_another_program(path) or (path.suffix.lower() == ".npz" and not stored_names(path)):
         return
     if path.suffix.lower() in (".csv", ".h5", ".hdf5"):
         kind_of(path)  # refuses what is not of the kind that its name says
@@ -68,15 +68,15 @@ def refuse_without_layout(path: Path) -> None:
         holds, lines = _of_table(found)
         says = "says how to read it"
     else:
-        there = shapes_of(path)
-        name = next((name for name, shape in there.items() if len(shape) in (2, 3)), None)
+        shapes = shapes_of(path)
+        name = next((name for name, shape in shapes.items() if len(shape) in (2, 3)), None)
         if name is None:
             raise FormatError(
-                f"{path}: holds {listed(there)}; must be t, x, y, p (events), values, t (frames), or, with a layout "
+                f"{path}: holds {listed(shapes)}; must be t, x, y, p (events), values, t (frames), or, with a layout "
                 "file, an array of frames x rows x columns or frames x taxels (docs/files.md)"
             )
-        holds, lines = listed(there), _of_arrays(path, name, there)
-        says = "says which are the frames" if len(there) > 1 else "or rate_hz, says what it is"
+        holds, lines = listed(shapes), _of_arrays(path, name, shapes)
+        says = "says which are the frames" if len(shapes) > 1 else "or rate_hz, says what it is"
     raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
@@ -86,10 +86,10 @@ def are_spike_trains(path: Path) -> bool:
     return is_npz and {"times", "offsets", "start", "stop"} <= set(stored_names(path))
 
 
-def _of_arrays(path: Path, name: str, there: Mapping[str, tuple[int, ...]]) -> list[str]:
+def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
     """Return the layout of the array of a name."""
-    count, *shape = there[name]
-    time = next((name for name, of in there.items() if of == (count,) and unit_of(name) is not None), None)
+    count, *shape = shapes[name]
+    time = next((name for name, of in shapes.items() if of == (count,) and unit_of(name) is not None), None)
     times = [] if time is None else [f"time = {_quoted(time)}", *_unit(time, arrays_of(path, [time])[time])]
     data = [f"array = {_quoted(name)}"] * bool(name) + times
     return [*_size(shape), *([_NO_RATE] if time is None else []), *(["[data]", *data] if data else [])]
@@ -150,8 +150,8 @@ class _TextTable:
             if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():
                 return column, [f"time_column = {self.called(column)}", f"time_unit = {_quoted(ISO)}"]
         if self._ascends and len(self.numeric) > 1:
-            said = ["time_column = 1  # it ascends; leave this out if it is a taxel"]
-            return 0, [*said, *_unit("", self.numbers(0))]
+            lines = ["time_column = 1  # it ascends; leave this out if it is a taxel"]
+            return 0, [*lines, *_unit("", self.numbers(0))]
         return None, []
 
     @property
@@ -230,12 +230,12 @@ def _size(shape: Sequence[int]) -> list[str]:
 
 def _unit(name: str, times: NDArray[np.float64]) -> list[str]:
     """Return the line that says the unit of times: that in their name, else the largest that fits, and their rate."""
-    said = (unit_of(name) or "").replace("µ", "u")
+    stated = (unit_of(name) or "").replace("µ", "u")
     most = float(np.nanmax(np.abs(times), initial=0.0))
-    unit = said if said in UNITS_US else next((u for u in UNITS_US if most * UNITS_US[u] <= TIME_US), "us")
+    unit = stated if stated in UNITS_US else next((u for u in UNITS_US if most * UNITS_US[u] <= TIME_US), "us")
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     notes = [f"{1e6 / (step * UNITS_US[unit]):.4g} frames/s"] if step > 0 else []
-    notes += [" ".join(f"or {_quoted(unit_name)}" for unit_name in UNITS_US if unit_name != unit)] * (not said)
+    notes += [" ".join(f"or {_quoted(unit_name)}" for unit_name in UNITS_US if unit_name != unit)] * (not stated)
     return [f"time_unit = {_quoted(unit)}" + "  # " * bool(notes) + ", ".join(notes)]
 
 

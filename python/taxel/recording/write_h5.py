@@ -42,8 +42,8 @@ def write_h5(path: Path, source: Source, *, overwrite: bool) -> None:
     def send(pipe: BinaryIO) -> None:
         for name, column in columns.items():
             if name in TEXTS:
-                said = str(column).encode()
-                pipe.write(json.dumps([name, "text", [len(said)]]).encode() + b"\n" + said)
+                encoded = str(column).encode()
+                pipe.write(json.dumps([name, "text", [len(encoded)]]).encode() + b"\n" + encoded)
                 continue
             pipe.write(json.dumps([name, column.dtype.str, column.shape]).encode() + b"\n")
             for piece in _pieces(column.shape, column.itemsize):

@@ -51,9 +51,9 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping
     OSError : the disk is full ...
     """
     whole = contents.main
-    samples = whole.lines.samples() if isinstance(whole, Stream) else None
+    samples = whole.stream.samples() if isinstance(whole, Stream) else None
     if samples is not None:
-        header = {**samples.about, "sources": [], **_told(whole)}
+        header = {**samples.about, "sources": [], **_provenance(whole)}
         writer = RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
         _add_small(writer, whole, _by_host(whole))
@@ -100,14 +100,14 @@ def _header(of: Source) -> dict[str, Any]:
         "array": array._geometry(),
         "registers": None if registers is None else registers._held,
         **({} if driven == array else {"driven": driven._geometry()}),
-        **_told(of),
+        **_provenance(of),
         "source": of.origin.source,
         "side": of.sensor.side,
         "heel": of.sensor.heel,
     }
 
 
-def _told(of: Source) -> dict[str, Any]:
+def _provenance(of: Source) -> dict[str, Any]:
     """Return what a header states of the recording that a file was made of."""
     # The verdict stands here and not with the final counts, so that a file that was cut still states it.
     converted = None if of.losses.verdict() is None else verdict_of(of)._held
@@ -129,7 +129,7 @@ def _write_frames(
                 "unit": source.table.unit,
                 "clock": not source.untimed,
                 "columns": source.columns or (),
-                "turned": source.readings.turned,
+                "turned": source.frame_table.turned,
             },
         }
         for name, source in sources.items()
@@ -176,7 +176,7 @@ def _low_rate(of: FrameSource) -> tuple[Frames, tuple[float, str, str]]:
     few = Frames(frames.values[first], frames.t[first], unit=frames.unit, array=frames.array)
     if not len(few):
         return few, (1.0, "none", few.unit)
-    recording = Recording(Contents.of(replace(of, readings=replace(of.readings, frames=known(few)))))
+    recording = Recording(Contents.of(replace(of, frame_table=replace(of.frame_table, frames=known(few)))))
     above, _, rest = cast("tuple[Frames, float, Rest]", above_rest(recording))
     return above, (1.0 / ticks_by_unit(few), _RESTS.get(rest.source, rest.source), above.unit)
 
@@ -185,13 +185,13 @@ def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bo
     """Yield name, number of the first frame, frames, and whether 16 bits hold them, of all sources by time."""
     whole = {name: _core.whole_frames(np.ascontiguousarray(table.values).reshape(-1)) for name, table in tables.items()}
     done = dict.fromkeys(tables, 0)
-    each = {name: max(1, _BLOCK // max(1, table.array.rows * table.array.columns)) for name, table in tables.items()}
+    blocks = {name: max(1, _BLOCK // max(1, table.array.rows * table.array.columns)) for name, table in tables.items()}
     while left := {name: table for name, table in tables.items() if done[name] < len(table)}:
         # The block of the source that comes first, and what the others have until its end.
         first = min(left, key=lambda name: left[name].t[done[name]])
-        end = left[first].t[min(done[first] + each[first], len(left[first])) - 1]
+        end = left[first].t[min(done[first] + blocks[first], len(left[first])) - 1]
         for name, frames in left.items():
-            stop = min(int(np.searchsorted(frames.t, end, side="right")), done[name] + each[name])
+            stop = min(int(np.searchsorted(frames.t, end, side="right")), done[name] + blocks[name])
             if stop > done[name]:
                 yield name, done[name], frames[done[name] : stop], whole[name]
                 done[name] = stop

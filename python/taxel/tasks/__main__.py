@@ -19,7 +19,7 @@ info                    tare                                            -
 rest                    tare, out                                       the tare
 ======================  ==============================================  ============================================
 
-`recordings` are paths of files and folders, and `open` holds the fields of `OpenOptions` by which they are opened.
+`recordings` are paths of files and folders, and `open` holds the fields of `TextOptions` by which they are opened.
 `options` holds fields of the task's own options (`TrainOptions` and so on). Keys have the meaning of the function's
 arguments in `taxel.tasks`; an unknown one is refused by its name. `out` is needed where it is in the table, and must
 not exist unless `overwrite` is true. `encode`, `calibrate`, `info` and `rest` take one recording.
@@ -50,7 +50,7 @@ from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import Error, ProblemError
 from taxel.detect import load
 from taxel.recording import Recording
-from taxel.recording.open_options import OpenOptions
+from taxel.recording.text_options import TextOptions
 from taxel.tasks.calibrate import CalibrateOptions, KnownLoad, calibrate
 from taxel.tasks.detect import DetectOptions, detect
 from taxel.tasks.encode import EncodeOptions, encode
@@ -149,11 +149,11 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
         out = Path(_needed(left, "out"))
         try_whole(out, overwrite=overwrite)
         save = lambda made: made.save(out, overwrite=overwrite)  # noqa: E731
-    opener = _fields(OpenOptions, left, "open")
+    opener = _fields(TextOptions, left, "open")
     paths = [Path(path) for path in _needed(left, "recordings")]
     with collected() as warnings:
         progress(f"reading {', '.join(map(str, paths[:3]))}{' ...' * (len(paths) > 3)}", 0, 0)
-        recordings = [opener.one(path) for path in paths] if name in _JOINED else opener.all(paths)
+        recordings = [opener.open_one(path) for path in paths] if name in _JOINED else opener.open_sensors(paths)
         result = work(recordings, left, progress, save)
     found = result.to_dict()
     found["warnings"] = [*dict.fromkeys([*warnings, *found.get("warnings", [])])]

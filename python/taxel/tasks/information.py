@@ -15,7 +15,7 @@ from taxel._core import ProblemError
 from taxel.encode import Encoder
 from taxel.information import Answer, LabelledTrial, answer, folds, notes_as_trials, read_trials, recordings_as_trials
 from taxel.recording import Recording
-from taxel.recording.open_options import sensors_of
+from taxel.recording.opening import sensors_of
 from taxel.tasks.encode import encoder_of
 
 

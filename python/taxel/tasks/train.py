@@ -29,7 +29,7 @@ from taxel.detect.scoring import score_together
 from taxel.detect.training import Trained, trained
 from taxel.recorded import recorded
 from taxel.recording import Recording
-from taxel.recording.open_options import sensors_of
+from taxel.recording.opening import sensors_of
 from taxel.recording.rest import BY_UNIT
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare

@@ -1,4 +1,4 @@
-"""The options that say of files what they do not hold themselves, and the opening."""
+"""The options of opening as text, and the opening by them."""
 
 from __future__ import annotations
 
@@ -8,50 +8,36 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from taxel._base.arguments import checked_path, instance, several, text
+from taxel._base.arguments import checked_path, several, text
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout
-from taxel.recording import Recording, open_all
 from taxel.recording.contents import Contents
 from taxel.recording.layout import on_array
-from taxel.recording.opening import joined, sensors
+from taxel.recording.opening import SharedOptions, joined, open_all, sensors
 from taxel.recording.read_foreign import is_lone_array
+from taxel.recording.recording import Recording
 
 
-@dataclass(frozen=True)
-class OpenOptions:
-    """Hold what says of files what they do not hold themselves; each command that reads files has these options.
+@dataclass(frozen=True, kw_only=True)
+class TextOptions(SharedOptions):
+    """Hold the options of opening as a command line or a request in JSON states them.
 
     Parameters
     ----------
     array : sequence of str, optional
         Rows, columns and pitch (mm) of the sensor, as "24x20x5"; of a ROS bag one for each topic, or one for all.
-    layout : path, optional
-        The layout file; default: that beside the file.
-    topic, field : sequence of str, optional
-        The topics of a ROS bag that are opened, and their fields.
-    types : path, optional
-        A folder of .msg or .idl files, for a ROS bag that lacks definitions.
-    ros : str, optional
-        The release of ROS whose messages a bag holds undefined, as "humble".
+    layout, topic, field, types, ros, limit
+        As of `taxel.open`.
     rate_hz : float, Hz, optional
         Frames a second, for recordings without times.
-    limit : int, bytes, optional
-        How much of a recording may be read into memory.
     """
 
     array: Sequence[str] | None = None
-    layout: str | os.PathLike[str] | None = None
-    topic: Sequence[str] | None = None
-    field: Sequence[str] | None = None
-    types: str | os.PathLike[str] | None = None
-    ros: str | None = None
     rate_hz: float | None = None
-    limit: int | None = None
 
-    def open(self, path: str | os.PathLike[str]) -> list[Recording]:
+    def open_trials(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
 
         Raises
@@ -61,16 +47,10 @@ class OpenOptions:
         place = Path(checked_path("path", path))
         given = [] if self.array is None else several("array", self.array)
         arrays = [of_size(text("array", size), of_wire=False) for size in given]
-        opened = open_all(
-            place,
-            array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
-            layout=self.layout or self._instead_of_layout(place),
-            topic=self.topic,
-            field=self.field,
-            types=self.types,
-            ros=self.ros,
-            limit=self.limit,
-        )
+        options = {option.name: getattr(self, option.name) for option in fields(SharedOptions)}
+        options["array"] = arrays if len(arrays) > 1 else arrays[0] if arrays else None
+        options["layout"] = self.layout or self._instead_of_layout(place)
+        opened = open_all(place, **options)
         return [self._timed(self._on_array(recording)) for recording in opened]
 
     def given(self) -> dict[str, Any]:
@@ -86,8 +66,8 @@ class OpenOptions:
         """Return the options as words of a command line."""
         words: list[str] = []
         for name, value in self.given().items():
-            for each in value if isinstance(value, list | tuple) else [value]:
-                words += [f"--{name.replace('_', '-')}", str(each)]
+            for entry in value if isinstance(value, list | tuple) else [value]:
+                words += [f"--{name.replace('_', '-')}", str(entry)]
         return words
 
     def _names_topic(self, bag: Path) -> bool:
@@ -120,28 +100,29 @@ class OpenOptions:
         wire = of_size(self.array[0])
         return _laid_on(recording, Array(*stated.shape, wire.pitch_mm, stated.exists, wire.name))
 
-    def joined(self, path: str | os.PathLike[str]) -> list[Recording]:
+    def open_joined(self, path: str | os.PathLike[str]) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""
-        return joined(self.open(path))
+        return joined(self.open_trials(path))
 
-    def all(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
+    def open_sensors(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
 
         Each sensor of a file with several is a recording of its own (`Recording.title`).
         """
-        return [of for path in several("paths", paths) for each in self.open(path) for of in sensors(each)]
+        trials = (trial for path in several("paths", paths) for trial in self.open_trials(path))
+        return [sensor for trial in trials for sensor in sensors(trial)]
 
     def _timed(self, recording: Recording) -> Recording:
         return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
 
-    def one(self, path: str | os.PathLike[str]) -> Recording:
+    def open_one(self, path: str | os.PathLike[str]) -> Recording:
         """Open a file that holds one recording, with its feet joined.
 
         Raises
         ------
         ProblemError : it holds several
         """
-        every = self.joined(path)
+        every = self.open_joined(path)
         if len(every) != 1:
             some = ", ".join(recording.name for recording in every[:3]) + ", ..." * (len(every) > 3)
             raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")
@@ -159,11 +140,3 @@ def _is_row_of(recording: Recording, given: Array) -> bool:
     stated, is_one = recording.array, len(recording.sources) < 2
     row = stated.shape == (1, given.rows * given.columns) and given.rows > 1 and stated.taxels == stated.columns
     return is_one and row and not stated._is_measured and not recording.has_events and not recording.is_stream
-
-
-def sensors_of(recordings: Recording | Sequence[Recording], name: str = "recordings") -> list[Recording]:
-    """Return each sensor of recordings as one of its own; refuse what is no recording."""
-    given = [recordings] if isinstance(recordings, Recording) else several(name, recordings)
-    if not len(given):
-        raise refused(name, " is empty: must be a Recording or more, as taxel.open or taxel.open_all returns")
-    return [recording for each in given for recording in sensors(instance(name, each, Recording))]
