@@ -95,7 +95,7 @@ def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     quietly = ["-q", "-p", "no:cacheprovider", "--continue-on-collection-errors"]
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
     about = {STUDY: f"{name} or registry or without_weight", LEARNER: "echo or Echo or nothing_is_left_out"}
-    about[FORMAT] = "channel or registry or among_the_large"
+    about[FORMAT] = "test_channel or registry or among_the_large"
     about[ENCODER] = "binary or nothing_is_left_out"
     about[OPTION] = "live or option"
     chosen = ["-k", about[name]] if name in about else []
