@@ -47,8 +47,8 @@ def test_a_kept_result_names_its_commit_date_and_machine(path: Path) -> None:
     result = json.loads(path.read_text())
     assert result["commit"]
     assert re.fullmatch(r"\d{4}-\d\d-\d\d", result["date"])
-    # The first coarse results did not save the machine.
-    assert result.get("machine") or path.parent.name == "coarse"
+    # The first toy results did not save the machine.
+    assert result.get("machine") or path.parent.name == "toy"
 
 
 @pytest.mark.parametrize(("file", "commit"), NAMED)
