@@ -99,7 +99,7 @@ export const LANES = [
   {
     name: "raster", label: "Raster of events by row over time", kind: "raster", least: 96,
     setting: "showRaster", box: "Raster, channels",
-    // Of frames and channels the values say more than their changes.
+    // The values of frames and of channels say more than their changes.
     fits: ({ raster, values, sensor }) => raster === "spikes" || (!values.frames && sensor.kind !== "channels"),
     heading: ({ raster }) =>
       raster === "spikes" ? ["Raster spikes of ", output({ id: "spikes-info", class: "dim" })] : ["Raster ", make("span", {}, swatch("more"), " more ", swatch("less"), " less, by row")],

@@ -121,7 +121,7 @@ export class Maps {
     this.changeScale = new Scale(10);
     /** @type {{ pressure: Uint32Array, change: Uint32Array }} */
     this.words = { pressure: new Uint32Array(256), change: new Uint32Array(256) };
-    /** Of the last frame drawn. */
+    /** What the last drawn frame says. */
     this.info = { unknown: 0, value: /** @type {number | null} */ (null), rest: /** @type {number | null} */ (null) };
     /** Colours of a sensor's ground and edge. */
     this.theme = { ground: "", edge: "" };

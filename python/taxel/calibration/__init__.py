@@ -55,10 +55,10 @@ class Calibration(Saved):
     date : str
         The day, as 2026-11-21.
     residual : float or None
-        Of a fit: root mean square of what the known loads are missed by, as a share of each; None where there were no
-        more loads than unknowns, so that they fit themselves.
+        Root mean square of what a fit misses the known loads by, as a share of each; None where there were no more
+        loads than unknowns, so that they fit themselves.
     loads : tuple of (float, str, float)
-        Of a fit: each load, its unit, and what the calibration makes of the frames under it.
+        The loads of a fit: each load, its unit, and what the calibration makes of the frames under it.
     note : str
 
     Examples

@@ -199,7 +199,8 @@ def distinct(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:
     """Return patterns in which, of trains with the same spikes in all of them, only the first has any.
 
     Weights that equal trains share require all of these to spike at once, as levels do that every touch of the training
-    reached in one frame. Of levels the first is the lowest, which weaker touches reach as well.
+    reached in one frame. The first of several levels is the
+    lowest, which weaker touches reach as well.
     """
     spikes = [tuple(pattern[train].tobytes() for pattern in patterns) for train in range(len(patterns[0]))]
     first = {key: train for train, key in reversed(list(enumerate(spikes)))}
