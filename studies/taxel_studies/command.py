@@ -30,7 +30,7 @@ Scheduler = Annotated[
 Report = Annotated[Path, typer.Option(help="Folder for the page, pictures and all results; resumes what is in it.")]
 Size = Annotated[str, typer.Option(help="full, or toy (shows that it runs); some studies have more.")]
 Realisations = Annotated[int | None, typer.Option(help="How many, instead of the size's.")]
-Changes = Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)]
+Changes = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)]
 Data = Annotated[
     Path | None, typer.Option(help="Folder of recordings, for the studies that need some (or TAXEL_DATA names it).")
 ]

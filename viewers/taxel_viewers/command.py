@@ -45,7 +45,9 @@ def show(
         ),
     ],
     encoder: Annotated[str | None, typer.Option(help="Show the spikes of this encoder too.")] = None,
-    values: Annotated[list[str] | None, typer.Option("--set", help=f"With --encoder: {SET_HELP}")] = None,
+    values: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=f"With --encoder: {SET_HELP}")
+    ] = None,
     tare: Annotated[
         Path | None, typer.Option(metavar="FILE", help="With --encoder: rest of the taxels (Tare.save wrote it).")
     ] = None,

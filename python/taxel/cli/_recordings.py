@@ -28,7 +28,7 @@ _REPORT_S = (2.0, 8.0, 20.0, 30.0)
 
 #: What every command that works on recordings reads.
 READ_HELP = ".mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of another maker"
-SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
+SET_HELP = "Set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
 
 ReportOption = Annotated[
     Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")

@@ -46,7 +46,7 @@ def calibrate(
     ] = None,
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", help="KEY=VALUE: a parameter of the law: v_trans, feedback_kohm, exponent ..."),
+        typer.Option("--set", metavar="KEY=VALUE", help="A parameter of the law: v_trans, feedback_kohm, exponent ..."),
     ] = None,
     unit: Annotated[str, typer.Option(help="Unit of the calibrated values: N or kPa, at a taxel.")] = "N",
     each: Annotated[

@@ -26,7 +26,7 @@ def encode(
     out: Annotated[Path, typer.Argument(help="The new file, a .npz that SpikeTrains.load reads.")],
     encoder: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(encoder_names())}.")],
     files: FileOptions,
-    values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
     tare: Annotated[str | None, tare_option()] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,

@@ -56,7 +56,7 @@ def information(
     ] = None,
     pools: Annotated[str | None, typer.Option(help="Squares of taxels averaged to one: their sides, as 2,4.")] = None,
     encoder: Annotated[str, typer.Option(help="The encoder: change_events or fa1.")] = "change_events",
-    values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
     classifiers: Annotated[
         str, typer.Option("--also", help="Further classifiers: neighbours, cone_r, tempotron.")
     ] = "neighbours",

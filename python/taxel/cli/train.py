@@ -59,7 +59,7 @@ def train(
     encoder: Annotated[
         str | None, typer.Option(metavar="NAME", help="The encoder's name; the same as --set encoder.name=NAME.")
     ] = None,
-    values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
     tare: Annotated[str | None, tare_option("Default: the time before the first label.")] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
