@@ -19,6 +19,7 @@ PARTS = {
     "python/taxel": "python/taxel",
 }
 BESIDE = {
+    "rules": "rules",
     "studies": "studies/taxel_studies",
     "benchmarks": "benchmarks/taxel_benchmarks",
     "viewers": "viewers/taxel_viewers",
