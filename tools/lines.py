@@ -1,4 +1,4 @@
-"""Count the lines of code of the product's six parts: `python tools/lines.py`.
+"""Count the lines of code of the product's parts: `python tools/lines.py`.
 
 A line counts where it holds code: no comment, no docstring, no blank line, no test. Files that a tool writes count too.
 """
@@ -16,6 +16,7 @@ PARTS = {
     "taxel-panel": "crates/taxel-panel/src",
     "page": "crates/taxel-panel/web",
     "border": "crates/taxel-python/src",
+    "border, base": "crates/taxel-border/src",
     "python/taxel": "python/taxel",
 }
 BESIDE = {

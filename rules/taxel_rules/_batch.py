@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ from taxel_rules import _rules
 class BatchLearner(SpikeLearner):
     """Learn spike times from all examples at once; the results of the compiled part end in ``_``."""
 
-    _compiled = _rules
+    _compiled: ClassVar[Any] = _rules
 
     weights_: NDArray[np.float64] = field(init=False)
     #: Names of further results, which the compiled part reads in `predict`.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,7 +33,7 @@ class EpochLearner(SpikeLearner):
     Defaults are the published values of a rule. `INST`, whose values were all published, documents each parameter.
     """
 
-    _compiled = _rules
+    _compiled: ClassVar[Any] = _rules
 
     eta: float | None
     initial: Sequence[float] | None

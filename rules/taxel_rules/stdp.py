@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,7 @@ class STDP(SpikeLearner):
     """
 
     _kind = "stdp"
-    _compiled = _rules
+    _compiled: ClassVar[Any] = _rules
 
     threshold: float = _DEFAULT.threshold
     tau_m: float = _DEFAULT.tau_m

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,7 +77,7 @@ class Tempotron(Learner):
     """
 
     _kind = "tempotron"
-    _compiled = _rules
+    _compiled: ClassVar[Any] = _rules
 
     tau: float = _DEFAULT.tau
     tau_s: float | None = _DEFAULT.tau_s

@@ -19,7 +19,7 @@ from taxel.learn import ConeR, ConeX, OnlineConeR
 
 sklearn = pytest.importorskip("sklearn")
 
-#: Arguments without defaults, of which the learners of taxel have none; the rules beside taxel are tried with these laws too.
+#: Arguments without defaults: the learners of taxel have none, the rules beside taxel, which are tried too, have.
 GIVEN: dict[str, Any] = {}
 LEARNERS = {
     name: kind

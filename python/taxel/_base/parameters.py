@@ -48,8 +48,8 @@ def ranges(kind: str, compiled: Any = _core) -> dict[str, Any]:
 class Parameters:
     """Hold the parameters of the constructor, unchanged, as attributes of the same names.
 
-    A subclass defines its name (`_kind`) in the compiled part that has it (`_compiled`), and which of its parameters are
-    groups of parameters themselves (`_nested`). Parameters are checked in the constructor and in `set_params`.
+    A subclass defines its name (`_kind`) in the compiled part that has it (`_compiled`), and which of its parameters
+    are groups of parameters themselves (`_nested`). Parameters are checked in the constructor and in `set_params`.
 
     The interface is scikit-learn's, which is not imported: `get_params`, `set_params`, nested names (``neuron__tau``),
     tags.

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::epochs::{Correction, Presented, Rule};
 use super::source::Source;
-use super::stepped::{Kernels, Reset, SteppedNeuron};
+use super::stepped::{AfterSpike, Kernels, SteppedNeuron};
 use taxel_core::Result;
 use taxel_core::allowed::{Range, ranges};
 
@@ -43,7 +43,11 @@ impl Fp {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<FpRule> {
         self.check_ranges()?;
         neuron.check_linear("FP")?;
-        Ok(FpRule { kernels: neuron.kernels(), window: self.window_ms, forgets: neuron.after_spike == Reset::Reset })
+        Ok(FpRule {
+            kernels: neuron.kernels(),
+            window: self.window_ms,
+            forgets: neuron.after_spike == AfterSpike::Reset,
+        })
     }
 }
 

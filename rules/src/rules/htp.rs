@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::epochs::{Correction, Presented, Rule};
 use super::source::Source;
-use super::stepped::{Kernels, Reset, SteppedNeuron};
+use super::stepped::{AfterSpike, Kernels, SteppedNeuron};
 use taxel_core::Result;
 use taxel_core::allowed::{Range, ranges};
 
@@ -51,7 +51,7 @@ impl Htp {
             kernels: neuron.kernels(),
             window: self.window_ms,
             theta_0: neuron.theta_0,
-            forgets: neuron.after_spike == Reset::Reset,
+            forgets: neuron.after_spike == AfterSpike::Reset,
             tau: neuron.tau,
         })
     }

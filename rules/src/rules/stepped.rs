@@ -28,7 +28,7 @@ pub enum Current {
 /// The effect of an output spike on the potential.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Reset {
+pub enum AfterSpike {
     /// It falls by `theta_0`, a fall that decays with `tau` (the SRM0 of Florian, and of Gardner and Grüning).
     Subtract,
     /// It is put to 0; currents go on (leaky integrate and fire).
@@ -48,8 +48,8 @@ pub struct SteppedNeuron {
     /// Threshold, mV.
     pub theta_0: f64,
     /// The effect of an output spike.
-    pub after_spike: Reset,
-    /// How long the membrane stays at 0 after a spike, ms; for [`Reset::Membrane`] alone.
+    pub after_spike: AfterSpike,
+    /// How long the membrane stays at 0 after a spike, ms; for [`AfterSpike::Membrane`] alone.
     pub refractory: f64,
     /// Step of the grid, from the pattern's start on, ms.
     pub step_ms: f64,
@@ -171,7 +171,7 @@ impl SteppedNeuron {
         if values[1] >= values[0] {
             return Err(problem!(names[1]; " is {} ms: must lie below {}, {} ms", values[1], names[0], values[0]));
         }
-        if self.refractory > 0.0 && self.after_spike != Reset::Membrane {
+        if self.refractory > 0.0 && self.after_spike != AfterSpike::Membrane {
             return Err(
                 problem!("refractory"; " is {} ms: must be 0 unless after_spike is \"membrane\"", self.refractory),
             );
@@ -181,7 +181,7 @@ impl SteppedNeuron {
 
     /// Refuses a potential that is not linear in the weights once the spikes are known: FP and HTP need one.
     pub(super) fn check_linear(&self, rule: &str) -> Result<()> {
-        if self.after_spike == Reset::Membrane {
+        if self.after_spike == AfterSpike::Membrane {
             return Err(problem!(
                 "after_spike"; " is \"membrane\": {rule} needs a potential linear in the weights, \"reset\" or \"subtract\""
             ));
@@ -246,19 +246,19 @@ impl SteppedNeuron {
             } else if walk.v >= self.theta_0 {
                 spikes.push(laid.grid.time(step as f64));
                 match self.after_spike {
-                    Reset::Subtract => walk.v -= self.theta_0,
-                    Reset::Membrane => {
+                    AfterSpike::Subtract => walk.v -= self.theta_0,
+                    AfterSpike::Membrane => {
                         walk.v = 0.0;
                         held_until = step + 1 + held_steps;
                     }
-                    Reset::Reset => walk.clear(),
+                    AfterSpike::Reset => walk.clear(),
                 }
             }
         }
     }
 
     /// Calls `each` with time and potential of every grid point, the neuron firing at `forced` (ms, ascending) and nowhere
-    /// else; for resets that leave the potential linear in the weights, [`Reset::Subtract`] and [`Reset::Reset`].
+    /// else; for resets that leave the potential linear in the weights, [`AfterSpike::Subtract`] and [`AfterSpike::Reset`].
     pub(super) fn forced(&self, weights: &[f64], laid: &Laid, forced: &[f64], mut each: impl FnMut(f64, f64)) {
         let mut walk = Walk::new(self, weights, laid);
         let mut forced = forced.iter().copied().peekable();
@@ -268,7 +268,7 @@ impl SteppedNeuron {
             let mut lost_up_to = f64::NEG_INFINITY;
             while let Some(at) = forced.next_if(|&at| at < t) {
                 match self.after_spike {
-                    Reset::Reset => {
+                    AfterSpike::Reset => {
                         walk.clear();
                         lost_up_to = at;
                     }
