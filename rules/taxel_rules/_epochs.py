@@ -56,9 +56,6 @@ class EpochLearner(SpikeLearner):
     status_: Status = field(init=False)
     neuron_: Neuron | None = field(init=False)
 
-    #: Number of entries of `right_` before the first epoch.
-    _LOOKS_BEFORE_THE_FIRST = 1
-
     def _plain(self) -> dict[str, Any]:
         return {"name": self._kind} | super()._plain()
 
@@ -96,7 +93,8 @@ class EpochLearner(SpikeLearner):
         trains, times = examples(patterns, targets)
         first = None if start is None else floats("start", start)
         self.neuron_ = self._fitted_neuron()
-        keep(self, _rules.fit_epochs(self._json(), trains, times, first, optional(callback, "progress", progress)))
+        trained = _rules.fit_epochs(self._json(), trains, times, first, optional(callback, "progress", progress))
+        keep(self, trained, before=1)
         return self
 
     def _fired(self, patterns: list[SpikeTrains]) -> list[NDArray[np.float64]]:
@@ -146,10 +144,10 @@ class EpochLearner(SpikeLearner):
         )
 
 
-def keep(learner: Any, trained: _rules.Trained) -> None:
-    """Set the results on the learner, then raise the KeyboardInterrupt of a Ctrl-C during the fit."""
+def keep(learner: Any, trained: _rules.Trained, *, before: int) -> None:
+    """Set the results on the learner, of which `before` are of the time before the first epoch; raise a Ctrl-C again."""
     learner.weights_, learner.right_ = trained.weights, trained.right
     learner.best_epoch_, learner.status_ = trained.best_epoch, trained.ended
-    learner.epochs_ = max(len(trained.right) - learner._LOOKS_BEFORE_THE_FIRST, 0)
+    learner.epochs_ = max(len(trained.right) - before, 0)
     if trained.raised is not None:
         raise trained.raised

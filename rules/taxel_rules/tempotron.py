@@ -94,7 +94,6 @@ class Tempotron(Learner):
     epochs_: int = field(init=False)
     best_epoch_: int = field(init=False)
     status_: Status = field(init=False)
-    _LOOKS_BEFORE_THE_FIRST = 0
 
     def fit(
         self,
@@ -130,7 +129,8 @@ class Tempotron(Learner):
         trains = [pattern._parts() for pattern in patterns_of(patterns)]
         truth = _labels(labels)
         first = None if start is None else floats("start", start)
-        keep(self, _rules.fit_tempotron(self._json(), trains, truth, first, optional(callback, "progress", progress)))
+        trained = _rules.fit_tempotron(self._json(), trains, truth, first, optional(callback, "progress", progress))
+        keep(self, trained, before=0)
         return self
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.bool_]:

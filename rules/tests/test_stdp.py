@@ -150,3 +150,28 @@ def test_an_hour_of_silence_and_spikes_next_to_each_other_are_heard():
     stdp = STDP(threshold=4.0).fit([SpikeTrains.from_lists(close, start=0.0, stop=3_700_000.0)])
     assert len(stdp.spikes_) == 2
     assert stdp.spikes_[1] > 3_600_000
+
+
+@pytest.mark.parametrize(("threshold", "fires"), [(1 - 1e-6, True), (1 + 1e-6, False)])
+def test_one_input_adds_its_weight_at_most(threshold, fires):
+    neuron = STDP(threshold=threshold, initial=1.0).fit([SpikeTrains.from_lists([[5.0]], stop=200.0)])
+    assert len(neuron.spikes_) == fires
+
+
+@pytest.mark.parametrize(("threshold", "fires"), [(4.74, True), (4.76, False)])
+def test_it_fires_between_inputs_where_the_potential_peaks_above_the_threshold(threshold, fires):
+    """Ten inputs at once: a peak of 10 x 0.475 = 4.75, ln(tau_m / tau_s) tau_m tau_s / (tau_m - tau_s) later."""
+    neuron = STDP(threshold=threshold).fit([SpikeTrains.from_lists([[5.0]] * 10, stop=200.0)])
+    assert len(neuron.spikes_) == fires
+    if fires:
+        after = neuron.spikes_[0] - 5.0
+        assert 4.3 < after <= 4.621
+        gained = 0.475 + neuron.a_plus * np.exp(-after / neuron.tau_plus)
+        assert neuron.weights_ == pytest.approx(np.full(10, gained), abs=1e-12)
+
+
+def test_the_first_input_after_a_spike_loses_and_the_next_does_not():
+    neuron = STDP(threshold=4.0).fit([SpikeTrains.from_lists([[5.0]] * 10 + [[20.0, 30.0]], stop=200.0)])
+    assert len(neuron.spikes_) == 1
+    lost = 0.475 - neuron.a_minus * np.exp((neuron.spikes_[0] - 20.0) / neuron.tau_minus)
+    assert neuron.weights_[10] == pytest.approx(lost, abs=1e-12)

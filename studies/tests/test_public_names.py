@@ -21,8 +21,7 @@ BESIDE = ("studies", "benchmarks", "viewers", "bridge", "rules")
 FILES = sorted(file for folder in BESIDE for file in (ROOT / folder / f"taxel_{folder}").rglob("*.py"))
 
 
-#: What the rules take beside public names: what makes learners of one kind, and trains for their compiled part. They are
-#: of one version with taxel, as their compiled part is.
+#: Private modules that the rules, which are of one version with taxel, need too: those that make learners of one kind.
 OF_LEARNERS = {
     "taxel._base.arguments",
     "taxel._base.errors",
@@ -65,7 +64,7 @@ def test_a_distribution_takes_public_names_of_taxel_alone(file: Path) -> None:
                 if alias.name.startswith("taxel.") and "._" in alias.name
             ]
         elif isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
-            own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls", "other")
+            own = ast.unparse(node.value) in ("self", "cls", "other", "super()")
             # A named tuple's own methods have such names, and how a process ends at once.
             named = node.attr in ("_replace", "_asdict", "_fields", "_make") or ast.unparse(node) == "os._exit"
             named |= file.parent.name == "taxel_rules" and node.attr == "_parts"

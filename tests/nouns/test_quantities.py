@@ -78,7 +78,7 @@ NEURON = taxel.Neuron(tau=5.0)
 
 def taught(targets: Any) -> list[float]:
     cone = taxel.learn.ConeR(neuron=taxel.Neuron(tau=9.0, refractory=0.5), lb=-9.0, ub=9.0)
-    return cone.fit([TRAINS], [targets]).weights_.tolist()
+    return cone.fit([TRAINS], [targets]).weights_.round(6).tolist()
 
 
 #: Each function that takes times: a call, and its times, in us.

@@ -51,7 +51,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> ConeRReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).classes_.tolist()
+        >>> ConeRReadout(tau=3.0, bound=3.0).fit(patterns, ["a", "b"] * 2).classes_.tolist()
         ['a', 'b']
         """
         trains = _listed(self, patterns)
@@ -95,7 +95,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> ConeRReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).predict(patterns).tolist()
+        >>> ConeRReadout(tau=3.0, bound=3.0).fit(patterns, ["a", "b"] * 2).predict(patterns).tolist()
         ['a', 'b', 'a', 'b']
         """
         best = self.decision_function(patterns).argmax(1)
@@ -116,7 +116,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> ConeRReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
+        >>> ConeRReadout(tau=3.0, bound=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
         1.0
         """
         found, labels = self.predict(patterns), words("y", y)
