@@ -145,7 +145,7 @@ class EpochLearner(SpikeLearner):
 
 
 def keep(learner: Any, trained: _rules.Trained, *, before: int) -> None:
-    """Set the results on the learner, of which `before` are of the time before the first epoch; raise a Ctrl-C again."""
+    """Set the results on the learner, of which `before` precede the first epoch; raise a Ctrl-C again."""
     learner.weights_, learner.right_ = trained.weights, trained.right
     learner.best_epoch_, learner.status_ = trained.best_epoch, trained.ended
     learner.epochs_ = max(len(trained.right) - before, 0)
