@@ -11,6 +11,7 @@ import warnings
 import numpy as np
 import pytest
 import stated
+from draws import mixed
 from making import lists, made
 from refusal import refused
 from simulator import kernel
@@ -187,8 +188,7 @@ OPTIONS = [
 ]
 
 
-@pytest.mark.parametrize("options", OPTIONS, ids=lambda o: ",".join(f"{k}={v}" for k, v in o.items()) or "printed")
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("options", "seed"), mixed(OPTIONS, [1, 2, 3]))
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_the_objective_is_that_of_every_row_handed_whole_to_a_solver(options, seed):
     patterns, targets = examples(seed, whole_ms=seed == 2)
