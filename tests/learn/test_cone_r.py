@@ -454,7 +454,7 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
     assert cone.status_ == "stopped"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        ever = long_rows.fit(made(ConeR, **LONG | {"tolerance": 1e-3}))
+        ever = long_rows.fit(made(ConeR, **LONG | {"tolerance": 3e-2}))
     assert cone.objective_ * (1 - cone.gap_) <= ever.objective_
 
 
