@@ -126,7 +126,7 @@ def write(path: Path, came: list[bytes], draw: np.random.Generator, told: Told, 
         writer.finish(counts(len(came)))
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(40, quick=15))
 def test_the_numbers_of_a_verdict_are_the_losses(seed: int, tmp_path: Path) -> None:
     draw, told, path = np.random.default_rng(seed), Told(), tmp_path / "a.mcap"
     finish = bool(draw.random() < 0.6)

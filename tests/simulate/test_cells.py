@@ -143,7 +143,9 @@ def test_an_edge_between_two_rows_is_felt_as_one_on_a_row():
     assert between > 0.5 * on
 
 
-@pytest.mark.parametrize("motion", ["dropped", "pressed", "rolled", "slid"])
+@pytest.mark.parametrize(
+    "motion", ["dropped", "slid", *(pytest.param(one, marks=pytest.mark.slow) for one in ("pressed", "rolled"))]
+)
 def test_wide_bodies_of_every_kind_do_on_finer_cells_what_they_do_on_taxels(motion):
     how = {
         "dropped": {"height_mm": 80.0, "ending": {"left_to_rest": {"rest_ms": 200.0, "lift_mm_s": 100.0}}},
