@@ -30,7 +30,6 @@ class StatedOptions:
         None,
         "Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.",
         commands="live record",
-        flag="--from",
         metavar="ADDRESS",
     )
     array: Array | None = option(

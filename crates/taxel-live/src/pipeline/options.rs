@@ -48,7 +48,7 @@ options! {
         /// Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.
         ///
         /// Stop the `Live` before it.
-        remote: Option<String> = None, "commands" = "live record", "flag" = "--from", "metavar" = "ADDRESS",
+        remote: Option<String> = None, "commands" = "live record", "metavar" = "ADDRESS",
             "python" = "RemoteBoard | None";
         /// Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
