@@ -115,10 +115,15 @@ def modules() -> list[Any]:
 
 @functools.cache
 def public() -> dict[str, Any]:
+    """Every public callable of taxel."""
+    return public_of(modules(), SOUND)
+
+
+def public_of(rooms: list[Any], tried: dict[str, Any]) -> dict[str, Any]:
     """Every public callable once, by its shortest name: functions, classes, methods of these and of private bases."""
     names: dict[int, str] = {}
     found: dict[str, Any] = {}
-    for module in modules():
+    for module in rooms:
         for name in getattr(module, "__all__", ()):
             value = getattr(module, name)
             if not callable(value) or id(value) in names:
@@ -134,12 +139,12 @@ def public() -> dict[str, Any]:
                 ]
                 members = {part: member for base in own for part, member in vars(base).items()}
                 if issubclass(value, SpikeLearner):  # what all learners share is tried with some of them
-                    members |= {part: one for part, one in vars(SpikeLearner).items() if f"{full}.{part}" in SOUND}
+                    members |= {part: one for part, one in vars(SpikeLearner).items() if f"{full}.{part}" in tried}
                 for part, member in members.items():
                     held = member.__func__ if isinstance(member, classmethod | staticmethod) else member
                     if not part.startswith("_") and part != "plot" and inspect.isfunction(held):
                         found[f"{full}.{part}"] = held
-    return {name: value for name, value in found.items() if takes(value) or name in SOUND}
+    return {name: value for name, value in found.items() if takes(value) or name in tried}
 
 
 def takes(value: Any) -> set[str]:

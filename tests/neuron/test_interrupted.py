@@ -12,7 +12,6 @@ CHILD = """
 import json, signal, sys, time
 import numpy as np
 from taxel import Neuron, SpikeTrains
-from taxel.learn import STDP
 
 trains, spikes = 100, 200_000
 # Every train has a spike in each stretch of 10 ms: sorting them by time is much of the work.
@@ -26,7 +25,6 @@ calls = {
     "run_many": lambda: Neuron().run_many(np.full((64, trains), 1e-3), given),
     "run_many on a grid": lambda: Neuron(time="grid").run_many(np.full((64, trains), 1e-3), given),
     "potential": lambda: Neuron().potential(weights, given, times),
-    "partial_fit": lambda: STDP().partial_fit(given),
 }
 signal.signal(signal.SIGVTALRM, lambda *_: signal.raise_signal(signal.SIGINT))
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -41,7 +39,7 @@ for name in sys.argv[2:]:
     signal.setitimer(signal.ITIMER_VIRTUAL, 0)
 print(json.dumps(late))
 """
-CALLS = ["run", "run on a grid", "run_many", "run_many on a grid", "potential", "partial_fit"]
+CALLS = ["run", "run on a grid", "run_many", "run_many on a grid", "potential"]
 
 
 @pytest.mark.parametrize("after", ["0.3", pytest.param("0.6", marks=pytest.mark.slow)])

@@ -10,8 +10,8 @@ use taxel_live::capture::{self, Receiver, ReceiverOptions};
 use taxel_live::host_clock::RoundTrip;
 use taxel_live::pipeline::{Copied, Copies as PipelineCopies};
 
-use crate::enter::{Shared, enter};
-use crate::errors::ProblemError;
+use taxel_border::enter::{Shared, enter};
+use taxel_border::errors::ProblemError;
 
 /// The entrance for parcels of another computer.
 #[pyclass(frozen)]

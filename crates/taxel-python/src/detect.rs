@@ -9,10 +9,10 @@ use taxel_core::detect::{
 use taxel_core::encode::{Quantity, Tare, Zeroing};
 use taxel_core::spikes::us;
 
-use crate::convert::{ArrayParts, Column, EventsIn, FramesIn, array, column, slice, to_array};
-use crate::enter::{Shared, enter};
-use crate::errors::{ProblemError, core};
-use crate::parameters::{Plain, parsed};
+use taxel_border::convert::{ArrayParts, Column, EventsIn, FramesIn, array, column, slice, to_array};
+use taxel_border::enter::{Shared, enter};
+use taxel_border::errors::{ProblemError, core};
+use taxel_border::parameters::{Plain, parsed};
 
 /// Detections as Python hands them over: labels, t and known in us, slope in mV/ms, repaired.
 pub(crate) type DetectionsIn<'py> = (

@@ -6,9 +6,9 @@ use taxel_core::encode::{Encoder, LocalLoad, Pieces, Skin, Tare};
 
 use taxel_core::problem;
 
-use crate::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spikes, to_array};
-use crate::enter::{Shared, enter};
-use crate::errors::core;
+use taxel_border::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spikes, to_array};
+use taxel_border::enter::{Shared, enter};
+use taxel_border::errors::core;
 
 /// Types, x and y of a skin's afferents.
 type SkinAfferents = (Vec<&'static str>, Vec<f64>, Vec<f64>);

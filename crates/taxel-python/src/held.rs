@@ -9,9 +9,9 @@ use taxel_core::touch_counts::{BIN_US, TouchCounts};
 use taxel_core::tracked_rest::TrackedRest;
 use taxel_core::{Error, problem};
 
-use crate::convert::{ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array};
-use crate::enter::{Shared, enter};
-use crate::errors::core;
+use taxel_border::convert::{ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array};
+use taxel_border::enter::{Shared, enter};
+use taxel_border::errors::core;
 
 /// What chosen taxels of a recording hold at any time; without values, each event is a step of 1 up or down.
 #[pyclass(frozen, module = "taxel._core")]

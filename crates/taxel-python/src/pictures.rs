@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 use taxel_core::Error;
 use taxel_live::recording::EventPictures;
 
-use crate::convert::{EventsIn, array, slice};
-use crate::enter::{Shared, enter};
+use taxel_border::convert::{EventsIn, array, slice};
+use taxel_border::enter::{Shared, enter};
 
 /// The pictures that a recording of events gets, one by one.
 #[pyclass(frozen, module = "taxel._core")]

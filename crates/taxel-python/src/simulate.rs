@@ -19,10 +19,10 @@ use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Feed, Replay, Report, Scenes, Touch};
 
-use crate::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
-use crate::enter::{Shared, enter, enter_with_progress};
-use crate::errors::core;
-use crate::parameters::{Plain, parsed};
+use taxel_border::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
+use taxel_border::enter::{Shared, enter, enter_with_progress};
+use taxel_border::errors::core;
+use taxel_border::parameters::{Plain, parsed};
 
 /// An act as Python passes it: silence in ms, a scene as JSON, or a sequence of frames with its period in us.
 #[derive(FromPyObject)]

@@ -13,12 +13,12 @@ use taxel_core::wire::v2::{self, Outcome};
 use taxel_core::wire::{self, Command, Cut, Decoder, Pairing, Registers};
 use taxel_core::{Error, Events, problem};
 
-use crate::convert::{
+use taxel_border::convert::{
     ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_events, from_filled, slice, to_array, to_room,
 };
-use crate::enter::{Shared, enter};
-use crate::errors::core;
-use crate::parameters::{Plain, parsed};
+use taxel_border::enter::{Shared, enter};
+use taxel_border::errors::core;
+use taxel_border::parameters::{Plain, parsed};
 
 /// A decoder of either version, and what the last datagram of version 2 was.
 enum Either {
@@ -177,9 +177,9 @@ pub fn command_bytes(py: Python<'_>, register: u8, value: u32) -> PyResult<Bound
 #[pyfunction]
 pub fn command_read(data: PyReadonlyArray1<'_, u8>) -> PyResult<(u8, u32)> {
     let data = slice("data", &data)?;
-    let bytes = data
-        .try_into()
-        .map_err(|_| crate::errors::FormatError::new_err(format!("command of {} bytes: must be 5", data.len())))?;
+    let bytes = data.try_into().map_err(|_| {
+        taxel_border::errors::FormatError::new_err(format!("command of {} bytes: must be 5", data.len()))
+    })?;
     let command = Command::from_bytes(bytes).map_err(core)?;
     Ok((command.register, command.value))
 }

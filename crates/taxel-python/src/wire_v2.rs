@@ -6,10 +6,10 @@ use pyo3::types::PyBytes;
 use taxel_core::Error;
 use taxel_core::wire::v2::{self, StreamReader};
 
-use crate::convert::{
+use taxel_border::convert::{
     ArrayParts, Column, ColumnsIn, EventsIn, FilledOut, column, from_filled, slice, to_array, to_room,
 };
-use crate::enter::{Shared, enter};
+use taxel_border::enter::{Shared, enter};
 
 /// Decodes a whole stream of datagrams, each behind its length, into columns.
 #[pyfunction]

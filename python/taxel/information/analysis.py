@@ -32,7 +32,7 @@ from taxel.spikes import to_ms
 __all__ = ["CLASSIFIERS", "answer"]
 
 #: Classifiers that `answer` can also run at the reference setting, beside the discriminants of every setting.
-CLASSIFIERS = ("neighbours", "cone_r", "tempotron")
+CLASSIFIERS = ("neighbours", "cone_r")
 #: Numbers of neighbours that are tried.
 NEIGHBOURS = (1, 3, 5, 9, 15)
 #: Frames are compared with events only where they have at most so many values.
@@ -81,7 +81,7 @@ def answer(
     folds : int, 2 or more
     shuffles : int, 1 or more
         Of the test against zero.
-    classifiers : sequence of {"neighbours", "cone_r", "tempotron"}
+    classifiers : sequence of {"neighbours", "cone_r"}
         Beside the discriminants, at the full setting.
     seed : int, 0 or more
     progress : function of (what, done, all), optional
@@ -259,7 +259,7 @@ class _Answering(Question):
         self.pace.begin(name, self.work.classifier(name))
         if name == "neighbours":
             return self.estimate(self.nested(matrices, neighbours=NEIGHBOURS).responses)
-        return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, self.split(self.labels).fold))
+        return self.estimate(readout_responses(spikes, self.window_us, self.labels, self.split(self.labels).fold))
 
     def _columns_answered(
         self, by_column: dict[tuple[str, int], list[Any]], about: dict[Any, Any], everything: int

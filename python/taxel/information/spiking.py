@@ -10,17 +10,17 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import instance, number, several, shown, text
+from taxel._base.arguments import instance, number, several, shown
 from taxel._base.errors import refused
 from taxel._base.parameters import Parameters
 from taxel._core import NotFittedError
 from taxel.information._labels import labelled, words
 from taxel.information.sampling import Spikes
-from taxel.learn import ConeR, Tempotron
+from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
+__all__ = ["ConeRReadout", "patterns_of", "readout_responses"]
 
 
 class _NeuronPerClass(Parameters, ABC):
@@ -51,7 +51,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).classes_.tolist()
+        >>> ConeRReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).classes_.tolist()
         ['a', 'b']
         """
         trains = _listed(self, patterns)
@@ -95,7 +95,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).predict(patterns).tolist()
+        >>> ConeRReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).predict(patterns).tolist()
         ['a', 'b', 'a', 'b']
         """
         best = self.decision_function(patterns).argmax(1)
@@ -116,7 +116,7 @@ class _NeuronPerClass(Parameters, ABC):
         Examples
         --------
         >>> patterns = [SpikeTrains.from_lists([[t], [9.0 - t]], stop=9.0) for t in (1.0, 8.0, 2.0, 7.0)]
-        >>> TempotronReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
+        >>> ConeRReadout(tau=3.0).fit(patterns, ["a", "b"] * 2).score(patterns, ["a", "b"] * 2)
         1.0
         """
         found, labels = self.predict(patterns), words("y", y)
@@ -192,53 +192,6 @@ class ConeRReadout(_NeuronPerClass):
         return float(learner.neuron_.potential(learner.weights_, trains, [trains.stop])[0])
 
 
-class TempotronReadout(_NeuronPerClass):
-    """Classify by a `Tempotron` a class, taught to fire on its own class and on no other.
-
-    Parameters
-    ----------
-    tau : float, ms, above 0
-    epochs : int, 1 or more
-    max_seconds : float, above 0
-        Of training a neuron.
-    seed : int, 0 or more
-
-    Attributes
-    ----------
-    classes_ : shape (classes,)
-    learners_ : list of Tempotron
-
-    Raises
-    ------
-    ProblemError : a parameter that is invalid
-
-    Notes
-    -----
-    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is predicted.
-    """
-
-    learners_: list[Tempotron]
-
-    def __init__(self, *, tau: float = 15.0, epochs: int = 100, max_seconds: float = 10.0, seed: int = 0) -> None:
-        self.tau = tau
-        self.epochs = epochs
-        self.max_seconds = max_seconds
-        self.seed = seed
-        super().__init__()
-
-    def _check(self) -> None:
-        self._learner()
-
-    def _learner(self) -> Tempotron:
-        return Tempotron(tau=self.tau, epochs=self.epochs, max_seconds=self.max_seconds, seed=self.seed)
-
-    def _trained(self, trains: list[SpikeTrains], is_of_class: NDArray[np.bool_]) -> Tempotron:
-        return self._learner().fit(trains, is_of_class)
-
-    def _potential(self, learner: Tempotron, trains: SpikeTrains) -> float:
-        return learner.peak(learner.weights_, trains)[0]
-
-
 def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
     """Return each trial's events as spike trains, ON and OFF of each taxel that ever sends one.
 
@@ -267,13 +220,12 @@ def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
 
 
 def readout_responses(
-    name: str, spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
+    spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
 ) -> NDArray[np.generic]:
-    """Predict each trial's label by neurons that were trained on the other folds.
+    """Predict each trial's label by a `ConeRReadout` that was trained on the other folds.
 
     Parameters
     ----------
-    name : {"cone_r", "tempotron"}
     spikes : Spikes
     window_us : float, us
     labels : labels, shape (trials,)
@@ -283,15 +235,13 @@ def readout_responses(
     -------
     shape (trials,)
     """
-    text("name", name, ("cone_r", "tempotron"))
     patterns = patterns_of(spikes, window_us)
     responses = np.empty_like(labels)
     # With a far shorter constant the potential at the window's end would hold nothing of its beginning.
     tau = max(1.0, to_ms(window_us) / 3)
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
-        model: Any = ConeRReadout(tau=tau) if name == "cone_r" else TempotronReadout(tau=tau)
-        model.fit([patterns[k] for k in train], labels[train])
+        model = ConeRReadout(tau=tau).fit([patterns[k] for k in train], labels[train])
         responses[test] = model.predict([patterns[k] for k in test])
     return responses
 
