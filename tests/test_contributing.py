@@ -84,7 +84,8 @@ def copy(tmp_path: Path) -> Path:
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
     for shared in (ROOT / "tests").glob("*.py"):
         shutil.copy(shared, tmp_path / "tests")
-    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    for settings in ("pyproject.toml", "conftest.py"):
+        shutil.copy(ROOT / settings, tmp_path)
     # Studies refer to pages of the documentation.
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("_build", "pictures"))
     return tmp_path

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from draws import seeds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -50,7 +51,7 @@ def plainly(e, trains, stop, step=0.002):
     return np.array(spikes), weights
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6, quick=2))
 def test_spikes_and_weights_are_those_of_the_paper_s_sums(seed):
     rng = np.random.default_rng(seed)
     trains = [np.sort(rng.uniform(0, 120, rng.integers(0, 9))) for _ in range(12)]
