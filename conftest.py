@@ -8,6 +8,9 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import is_hypothesis_test, settings
 
+#: Scripts that made kept data: not tests, and they need packages that are not installed.
+collect_ignore = ["rules/tests/data"]
+
 settings.register_profile("slow", deadline=None, derandomize=True)
 settings.register_profile("quick", settings.get_profile("slow"), max_examples=20)
 
