@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.information.spiking import _NeuronPerClass
+from taxel.information.spiking import NeuronPerClass
 from taxel.spikes import SpikeTrains
 from taxel_rules.tempotron import Tempotron
 
 
-class TempotronReadout(_NeuronPerClass):
+class TempotronReadout(NeuronPerClass):
     """Classify by a `Tempotron` a class, taught to fire on its own class and on no other.
 
     Parameters

@@ -55,7 +55,7 @@ class Work:
         return 4 * self.estimate() + self.rasters(finest) + 2 * self.prediction(finest)
 
     def classifier(self, name: str) -> float:
-        """Return the time of a further classifier: "neighbours" or "cone_r"."""
+        """Return the time of a further classifier: "neighbours", or neurons."""
         if name == "neighbours":
             return 4 * self._predicted(5)
         return 6e-3 * self._question.events * len(np.unique(self._question.labels)) * self._question.folds

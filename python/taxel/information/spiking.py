@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from importlib.metadata import entry_points
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import instance, number, several, shown
+from taxel._base.arguments import instance, number, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.parameters import Parameters
 from taxel._core import NotFittedError
@@ -20,10 +21,10 @@ from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["ConeRReadout", "patterns_of", "readout_responses"]
+__all__ = ["ConeRReadout", "NeuronPerClass", "patterns_of", "readout_names", "readout_responses"]
 
 
-class _NeuronPerClass(Parameters, ABC):
+class NeuronPerClass(Parameters, ABC):
     """Classify by one neuron per class: the class of the highest potential is predicted.
 
     scikit-learn's `clone` and `cross_val_score` accept it; Python checks the parameters.
@@ -143,7 +144,7 @@ class _NeuronPerClass(Parameters, ABC):
         """Return the potential that is compared between classes, mV."""
 
 
-class ConeRReadout(_NeuronPerClass):
+class ConeRReadout(NeuronPerClass):
     """Classify by a neuron a class, which `ConeR` teaches to fire at the window's end on its own class and never else.
 
     Parameters
@@ -219,13 +220,23 @@ def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
     return patterns
 
 
+def readout_names() -> tuple[str, ...]:
+    """Return the names of classifiers of spikes: "cone_r" and the entry points of the group ``taxel.classifiers``.
+
+    Such an entry point names a `NeuronPerClass` whose time constant is the argument `tau`, ms.
+    """
+    return ("cone_r", *sorted(entry_points(group="taxel.classifiers").names))
+
+
 def readout_responses(
-    spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
+    name: str, spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
 ) -> NDArray[np.generic]:
-    """Predict each trial's label by a `ConeRReadout` that was trained on the other folds.
+    """Predict each trial's label by neurons that were trained on the other folds.
 
     Parameters
     ----------
+    name : str
+        One of `readout_names`.
     spikes : Spikes
     window_us : float, us
     labels : labels, shape (trials,)
@@ -235,13 +246,15 @@ def readout_responses(
     -------
     shape (trials,)
     """
+    text("name", name, readout_names())
+    kind = ConeRReadout if name == "cone_r" else entry_points(group="taxel.classifiers")[name].load()
     patterns = patterns_of(spikes, window_us)
     responses = np.empty_like(labels)
     # With a far shorter constant the potential at the window's end would hold nothing of its beginning.
     tau = max(1.0, to_ms(window_us) / 3)
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
-        model = ConeRReadout(tau=tau).fit([patterns[k] for k in train], labels[train])
+        model = kind(tau=tau).fit([patterns[k] for k in train], labels[train])
         responses[test] = model.predict([patterns[k] for k in test])
     return responses
 
