@@ -26,6 +26,7 @@ from sound.things import EVENTS, FOUND, TARE, TICKS, TRAINS
 import taxel
 from taxel import _core
 from taxel._base.saved import Saved
+from taxel.information.spiking import NeuronPerClass
 from taxel.learn._learner import SpikeLearner
 
 mpl.use("Agg")
@@ -135,7 +136,7 @@ def public_of(rooms: list[Any], tried: dict[str, Any]) -> dict[str, Any]:
                 own = [
                     base
                     for base in reversed(value.__mro__)
-                    if base is value or base.__name__.startswith("_") or base is Saved
+                    if base is value or base.__name__.startswith("_") or base in (Saved, NeuronPerClass)
                 ]
                 members = {part: member for base in own for part, member in vars(base).items()}
                 if issubclass(value, SpikeLearner):  # what all learners share is tried with some of them

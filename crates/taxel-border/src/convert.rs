@@ -67,7 +67,7 @@ pub fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T
 /// An array that is an attribute of a result.
 pub type Column<T> = Py<PyArray1<T>>;
 
-/// As [`array`], for an attribute of a result.
+/// As [`array()`], for an attribute of a result.
 pub fn column<T: Element>(py: Python<'_>, values: Vec<T>) -> Column<T> {
     array(py, values).unbind()
 }
