@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
 use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns};
-use taxel_border::enter::{Shared, enter, enter_keeping};
+use taxel_border::enter::{Exclusive, enter, enter_keeping};
 use taxel_border::errors::core;
 use taxel_border::parameters::{Plain, checked, parsed, unknown};
 use taxel_core::parameters::Described;
@@ -224,14 +224,14 @@ pub fn output_skim<'py>(
 
 /// A neuron with spike-timing-dependent plasticity, in one stream of time.
 #[pyclass(frozen, name = "STDP")]
-pub struct Plastic(Shared<StdpNeuron>);
+pub struct Plastic(Exclusive<StdpNeuron>);
 
 #[pymethods]
 impl Plastic {
     #[new]
     fn new(parameters: &str, trains: usize) -> PyResult<Self> {
         let parameters: Stdp = parsed("STDP", parameters)?;
-        Ok(Self(Shared::new(StdpNeuron::new(&parameters, trains).map_err(core)?)))
+        Ok(Self(Exclusive::new(StdpNeuron::new(&parameters, trains).map_err(core)?)))
     }
 
     #[getter]

@@ -88,9 +88,9 @@ impl ProgressCaller<'_> {
 }
 
 /// An object that several Python threads may use: one at a time, and the others wait without the GIL.
-pub struct Shared<T>(Mutex<T>);
+pub struct Exclusive<T>(Mutex<T>);
 
-impl<T: Send> Shared<T> {
+impl<T: Send> Exclusive<T> {
     /// The value, which no thread uses yet.
     pub fn new(value: T) -> Self {
         Self(Mutex::new(value))

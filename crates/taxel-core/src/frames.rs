@@ -37,9 +37,9 @@ impl<'a> FramesView<'a> {
     /// # Errors
     ///
     /// If the caller stops.
-    pub fn changes(self, stop: Stop<'_>) -> Result<Changes> {
+    pub fn changes(self, stop: Stop<'_>) -> Result<ChangeCounts> {
         let taxels = self.array.len();
-        let mut changes = Changes { number: vec![0; taxels], on: vec![0; taxels] };
+        let mut changes = ChangeCounts { number: vec![0; taxels], on: vec![0; taxels] };
         let mut last = vec![0_i8; taxels];
         for ((_, before), (_, frame)) in self.iter().zip(self.iter().skip(1)) {
             stop.check()?;
@@ -57,7 +57,7 @@ impl<'a> FramesView<'a> {
 
 /// The changes of each taxel of frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Changes {
+pub struct ChangeCounts {
     /// Number of changes.
     pub number: Vec<u32>,
     /// Number of those in the direction of the taxel's change before.

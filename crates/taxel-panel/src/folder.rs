@@ -30,7 +30,7 @@ pub(super) struct Listed {
 /// A file, and its trial where it holds several.
 pub(super) type Key = (PathBuf, Option<String>);
 
-/// See the module.
+/// The recordings of a folder, with the keyframe indices of those that were opened.
 pub(super) struct Folder {
     path: PathBuf,
     /// The indices in use, so that a recording is indexed once however many clients show it, with the sizes of the files.

@@ -9,7 +9,7 @@ use taxel_core::problem;
 
 use crate::cone_x::{ProofOut, proof_out};
 use taxel_border::convert::{Column, SpikesIn, column, slice, to_patterns};
-use taxel_border::enter::{Shared, enter, enter_keeping};
+use taxel_border::enter::{Exclusive, enter, enter_keeping};
 use taxel_border::errors::core;
 use taxel_border::parameters::parsed;
 
@@ -113,7 +113,7 @@ impl ConeRProblem {
 /// A sliding window of patterns and its last fit.
 #[pyclass(frozen)]
 pub struct OnlineConeR {
-    window: Shared<core_learn::OnlineConeR>,
+    window: Exclusive<core_learn::OnlineConeR>,
     max_seconds: Option<f64>,
 }
 
@@ -123,7 +123,7 @@ impl OnlineConeR {
     fn new(parameters: &str) -> PyResult<Self> {
         let (parameters, window) = to_online(parameters)?;
         let window = core_learn::OnlineConeR::new(&parameters, window).map_err(core)?;
-        Ok(Self { window: Shared::new(window), max_seconds: parameters.max_seconds })
+        Ok(Self { window: Exclusive::new(window), max_seconds: parameters.max_seconds })
     }
 
     #[getter]

@@ -1,4 +1,4 @@
-//! Shared by rules that learn by epochs: present each pattern, compare the output spikes with the targets, correct.
+//! Exclusive by rules that learn by epochs: present each pattern, compare the output spikes with the targets, correct.
 
 use rand::rngs::StdRng;
 use rand::seq::SliceRandom;
