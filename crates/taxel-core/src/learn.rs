@@ -13,8 +13,10 @@ mod statement;
 mod stdp;
 
 pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, GapMultipliers, Horizon, Shares};
-pub use engines::{DualActiveSet, Multipliers, Outcome, Ray, RowId};
+pub use engines::{DualActiveSet, Multipliers, Ray, RowId, SolveOutcome};
 pub use fit::{Engine, Fit, Left, Round, Status};
 pub use online::OnlineConeR;
-pub use statement::{Bound, Bounds, Certificate, Divisor, DivisorC, DivisorD, Margin, Norm, Parts, Row, Sides, Stated};
+pub use statement::{
+    Bound, Bounds, Certificate, Divisor, DivisorC, DivisorD, Margin, Norm, Parts, Row, Sides, StatedRow,
+};
 pub use stdp::{Stdp, StdpNeuron};

@@ -92,9 +92,9 @@ impl ProgressCaller<'_> {
 }
 
 /// An object that several Python threads may use: one at a time, and the others wait without the GIL.
-pub(crate) struct Shared<T>(Mutex<T>);
+pub(crate) struct Exclusive<T>(Mutex<T>);
 
-impl<T: Send> Shared<T> {
+impl<T: Send> Exclusive<T> {
     pub(crate) fn new(value: T) -> Self {
         Self(Mutex::new(value))
     }

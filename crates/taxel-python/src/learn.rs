@@ -9,7 +9,7 @@ use taxel_core::problem;
 
 use crate::cone_x::{ProofOut, proof_out};
 use crate::convert::{Column, SpikesIn, array, column, slice, to_patterns};
-use crate::enter::{Shared, enter, enter_keeping};
+use crate::enter::{Exclusive, enter, enter_keeping};
 use crate::errors::core;
 use crate::parameters::parsed;
 
@@ -113,7 +113,7 @@ impl ConeRProblem {
 /// A sliding window of patterns and its last fit.
 #[pyclass(frozen)]
 pub struct OnlineConeR {
-    window: Shared<core_learn::OnlineConeR>,
+    window: Exclusive<core_learn::OnlineConeR>,
     max_seconds: Option<f64>,
 }
 
@@ -123,7 +123,7 @@ impl OnlineConeR {
     fn new(parameters: &str) -> PyResult<Self> {
         let (parameters, window) = to_online(parameters)?;
         let window = core_learn::OnlineConeR::new(&parameters, window).map_err(core)?;
-        Ok(Self { window: Shared::new(window), max_seconds: parameters.max_seconds })
+        Ok(Self { window: Exclusive::new(window), max_seconds: parameters.max_seconds })
     }
 
     #[getter]
@@ -157,14 +157,14 @@ impl OnlineConeR {
 
 /// A neuron with spike-timing-dependent plasticity, in one stream of time.
 #[pyclass(frozen, name = "STDP")]
-pub struct Plastic(Shared<StdpNeuron>);
+pub struct Plastic(Exclusive<StdpNeuron>);
 
 #[pymethods]
 impl Plastic {
     #[new]
     fn new(parameters: &str, trains: usize) -> PyResult<Self> {
         let parameters: Stdp = parsed("STDP", parameters)?;
-        Ok(Self(Shared::new(StdpNeuron::new(&parameters, trains).map_err(core)?)))
+        Ok(Self(Exclusive::new(StdpNeuron::new(&parameters, trains).map_err(core)?)))
     }
 
     #[getter]
