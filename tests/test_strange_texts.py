@@ -176,7 +176,7 @@ def live(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
     yield ["live", *to, "--readout", places["other readout"], "--record", out / f"{FILE}.mcap"]
     yield ["live", *to, "--readout", places["labels"]]
     yield ["live", *to, "--send", f"udp:{NAME}", "--readout", places["readout"]]
-    yield ["live", *to, "--from", NAME]
+    yield ["live", *to, "--remote", NAME]
 
 
 def record(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:

@@ -49,7 +49,7 @@ def bridge(
 ) -> None:
     """Publish a board to other computers: its datagrams, ten frames a second, and detections.
 
-    On the other computer, taxel live and taxel record receive the board with --from zenoh:HOST:PORT/NAME. The bridge
+    On the other computer, taxel live and taxel record receive the board with --remote zenoh:HOST:PORT/NAME. The bridge
     listens on loopback unless --listen names another address; what it publishes is neither encrypted nor protected by a
     password. It needs the wheel taxel_zenoh (make bridge). Exit code 3: nothing was received, or something was lost
     here after it had arrived.
@@ -108,7 +108,7 @@ def _announce(place: str, name: str, console: Console) -> None:
         # These stand for all addresses of this computer; other computers need one of them.
         place = f"HOST:{place.rpartition(':')[2]}"
         name += ", HOST being this computer's name or address"
-    console.print(f"receive it with --from zenoh:{place}/{name}", highlight=False)
+    console.print(f"receive it with --remote zenoh:{place}/{name}", highlight=False)
 
 
 def _watch(live: Live, published: Bridge, seconds: float | None, console: Console) -> None:

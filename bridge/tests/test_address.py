@@ -38,7 +38,7 @@ def test_what_is_no_address_is_refused_with_one_that_is(said):
 
 def test_without_the_wheel_one_line_says_how_to_get_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "taxel_zenoh", None)
-    for command in (["live", "--panel", "--from", "zenoh:127.0.0.1/left"], ["bridge", "--port", "0"]):
+    for command in (["live", "--panel", "--remote", "zenoh:127.0.0.1/left"], ["bridge", "--port", "0"]):
         with pytest.raises(SystemExit) as ended:
             main(command)
         assert ended.value.code == 3
@@ -51,7 +51,7 @@ def test_what_only_a_remote_board_takes_is_refused_without_one(capsys):
     with pytest.raises(SystemExit) as ended:
         main(["live", "--panel", "--congestion", "drop"])
     assert ended.value.code == 2
-    assert "give --from ADDRESS" in capsys.readouterr().err
+    assert "give --remote ADDRESS" in capsys.readouterr().err
     with pytest.raises(taxel.ProblemError, match="congestion is 'wait': must be block or drop"):
         Remote("zenoh:127.0.0.1", congestion="wait")
     with (

@@ -190,7 +190,7 @@ def test_three_processes_lose_nothing_and_a_killed_one_comes_back(tmp_path, plac
 def test_a_viewer_that_never_reads_holds_up_nobody(tmp_path, place):
     """A stopped viewer and a killed one: the recorder gets every datagram, and what listens there loses nothing."""
     port = free_port(socket.SOCK_STREAM)
-    viewer = ["live", "--panel", "--from", f"zenoh:{place}", "--seconds", "600"]
+    viewer = ["live", "--panel", "--remote", f"zenoh:{place}", "--seconds", "600"]
     with contextlib.ExitStack() as all_of_it:
         begin = all_of_it.enter_context
         bridge = begin(command("bridge", "--port", str(port), "--host", "127.0.0.1", "--listen", place, "--json"))
@@ -218,7 +218,7 @@ def test_a_viewer_that_never_reads_holds_up_nobody(tmp_path, place):
 def test_what_a_viewer_was_too_slow_for_is_counted_to_the_last_datagram(tmp_path, place):
     with Live(0, host="127.0.0.1") as near:
         published = Bridge(near, listen=place)
-        with command("record", "--from", f"zenoh:{place}", "--json", str(tmp_path / "far.mcap")) as recorder:
+        with command("record", "--remote", f"zenoh:{place}", "--json", str(tmp_path / "far.mcap")) as recorder:
             until(lambda: published.counts["block"]["subscribed"])
             # Stops the recorder for one of three bursts, so that datagrams before and after the loss are recorded.
             for how in (signal.SIGCONT, signal.SIGSTOP, signal.SIGCONT):

@@ -162,7 +162,7 @@ def test_a_cable_that_is_pulled_for_5_s_is_noticed_and_what_was_lost_meanwhile_c
 @pytest.mark.slow
 def test_what_keeps_two_computers_apart_is_said_in_one_line(tmp_path, two):
     near, far = two
-    record = ["record", tmp_path / "no.mcap", "--from"]
+    record = ["record", tmp_path / "no.mcap", "--remote"]
     for computer, line, said in (
         (
             far,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, warn
 from taxel._core import ProblemError
 
-__all__ = ["Array", "Places", "names_beside", "of_size"]
+__all__ = ["Array", "Places", "of_size"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -185,6 +186,32 @@ class Array:
     def _of(cls, array: object) -> Array:
         """Return the given array, or the thesis' array for None."""
         return cls.thesis() if array is None else instance("array", array, cls)
+
+    @classmethod
+    def _beside(cls, arrays: Sequence[Array], gap: int = 0) -> tuple[Array, list[int]]:
+        """Return one array of several from left to right, `gap` empty columns apart, and the first column of each.
+
+        Rows that an array lacks do not exist there.
+        """
+        if len(arrays) == 1:
+            return arrays[0], [0]
+        *lefts, end = accumulate((array.columns + gap for array in arrays), initial=0)
+        shape = max(array.rows for array in arrays), end - gap
+        ats = [np.s_[: array.rows, left : left + array.columns] for array, left in zip(arrays, lefts, strict=True)]
+        exists, names = np.zeros(shape, bool), np.full(shape, "", object)
+        for at, array in zip(ats, arrays, strict=True):
+            exists[at] = array._there()
+            names[at] = "" if array.names is None else np.array(array.names, object).reshape(array.shape)
+        pitches = {array.pitch_mm for array in arrays}
+        beside = cls(
+            *shape,
+            pitches.pop() if len(pitches) == 1 else None,
+            None if exists.all() else exists,
+            " | ".join(dict.fromkeys(array.name for array in arrays)),
+            _places_beside(arrays, ats, shape),
+            names.ravel().tolist() if any(array.names is not None for array in arrays) else None,
+        )
+        return beside, lefts
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -464,15 +491,27 @@ class Array:
         return escaped(f"Array({self.name}: {size}, {self._apart()})")
 
 
-def names_beside(arrays: Sequence[Array], lefts: Sequence[int], shape: tuple[int, int]) -> list[str] | None:
-    """Return the names of the taxels of arrays side by side, each from its first column on; None if none has any."""
-    if all(array.names is None for array in arrays):
+def _places_beside(
+    arrays: Sequence[Array], ats: Sequence[tuple[slice, slice]], shape: tuple[int, int]
+) -> Places | None:
+    """Return the places of arrays side by side; None unless all have them in one unit.
+
+    Arrays that stand apart from left to right keep their places, as those of two feet in one system of coordinates;
+    others are set half a width apart.
+    """
+    every = [array.places for array in arrays]
+    places = [of_one for of_one in every if of_one is not None]
+    if len(places) < len(arrays) or len({of_one.unit for of_one in places}) > 1:
         return None
-    names = np.full(shape, "", object)
-    for array, left in zip(arrays, lefts, strict=False):
-        if array.names is not None:
-            names[: array.rows, left : left + array.columns] = np.array(array.names, object).reshape(array.shape)
-    return [str(name) for name in names.ravel()]
+    across = [of_one.x[array._there()] for array, of_one in zip(arrays, places, strict=True)]
+    apart = all(a.max() < b.min() for a, b in pairwise(across))
+    x, y, area, right = np.zeros(shape), np.zeros(shape), np.ones(shape), 0.0
+    for at, of_one, own in zip(ats, places, across, strict=True):
+        x[at], y[at] = of_one.x if apart else of_one.x - own.min() + right, of_one.y
+        right += 1.5 * (own.max() - own.min())
+        area[at] = 1.0 if of_one.area is None else of_one.area
+    known = all(of_one.area is not None for of_one in places)
+    return Places(x, y, area if known else None, places[0].unit)
 
 
 def _pitch(pitch: object) -> float | tuple[float, float]:

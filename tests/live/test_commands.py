@@ -73,7 +73,7 @@ def test_taxel_record_keeps_the_registers_of_a_sensor_of_ones_own(tmp_path: Path
     [
         ([], "--rate-hz and --bits belong together"),
         (["--rate-hz", "500", "--preset", "2 kHz"], "--rate-hz and --preset"),
-        (["--rate-hz", "500", "--from", "zenoh:127.0.0.1:7447/left"], "--rate-hz and --from"),
+        (["--rate-hz", "500", "--remote", "zenoh:127.0.0.1:7447/left"], "--rate-hz and --remote"),
     ],
 )
 def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(
@@ -106,9 +106,13 @@ def test_taxel_record_says_how_much_a_board_of_version_2_sent(tmp_path: Path) ->
         report = emulate(f"{LOOPBACK}:{port}", [Scene.draw(seed=3)], seed=1, tare_ms=20.0, wire=2)
         said, _ = process.communicate(timeout=60)
     counted, verdict = said.splitlines()
-    assert f"{report.datagrams} datagrams, {report.bytes} bytes, " in counted
-    assert counted.endswith(" 2 markers")
-    assert verdict == "nothing lost"
+    kept = taxel.open(tmp_path / "two.mcap").datagrams()
+    assert f"{len(kept)} datagrams, {kept.payload.size} bytes, " in counted
+    # The system drops datagrams of a recorder that a busy machine keeps waiting; then the verdict says so.
+    assert (verdict == "nothing lost") == (len(kept) == report.datagrams)
+    if verdict == "nothing lost":
+        assert kept.payload.size == report.bytes
+        assert counted.endswith(" 2 markers")
 
 
 def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:

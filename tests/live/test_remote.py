@@ -66,7 +66,7 @@ def test_an_address_that_nothing_receives_is_refused_in_one_line(
     address: str, code: int, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
-        main(["live", "--panel", "--from", address])
+        main(["live", "--panel", "--remote", address])
     assert ended.value.code == code
     printed = capsys.readouterr().err
     assert printed.count("\n") == 1

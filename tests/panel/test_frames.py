@@ -15,7 +15,6 @@ import taxel
 from taxel import Array, Frames, Places
 from taxel.live import Panel
 from taxel.live import _shown_files as shown_files
-from taxel.live._shown_files import side_by_side
 from taxel.recording.contents import Contents, source_from
 from taxel.recording.pressure import above_rest, force_n
 from taxel.recording.rest import ticks_by_unit
@@ -477,9 +476,9 @@ def test_feet_in_one_system_of_coordinates_keep_their_places_and_others_stand_ap
     def foot(xs):
         return Array(1, len(xs), places=Places(xs, [0.0] * len(xs)))
 
-    both, lefts = side_by_side([foot([-700.0, -300.0]), foot([300.0, 700.0])])
+    both, lefts = Array._beside([foot([-700.0, -300.0]), foot([300.0, 700.0])], gap=1)
     assert (lefts, both.places.x.ravel()[[0, 1, 3, 4]].tolist()) == ([0, 3], [-700, -300, 300, 700])
-    both, _ = side_by_side([foot([0.0, 400.0]), foot([0.0, 400.0])])
+    both, _ = Array._beside([foot([0.0, 400.0]), foot([0.0, 400.0])], gap=1)
     assert both.places.x.ravel()[[0, 1, 3, 4]].tolist() == [0, 400, 600, 1000]
 
 

@@ -189,6 +189,8 @@ impl ParameterNumbers for Vec<f64> {
 
 /// Defines a type's table `RANGES`, and `check_ranges`, which reads it. A name in parentheses after a parameter is the
 /// method that returns its value if the parameter is left out.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! ranges {
     ($($name:ident $(($method:ident))?: $unit:literal, $range:expr;)*) => {
         /// The valid values of its parameters.
@@ -207,7 +209,7 @@ macro_rules! ranges {
     (@ $self:ident $name:ident) => { $self.$name };
     (@ $self:ident $name:ident $method:ident) => { $self.$method() };
 }
-pub(crate) use ranges;
+pub use ranges;
 
 /// Refuses a value that is not above 0 and finite; `unit` may be empty.
 ///

@@ -10,8 +10,8 @@ use taxel_live::capture::{self, Receiver, ReceiverOptions};
 use taxel_live::host_clock::RoundTrip;
 use taxel_live::pipeline::{Copied, Copies as PipelineCopies};
 
-use crate::enter::{Exclusive, enter};
-use crate::errors::ProblemError;
+use taxel_border::enter::{Shared, enter};
+use taxel_border::errors::ProblemError;
 
 /// The entrance for parcels of another computer.
 #[pyclass(frozen)]
@@ -66,11 +66,11 @@ impl Feed {
 
 /// The receiving end of a pipeline's copies.
 #[pyclass(frozen)]
-pub struct Copies(Exclusive<PipelineCopies>);
+pub struct Copies(Shared<PipelineCopies>);
 
 impl Copies {
     pub(crate) fn new(copies: PipelineCopies) -> Self {
-        Self(Exclusive::new(copies))
+        Self(Shared::new(copies))
     }
 }
 

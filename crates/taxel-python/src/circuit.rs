@@ -5,9 +5,9 @@ use pyo3::prelude::*;
 use taxel_core::circuit::{Adaptive, Converter, ConverterScan, Divider, Fabric, VirtualGround};
 use taxel_core::{Result, Stop};
 
-use crate::convert::{Column, array, column, slice};
-use crate::enter::enter;
-use crate::parameters::parsed;
+use taxel_border::convert::{Column, array, column, slice};
+use taxel_border::enter::enter;
+use taxel_border::parameters::parsed;
 
 type Values<'py> = Bound<'py, PyArray1<f64>>;
 

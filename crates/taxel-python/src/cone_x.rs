@@ -7,10 +7,10 @@ use taxel_core::learn::{
 };
 use taxel_core::problem;
 
-use crate::convert::{Column, SpikesIn, array, column, slice, to_patterns};
-use crate::enter::{enter, enter_keeping};
-use crate::errors::core;
-use crate::parameters::parsed;
+use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns};
+use taxel_border::enter::{enter, enter_keeping};
+use taxel_border::errors::core;
+use taxel_border::parameters::parsed;
 
 fn to_cone_x(json: &str) -> PyResult<ConeX> {
     let parameters: ConeX = parsed("ConeX", json)?;

@@ -19,12 +19,12 @@ use taxel_live::pipeline::{
 use taxel_live::ports;
 
 use crate::bridge::{Copies, Feed};
-use crate::convert::array;
-use crate::enter::enter;
-use crate::errors::{ProblemError, core, live};
-use crate::parameters::{Plain, parsed};
 use crate::thread_state;
 use crate::threaded::Threaded;
+use taxel_border::convert::array;
+use taxel_border::enter::enter;
+use taxel_border::errors::{ProblemError, core, live};
+use taxel_border::parameters::{Plain, parsed};
 
 /// A detection, by name: `reported` is the time of its report in us of the board's clock, `reported_ns` in ns of the host's.
 #[derive(IntoPyObject)]

@@ -9,9 +9,9 @@ use taxel_core::metrics::{Metric, NAMES, Patterns, Work};
 use taxel_core::problem;
 use taxel_core::vectors::Instructions;
 
-use crate::convert::{array, slice};
-use crate::enter::{enter, enter_with_progress};
-use crate::errors::core;
+use taxel_border::convert::{array, slice};
+use taxel_border::enter::{enter, enter_with_progress};
+use taxel_border::errors::core;
 
 /// Patterns as Python hands them over: name, count, trains, times, offsets, window, listed.
 type PatternsIn<'py> =

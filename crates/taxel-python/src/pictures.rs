@@ -5,12 +5,12 @@ use pyo3::prelude::*;
 use taxel_core::Error;
 use taxel_live::recording::EventPreviews;
 
-use crate::convert::{EventsIn, array, slice};
-use crate::enter::{Exclusive, enter};
+use taxel_border::convert::{EventsIn, array, slice};
+use taxel_border::enter::{Shared, enter};
 
 /// The pictures that a recording of events gets, one by one.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct RecordingPictures(Exclusive<EventPreviews>);
+pub struct RecordingPictures(Shared<EventPreviews>);
 
 /// Time, us, and ticks by taxel index.
 type PictureOut<'py> = (i64, Bound<'py, PyArray1<u16>>);
@@ -22,7 +22,7 @@ impl RecordingPictures {
     fn new(py: Python<'_>, events: EventsIn<'_>, around: PyReadonlyArray1<'_, i64>) -> PyResult<Self> {
         let around = slice("around", &around)?;
         let events = events.view()?;
-        Ok(Self(Exclusive::new(enter(py, |_| EventPreviews::new(events, around))?)))
+        Ok(Self(Shared::new(enter(py, |_| EventPreviews::new(events, around))?)))
     }
 
     fn __iter__(slf: Py<Self>) -> Py<Self> {

@@ -18,11 +18,11 @@ use taxel_live::recording::{
     WriterOptions, damage_of_version_1, decode_lsa, numbered,
 };
 
-use crate::convert::{ArrayParts, Column, array, column, from_events, slice, to_array};
-use crate::enter::enter;
-use crate::errors::{core, live};
-use crate::parameters::{Plain, parsed};
 use crate::threaded::Threaded;
+use taxel_border::convert::{ArrayParts, Column, array, column, from_events, slice, to_array};
+use taxel_border::enter::enter;
+use taxel_border::errors::{core, live};
+use taxel_border::parameters::{Plain, parsed};
 
 /// The decoded datagrams of a board.
 #[pyclass(frozen, get_all)]

@@ -19,10 +19,10 @@ use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, PipedFrames, Replay, Report, Scenes, Touch};
 
-use crate::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
-use crate::enter::{Exclusive, enter, enter_with_progress};
-use crate::errors::core;
-use crate::parameters::{Plain, parsed};
+use taxel_border::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
+use taxel_border::enter::{Shared, enter, enter_with_progress};
+use taxel_border::errors::core;
+use taxel_border::parameters::{Plain, parsed};
 
 /// An act as Python passes it: silence in ms, a scene as JSON, or a sequence of frames with its period in us.
 #[derive(FromPyObject)]
@@ -343,7 +343,7 @@ type TwoOut<'py, A, B> = (Bound<'py, PyArray1<A>>, Bound<'py, PyArray1<B>>);
 
 /// Foam bonded to the board.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct Layer(Exclusive<Bonded>);
+pub struct Layer(Shared<Bonded>);
 
 #[pymethods]
 impl Layer {
@@ -354,7 +354,7 @@ impl Layer {
         let array = to_array(parts)?;
         let layer =
             enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch, stop)?.to_within(tolerance)))?;
-        Ok(Self(Exclusive::new(layer)))
+        Ok(Self(Shared::new(layer)))
     }
 
     /// mm/MPa and the share that arrives at the base, by wave number in 1/mm.
@@ -396,7 +396,7 @@ impl Layer {
 
 /// A board that scans frames as they are pushed, and sends what it makes of them.
 #[pyclass(frozen, module = "taxel._core")]
-pub struct Source(Exclusive<(Board, Sender)>);
+pub struct Source(Shared<(Board, Sender)>);
 
 #[pymethods]
 impl Source {
@@ -407,7 +407,7 @@ impl Source {
         let version_2: Version2 = parsed("version 2", version_2)?;
         let board = Board::new(registers, &array).map_err(core)?.version_2(version_2).map_err(core)?;
         let sender = enter(py, |_| Sender::open(of_text(to)?, true))?;
-        Ok(Self(Exclusive::new((board, sender))))
+        Ok(Self(Shared::new((board, sender))))
     }
 
     /// Scans a frame and sends its events; gives how many there were.

@@ -13,12 +13,12 @@ use taxel_core::wire::v2::{self, DatagramOutcome};
 use taxel_core::wire::{self, Command, CutDatagrams, Decoder, Pairing, Registers};
 use taxel_core::{Error, Events, problem};
 
-use crate::convert::{
+use taxel_border::convert::{
     ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_events, from_filled, slice, to_array, to_room,
 };
-use crate::enter::{Exclusive, enter};
-use crate::errors::core;
-use crate::parameters::{Plain, parsed};
+use taxel_border::enter::{Shared, enter};
+use taxel_border::errors::core;
+use taxel_border::parameters::{Plain, parsed};
 
 /// A decoder of either version, and what the last datagram of version 2 was.
 enum VersionedDecoder {
@@ -28,7 +28,7 @@ enum VersionedDecoder {
 
 /// Turns bytes of version 1, or datagrams of version 2, into events as they come.
 #[pyclass(module = "taxel._core", frozen)]
-pub struct WireDecoder(Exclusive<VersionedDecoder>);
+pub struct WireDecoder(Shared<VersionedDecoder>);
 
 #[pymethods]
 impl WireDecoder {
@@ -36,7 +36,7 @@ impl WireDecoder {
     #[new]
     fn new(version: u8, array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
         let (array, pairing): (_, Pairing) = (to_array(array)?, parsed("pairing", &format!("{pairing:?}"))?);
-        Ok(Self(Exclusive::new(match version {
+        Ok(Self(Shared::new(match version {
             1 => VersionedDecoder::One(Decoder::new(array).pairing(pairing).differences(differences)),
             _ => VersionedDecoder::Two(v2::Decoder::new(array), None),
         })))
@@ -177,9 +177,9 @@ pub fn command_bytes(py: Python<'_>, register: u8, value: u32) -> PyResult<Bound
 #[pyfunction]
 pub fn command_read(data: PyReadonlyArray1<'_, u8>) -> PyResult<(u8, u32)> {
     let data = slice("data", &data)?;
-    let bytes = data
-        .try_into()
-        .map_err(|_| crate::errors::FormatError::new_err(format!("command of {} bytes: must be 5", data.len())))?;
+    let bytes = data.try_into().map_err(|_| {
+        taxel_border::errors::FormatError::new_err(format!("command of {} bytes: must be 5", data.len()))
+    })?;
     let command = Command::from_bytes(bytes).map_err(core)?;
     Ok((command.register, command.value))
 }
@@ -282,7 +282,7 @@ struct WireBoardOptions {
 
 /// The emulated board, and the circuit through which it reads.
 #[pyclass(module = "taxel._core", frozen)]
-pub struct WireBoard(Exclusive<(Board, Option<Crossed>)>);
+pub struct WireBoard(Shared<(Board, Option<Crossed>)>);
 
 #[pymethods]
 impl WireBoard {
@@ -298,7 +298,7 @@ impl WireBoard {
             board = board.asynchronous().map_err(core)?;
         }
         let crossed = circuit.map(|chain| Crossed::new(chain, &registers, &array)).transpose().map_err(core)?;
-        Ok(Self(Exclusive::new((board, crossed))))
+        Ok(Self(Shared::new((board, crossed))))
     }
 
     /// Resets the board.

@@ -45,7 +45,7 @@ BitsOption = Annotated[
 CongestionOption = Annotated[
     str | None,
     typer.Option(
-        help="With --from, if this computer is too slow: block (the bridge waits) or drop (datagrams are lost and "
+        help="With --remote, if this computer is too slow: block (the bridge waits) or drop (datagrams are lost and "
         "counted). Default: block with --record or --readout, else drop."
     ),
 ]
@@ -117,7 +117,7 @@ def _registers(
     if rate_hz is None or bits is None:
         raise ProblemError("--rate-hz and --bits belong together: both are those of the taxel.live.Source that sends")
     if preset is not None or address is not None:
-        option = "--preset" if preset is not None else "--from"
+        option = "--preset" if preset is not None else "--remote"
         raise ProblemError(f"--rate-hz and {option}: both state the board's registers; give one of them")
     return Registers._of_source(Array._of(array), rate_hz, bits)[0]
 
@@ -128,7 +128,7 @@ def remote(
     """Return the receiver of another computer's board; `lossless`: it blocks by default, else it drops."""
     if address is None:
         if congestion is not None:
-            raise ProblemError("--congestion belongs to a board of another computer: give --from ADDRESS")
+            raise ProblemError("--congestion belongs to a board of another computer: give --remote ADDRESS")
         return contextlib.nullcontext()
     received: contextlib.AbstractContextManager[RemoteBoard] = receiver_of(address)(
         address, congestion=congestion or ("block" if lossless else "drop")

@@ -96,7 +96,7 @@ def live(options: dict[str, Any], typed: _Typed) -> None:
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
     Example: taxel live --panel --control 127.0.0.1:5209
-    Example: taxel live --from zenoh:192.168.1.5:7447/left --panel
+    Example: taxel live --remote zenoh:192.168.1.5:7447/left --panel
     """
     _together(options, typed)
     given_tare = options["tare"]

@@ -86,7 +86,7 @@ def record(
 
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
-    Example: taxel record --from zenoh:192.168.1.5:7447/left walk.mcap
+    Example: taxel record --remote zenoh:192.168.1.5:7447/left walk.mcap
     """
     if typed.length is None and typed.trials is not None:
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import tempfile
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from taxel._base.files import open_file
 from taxel._core import FormatError, ProblemError
-from taxel.array import Array, Places, names_beside
+from taxel.array import Array
 from taxel.frames import Frames
 from taxel.labels import Labels, beside
 from taxel.recording import Recording
@@ -134,7 +133,7 @@ class ShownFiles:
         """Return the taxels that are dead, stuck, noisy, in the array that is shown, and how many cannot be judged."""
         recording, _ = self.opened(path, trial)
         frames = {name: one.frames() for name, one in _sources(recording).items()}
-        _, lefts = side_by_side([one.array for one in frames.values()])
+        _, lefts = _array_of(frames)
         found: dict[str, _Taxels] = {"dead": [], "stuck": [], "noisy": []}
         untested = 0
         for left, one in zip(lefts, frames.values(), strict=True):
@@ -189,6 +188,11 @@ def _sources(recording: Recording) -> dict[str, Recording]:
     return {name: one for name, one in every.items() if not one.has_events and not one.is_stream} if several else every
 
 
+def _array_of(frames: dict[str, Frames]) -> tuple[Array, list[int]]:
+    """Return the array that shows those of all sensors, and the first column of each."""
+    return Array._beside([one.array for one in frames.values()], gap=1)
+
+
 def _frames(recording: Recording) -> tuple[Any, ...]:
     """Return array, sources, unit, distance of numbered frames, remarks and verdict (empty if unknown)."""
     sources = _sources(recording)
@@ -196,7 +200,7 @@ def _frames(recording: Recording) -> tuple[Any, ...]:
     units = {one.unit for one in frames.values()}
     if len(units) > 1:
         raise ProblemError(f"{recording.path}: its sources are in {', '.join(sorted(units))}; must be in one unit")
-    array, lefts = side_by_side([one.array for one in frames.values()])
+    array, lefts = _array_of(frames)
     us = 1 if recording.timed else _NUMBER_US
     parts = [
         (name, left, one.array.rows, one.array.columns, _times(one.t, us), _values(one), _rest(one))
@@ -242,50 +246,3 @@ def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:
 
 def _values(frames: Frames) -> NDArray[np.float32]:
     return np.ascontiguousarray(frames.values).reshape(-1)
-
-
-def side_by_side(arrays: list[Array]) -> tuple[Array, list[int]]:
-    """Return one array that holds arrays side by side, with an empty column between, and the first column of each."""
-    if len(arrays) == 1:
-        return arrays[0], [0]
-    rows, lefts, columns = max(one.rows for one in arrays), [], 0
-    for one in arrays:
-        lefts.append(columns)
-        columns += one.columns + 1
-    exists = np.zeros((rows, columns - 1), bool)
-    for left, one in zip(lefts, arrays, strict=True):
-        exists[: one.rows, left : left + one.columns] = True if one.exists is None else one.exists
-    pitches = {one.pitch_mm for one in arrays}
-    name = arrays[0].name if len({one.name for one in arrays}) == 1 else ", ".join(one.name for one in arrays)
-    more: dict[str, Any] = {"pitch_mm": pitches.pop()} if len(pitches) == 1 else {}
-    more |= {"places": _places_beside(arrays, lefts, exists), "names": names_beside(arrays, lefts, exists.shape)}
-    return Array(rows, columns - 1, exists=exists, name=name, **more), lefts
-
-
-def _places_beside(arrays: list[Array], lefts: list[int], exists: NDArray[np.bool_]) -> Places | None:
-    """Return the places of arrays side by side; None unless all have them in one unit.
-
-    Arrays that stand apart from left to right keep their places, as those of two feet in one system of coordinates;
-    others are set half a width apart.
-    """
-    every = [one.places for one in arrays]
-    places = [one for one in every if one is not None]
-    if len(places) < len(arrays) or len({one.unit for one in places}) > 1:
-        return None
-    x, y, area = np.zeros(exists.shape), np.zeros(exists.shape), np.ones(exists.shape)
-    ends = [
-        (one.x[array._there()].min(), one.x[array._there()].max()) for array, one in zip(arrays, places, strict=True)
-    ]
-    apart = all(one[1] < other[0] for one, other in itertools.pairwise(ends))
-    right = 0.0
-    for array, left, one in zip(arrays, lefts, places, strict=True):
-        at = np.s_[: array.rows, left : left + array.columns]
-        there = exists[at]
-        own = one.x.reshape(array.shape)
-        least, most = float(own[there].min()), float(own[there].max())
-        x[at], y[at] = own if apart else own - least + right, one.y.reshape(array.shape)
-        right += 1.5 * (most - least)
-        if one.area is not None:
-            area[at] = one.area.reshape(array.shape)
-    known = all(one.area is not None for one in places)
-    return Places(x, y, area if known else None, places[0].unit)

@@ -15,7 +15,7 @@ from taxel._base.arguments import flag, instance, number, several, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.array import Array, names_beside
+from taxel.array import Array
 from taxel.calibration import Calibration
 from taxel.clock import Clock
 from taxel.detections import Detections
@@ -93,7 +93,10 @@ def merged(recordings: Sequence[Contents], gap: float | None = None, *, beside: 
         )
     tables = [part.table for part in sources]
     shifts = _shifts(tables, gap)
-    array, lefts = _side_by_side(tables) if beside else (_common(sources, tables), [0] * len(sources))
+    if beside:
+        array, lefts = Array._beside([table.array for table in tables])
+    else:
+        array, lefts = _common(sources, tables), [0] * len(sources)
     merging = _Merging(sources, tables, shifts, lefts, array, beside)
     lost = [line for source in sources for line in source.losses.lost()]
     for recording, source in zip(recordings, sources, strict=True):
@@ -382,20 +385,6 @@ def _common(sources: Sequence[Source], tables: Sequence[Events | Frames]) -> Arr
                 "merged beside one another only"
             )
     return array
-
-
-def _side_by_side(tables: Sequence[Events | Frames]) -> tuple[Array, list[int]]:
-    """Return one sensor of all, and the first column of each; rows that a sensor lacks do not exist there."""
-    arrays = [table.array for table in tables]
-    lefts = np.cumsum([0, *(a.columns for a in arrays)]).tolist()
-    rows = max(a.rows for a in arrays)
-    exists = np.zeros((rows, lefts[-1]), bool)
-    for left, a in zip(lefts, arrays, strict=False):
-        exists[: a.rows, left : left + a.columns] = True if a.exists is None else a.exists
-    name = " | ".join(dict.fromkeys(a.name for a in arrays))
-    pitch = arrays[0].pitch_mm if all(a.pitch_mm == arrays[0].pitch_mm for a in arrays) else None
-    names = names_beside(arrays, lefts, exists.shape)
-    return Array(rows, lefts[-1], pitch, None if exists.all() else exists, name, names=names), lefts[:-1]
 
 
 def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[int]) -> Events:
