@@ -15,7 +15,7 @@ mod handle;
 mod observers;
 mod options;
 mod output;
-mod picture_buffer;
+mod preview_buffer;
 mod read_out;
 mod readout_queue;
 mod receive;

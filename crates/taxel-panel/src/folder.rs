@@ -114,7 +114,7 @@ impl Folder {
     }
 
     /// An index that is in memory, of a file of this size.
-    pub(super) fn known(&self, key: &Key, bytes: u64) -> Option<Indexed> {
+    pub(super) fn stored_index(&self, key: &Key, bytes: u64) -> Option<Indexed> {
         lock(&self.indices).get(key).filter(|(length, _)| *length == bytes).and_then(|(_, index)| index.upgrade())
     }
 

@@ -221,7 +221,7 @@ type ChangesOut<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
 pub fn changes_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>) -> PyResult<ChangesOut<'py>> {
     let frames = frames.view()?;
     let changes = enter(py, |stop| frames.changes(stop))?;
-    Ok((array(py, changes.number), array(py, changes.on)))
+    Ok((array(py, changes.number), array(py, changes.same_direction)))
 }
 
 /// What a touched taxel reads above rest at least, for a board's noise floor.

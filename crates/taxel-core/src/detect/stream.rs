@@ -75,7 +75,7 @@ impl ReadoutStream {
     }
 
     fn of(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
-        let repairs = Repairs::within(encoder.hears_repaired_ms());
+        let repairs = Repairs::within(encoder.repaired_span_ms());
         let (emitted, zeroings) = (vec![], VecDeque::new());
         Self { encoder, array, decides, clock, now: None, emitted, repairs, zeroings, late: 0, begin: i64::MIN }
     }

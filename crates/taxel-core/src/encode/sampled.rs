@@ -300,7 +300,7 @@ impl<R: Rule> Stream for Sampled<R> {
         Ok(())
     }
 
-    fn hears_repaired_ms(&self) -> Option<f64> {
+    fn repaired_span_ms(&self) -> Option<f64> {
         R::SPIKES_OF_REPAIRED.then(|| ms(self.period) + self.latency_ms)
     }
 

@@ -81,8 +81,8 @@ impl Stream for SideBySide {
         Ok(())
     }
 
-    fn hears_repaired_ms(&self) -> Option<f64> {
-        self.parts.iter().filter_map(|part| part.stream.hears_repaired_ms()).reduce(f64::max)
+    fn repaired_span_ms(&self) -> Option<f64> {
+        self.parts.iter().filter_map(|part| part.stream.repaired_span_ms()).reduce(f64::max)
     }
 
     fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {

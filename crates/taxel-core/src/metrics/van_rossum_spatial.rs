@@ -72,7 +72,7 @@ impl Smoothing {
     }
 
     /// The kernel for these patterns; each train must have a taxel in the array.
-    pub(super) fn laid_out(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<SmoothingKernel> {
+    pub(super) fn smoothing_kernel(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<SmoothingKernel> {
         let taxels = self.array.len();
         for side in std::iter::once(a).chain(b) {
             if side.trains % taxels != 0 {
@@ -117,7 +117,7 @@ impl Distance for VanRossumSpatial {
     }
 
     fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        Ok(Box::new(SmoothedDistance(self, self.smoothing.laid_out(a, b)?)))
+        Ok(Box::new(SmoothedDistance(self, self.smoothing.smoothing_kernel(a, b)?)))
     }
 }
 

@@ -43,7 +43,7 @@ impl Distance for VanRossumSpatialAbsolute {
     }
 
     fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        Ok(Box::new(SmoothedAbsolute(self, self.smoothing.laid_out(a, b)?)))
+        Ok(Box::new(SmoothedAbsolute(self, self.smoothing.smoothing_kernel(a, b)?)))
     }
 }
 

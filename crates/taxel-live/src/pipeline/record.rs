@@ -12,7 +12,7 @@ use taxel_core::{Events, Marker};
 
 use super::counters::Counters;
 use super::decode::fresh_decoder;
-use super::picture_buffer::PreviewBuffer;
+use super::preview_buffer::PreviewBuffer;
 use super::recorder::Recorder;
 use super::shared::{EndedRecording, PipelineShared};
 use crate::Result;
@@ -28,7 +28,7 @@ pub(super) struct RecordStage {
     /// Decodes from a recording's first datagram on, as a reader of the file will, until the offset between the
     /// recording's clock and the pipeline's is known.
     origin: Option<Box<SenderDecoder>>,
-    picture_buffer: PreviewBuffer,
+    preview_buffer: PreviewBuffer,
     /// Number of decoded datagrams when the last picture was considered.
     considered: u64,
     /// Whether the recording has the fresh tare.
@@ -42,7 +42,7 @@ impl RecordStage {
         Self {
             shared,
             origin: None,
-            picture_buffer: PreviewBuffer::new(),
+            preview_buffer: PreviewBuffer::new(),
             considered: 0,
             tared: false,
             counted: Instant::now(),
@@ -152,7 +152,7 @@ impl RecordStage {
     /// Records earlier zeroings, which remain valid in a new recording.
     fn earlier_zeroings(&self) -> Result<()> {
         let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
-        self.with(|recorder| zeroed.iter().try_for_each(|one| recorder.zeroing(one)))
+        self.with(|recorder| zeroed.iter().try_for_each(|zeroing| recorder.zeroing(zeroing)))
     }
 
     /// Records zeroings; on an error the caller zeroes nothing.
@@ -166,26 +166,28 @@ impl RecordStage {
     /// Buffers a picture if one is due, and records the selected ones; with `last` also the final one.
     pub(super) fn pictures(&mut self, decoded: u64, held: &Held, last: bool) -> Result<()> {
         let now = Instant::now();
-        if !(last || self.picture_buffer.is_due(now)) {
+        if !(last || self.preview_buffer.is_due(now)) {
             return Ok(());
         }
         let times = std::mem::take(&mut *lock(&self.shared.recording.picture_times));
         if !self.runs() {
-            self.picture_buffer.clear();
+            self.preview_buffer.clear();
             return Ok(());
         }
         let new = decoded != self.considered;
         self.considered = decoded;
         if let (true, Some(t_us)) = (new, self.shared.published().counters.board.board_us) {
-            self.picture_buffer.push(now, now_ns(), t_us, held.frame());
+            self.preview_buffer.push(now, now_ns(), t_us, held.frame());
         }
-        times.into_iter().for_each(|t| self.picture_buffer.around(t));
+        times.into_iter().for_each(|t| self.preview_buffer.around(t));
         let columns = self.shared.options.array.columns;
-        let mut picture_buffer = std::mem::replace(&mut self.picture_buffer, PreviewBuffer::new());
+        let mut preview_buffer = std::mem::replace(&mut self.preview_buffer, PreviewBuffer::new());
         let outcome = self.with(|recorder| {
-            picture_buffer.take_wanted().try_for_each(|one| recorder.picture(one.at_ns, one.t_us, columns, &one.held))
+            preview_buffer
+                .take_wanted()
+                .try_for_each(|preview| recorder.picture(preview.at_ns, preview.t_us, columns, &preview.held))
         });
-        self.picture_buffer = picture_buffer;
+        self.preview_buffer = preview_buffer;
         outcome
     }
 

@@ -142,7 +142,7 @@ pub(super) fn verdict(
         };
         (name.clone(), verdict)
     });
-    Verdict::together(std::iter::once((name.to_owned(), verdict)).chain(others).collect())
+    Verdict::combine(std::iter::once((name.to_owned(), verdict)).chain(others).collect())
 }
 
 /// What a user should check if nothing arrived.

@@ -258,7 +258,7 @@ impl Stages {
         // Recorded first, so that every zeroing is in the recording.
         self.record.zeroings(&zeroings)?;
         let mut published = self.shared.published();
-        published.zeroed.extend(zeroings.iter().map(|one| (array.index(one.x, one.y), *one)));
+        published.zeroed.extend(zeroings.iter().map(|zeroing| (array.index(zeroing.x, zeroing.y), *zeroing)));
         published.zeroings += 1;
         drop(published);
         self.shared.picture_around([t]);

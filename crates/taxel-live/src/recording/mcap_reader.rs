@@ -260,7 +260,7 @@ impl Reader {
         let so_far = |topic: Topic| remarks.counts.as_ref().and_then(|counts| counts.messages.get(&topic)).copied();
         let mut unread = unread.clone();
         if let Some((0, indexed)) = self.blocks.skipped.first() {
-            unread.add(&self.listed(&ReadPosition::default(), indexed.as_ref(), &IndexedChunks::new()));
+            unread.add(&self.unread_chunks(&ReadPosition::default(), indexed.as_ref(), &IndexedChunks::new()));
         }
         let (mut lost, mut repeated) = (BTreeMap::new(), 0);
         for topic in Topic::ALL.into_iter().filter(|topic| topic.lost_in_file().is_some()) {
@@ -305,7 +305,7 @@ impl Reader {
     }
 
     /// The messages of this source that message indexes list beyond those that were read; not known without such indexes.
-    fn listed(&self, place: &ReadPosition, indexed: Option<&IndexedChunks>, read: &IndexedChunks) -> Unread {
+    fn unread_chunks(&self, place: &ReadPosition, indexed: Option<&IndexedChunks>, read: &IndexedChunks) -> Unread {
         let mut unread = Unread { unknown: true, ..Unread::default() };
         for (channel, n) in indexed.into_iter().flatten() {
             let n = n.saturating_sub(read.get(channel).copied().unwrap_or(0));
@@ -399,10 +399,10 @@ impl Reader {
             return Err(wrong);
         }
         let mut unread = match (skipped, sound) {
-            (Ok(k), _) => self.listed(place, self.blocks.skipped[k].1.as_ref(), &read),
+            (Ok(k), _) => self.unread_chunks(place, self.blocks.skipped[k].1.as_ref(), &read),
             (Err(_), true) => Unread::default(),
             (Err(_), false) => match self.blocks.indexed(block)? {
-                Some(indexed) => Unread { unknown: false, ..self.listed(place, Some(&indexed), &read) },
+                Some(indexed) => Unread { unknown: false, ..self.unread_chunks(place, Some(&indexed), &read) },
                 None => Unread { unknown: true, ..Unread::default() },
             },
         };

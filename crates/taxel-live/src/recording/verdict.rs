@@ -226,7 +226,7 @@ impl Verdict {
                 let text = format!("the {kind} does not say what was lost");
                 Self { status: RecordingStatus::Unknown, text, ..Self::default() }
             }
-            Basis::Together(parts) => Self::together(parts),
+            Basis::Together(parts) => Self::combine(parts),
             Basis::Sources(parts) => Self::of_sources(parts),
             Basis::Stretches(parts) => Self::of_stretches(parts),
             Basis::Later(us, verdict) => verdict.later(us),
@@ -401,18 +401,18 @@ impl Verdict {
     /// The verdict on several recordings or sources: the worst status, and the sums of their numbers.
     ///
     /// Equal verdicts without numbers are one.
-    pub(crate) fn together(parts: Vec<(String, Self)>) -> Self {
-        Self::joined(parts, |_, sum, n| sum + n)
+    pub(crate) fn combine(parts: Vec<(String, Self)>) -> Self {
+        Self::combine_with(parts, |_, sum, n| sum + n)
     }
 
-    /// As [`Self::together`], of the sources of one file, whose damage each of them has: it counts once.
+    /// As [`Self::combine`], of the sources of one file, whose damage each of them has: it counts once.
     fn of_sources(parts: Vec<(String, Self)>) -> Self {
-        Self::joined(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
+        Self::combine_with(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
     }
 
-    /// As [`Self::together`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
+    /// As [`Self::combine`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
     fn of_stretches(parts: Vec<(String, Self)>) -> Self {
-        let mut whole = Self::together(parts.clone());
+        let mut whole = Self::combine(parts.clone());
         let all = parts.iter().map(|(_, part)| [&part.lost, &part.damaged, &part.noted]);
         for (k, sums) in [&mut whole.lost, &mut whole.damaged, &mut whole.noted].into_iter().enumerate() {
             for (cause, sum) in sums {
@@ -429,7 +429,7 @@ impl Verdict {
         whole
     }
 
-    fn joined(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
+    fn combine_with(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
         let numbers = |one: &Self| !(one.lost.is_empty() && one.damaged.is_empty() && one.noted.is_empty());
         if let [(_, first), others @ ..] = &parts[..]
             && (others.is_empty() || (others.iter().all(|(_, one)| one == first) && !numbers(first)))

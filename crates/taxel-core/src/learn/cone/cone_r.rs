@@ -193,7 +193,7 @@ impl ConeRProblem {
         neuron.check_rows(points)?;
         let asked = targets.iter().zip(silence).zip(ends);
         let asked = asked.map(|((targets, silence), end)| PatternDemand { targets, silence: silence.as_deref(), end });
-        Self::laid_out(parameters, patterns, asked, stop)
+        Self::lay_out(parameters, patterns, asked, stop)
     }
 
     /// Computes the rows of a first pattern, which the caller has checked; `push` adds the others.
@@ -203,10 +203,10 @@ impl ConeRProblem {
         asked: PatternDemand<'_>,
         stop: Stop<'_>,
     ) -> Result<Self> {
-        Self::laid_out(parameters, std::slice::from_ref(pattern), [asked].into_iter(), stop)
+        Self::lay_out(parameters, std::slice::from_ref(pattern), [asked].into_iter(), stop)
     }
 
-    fn laid_out<'a>(
+    fn lay_out<'a>(
         parameters: &ConeR,
         patterns: &[SpikeTrains],
         asked: impl Iterator<Item = PatternDemand<'a>>,

@@ -5,8 +5,8 @@ mod body;
 mod held;
 #[cfg(target_arch = "x86_64")]
 mod run;
+mod run_totals;
 mod session;
-mod taken;
 mod words;
 
 use super::checksum::split;
@@ -20,8 +20,8 @@ use crate::{Array, Events, Result, problem};
 use held::ValuesByLine;
 #[cfg(target_arch = "x86_64")]
 use run::RunDecoder;
+use run_totals::RunTotals;
 use session::{BoardSession, Noted, WINDOW};
-use taken::Taken;
 pub use words::stream_rows;
 
 /// Number of repeated datagrams in turn, or of ones with other contents, after which a session has begun again.
@@ -203,7 +203,7 @@ impl Decoder {
         let taken = self.plain(std::iter::once(datagram), stream_rows(datagram.len()), out);
         match self.sessions.last() {
             Some(session) if taken.datagrams > 0 => {
-                let Taken { base, span, .. } = taken;
+                let RunTotals { base, span, .. } = taken;
                 self.last_arrival = arrived.map(|now| (now, latest.max(base))).or(self.last_arrival);
                 let until = (span > 0).then(|| base + i64::from(span));
                 DatagramOutcome::Intact { until, missing: session.missing(), reset: false }
@@ -309,7 +309,7 @@ impl Decoder {
         datagrams: impl Iterator<Item = &'d [u8]> + Clone,
         most: usize,
         out: &mut impl Table,
-    ) -> Taken {
+    ) -> RunTotals {
         #[cfg(target_arch = "x86_64")]
         if self.instructions >= Instructions::Avx2
             && let (Some(first), Some(board), Some(session)) =
@@ -333,7 +333,7 @@ impl Decoder {
             }
             return run.taken;
         }
-        Taken::default()
+        RunTotals::default()
     }
 
     /// The session of a datagram with this sum, and whether the datagram begins it.

@@ -5,8 +5,8 @@
 //! it alone; only the decoder defines a datagram's meaning. So both ways return the same rows, values and counts.
 
 use super::held::ValuesByLine;
+use super::run_totals::RunTotals;
 use super::session::BoardSession;
-use super::taken::Taken;
 use super::words::{EIGHT, Eight, FULL};
 use crate::wire::columns::Room;
 use crate::wire::v2::checksum::{EVEN, even, split};
@@ -28,7 +28,7 @@ pub(super) struct RunDecoder<'a> {
     held: &'a mut ValuesByLine,
     latest: &'a mut i64,
     counts: &'a mut Counts,
-    pub(super) taken: Taken,
+    pub(super) taken: RunTotals,
 }
 
 /// Whether a datagram of this length can belong to a run.
@@ -58,7 +58,7 @@ impl<'a> RunDecoder<'a> {
             return None;
         }
         let common = DatagramHeader::common_of(kind, board, session.number, held.stride);
-        Some((Self { common, session, held, latest, counts, taken: Taken::default() }, value))
+        Some((Self { common, session, held, latest, counts, taken: RunTotals::default() }, value))
     }
 
     /// Decodes datagrams whose words have `VALUE` bits of value into `room`, from a row on, while they are plain;
@@ -76,7 +76,7 @@ impl<'a> RunDecoder<'a> {
         first: usize,
         paired: bool,
     ) -> usize {
-        let (mut row, mut taken) = (first, Taken::default());
+        let (mut row, mut taken) = (first, RunTotals::default());
         for datagram in datagrams {
             if !short(datagram) || DatagramHeader::common(datagram) != self.common {
                 break;
@@ -105,7 +105,7 @@ impl<'a> RunDecoder<'a> {
             *self.latest = (*self.latest).max(t + i64::from(header.span));
             row += rows;
             let (datagrams, bytes) = (taken.datagrams + 1, taken.bytes + datagram.len());
-            taken = Taken { datagrams, bytes, base: t, span: header.span };
+            taken = RunTotals { datagrams, bytes, base: t, span: header.span };
         }
         self.counts.datagrams += taken.datagrams as u64;
         self.counts.intact += taken.datagrams as u64;

@@ -113,14 +113,14 @@ mod tests {
     use super::*;
 
     /// Pushes a picture each 10 ms in `from..to` (hundredths of a second) and gives the board's times of those that are recorded.
-    fn recorded(picture_buffer: &mut PreviewBuffer, begun: Instant, times: std::ops::Range<i64>) -> Vec<i64> {
+    fn recorded(preview_buffer: &mut PreviewBuffer, begun: Instant, times: std::ops::Range<i64>) -> Vec<i64> {
         let mut recorded_now = vec![];
         for k in times {
             let now = begun + BUFFERED_EVERY * u32::try_from(k).unwrap();
-            assert!(picture_buffer.is_due(now));
-            picture_buffer.push(now, k, 10_000 * k, std::iter::once(k as u16));
-            assert!(!picture_buffer.is_due(now + BUFFERED_EVERY / 2));
-            recorded_now.extend(picture_buffer.take_wanted().map(|picture| {
+            assert!(preview_buffer.is_due(now));
+            preview_buffer.push(now, k, 10_000 * k, std::iter::once(k as u16));
+            assert!(!preview_buffer.is_due(now + BUFFERED_EVERY / 2));
+            recorded_now.extend(preview_buffer.take_wanted().map(|picture| {
                 assert_eq!((picture.at_ns * 10_000, i64::from(picture.held[0]) * 10_000), (picture.t_us, picture.t_us));
                 picture.t_us
             }));
@@ -130,31 +130,31 @@ mod tests {
 
     #[test]
     fn a_recording_gets_ten_pictures_a_second_and_those_around_events_once() {
-        let (mut picture_buffer, begun) = (PreviewBuffer::new(), Instant::now());
-        assert_eq!(recorded(&mut picture_buffer, begun, 0..37), [0, 100_000, 200_000, 300_000]);
+        let (mut preview_buffer, begun) = (PreviewBuffer::new(), Instant::now());
+        assert_eq!(recorded(&mut preview_buffer, begun, 0..37), [0, 100_000, 200_000, 300_000]);
         // Times between two pictures, at a picture, and after the last picture.
-        picture_buffer.around(123_456);
-        picture_buffer.around(150_000);
-        picture_buffer.around(365_000);
-        let recorded_now: Vec<i64> = picture_buffer.take_wanted().map(|picture| picture.t_us).collect();
+        preview_buffer.around(123_456);
+        preview_buffer.around(150_000);
+        preview_buffer.around(365_000);
+        let recorded_now: Vec<i64> = preview_buffer.take_wanted().map(|picture| picture.t_us).collect();
         assert_eq!(recorded_now, [120_000, 130_000, 140_000, 150_000, 360_000]);
-        picture_buffer.around(123_456);
-        assert_eq!(picture_buffer.take_wanted().count(), 0, "each once");
-        assert_eq!(recorded(&mut picture_buffer, begun, 37..45), [370_000, 400_000]);
+        preview_buffer.around(123_456);
+        assert_eq!(preview_buffer.take_wanted().count(), 0, "each once");
+        assert_eq!(recorded(&mut preview_buffer, begun, 37..45), [370_000, 400_000]);
     }
 
     #[test]
     fn events_of_long_ago_and_many_of_them_cost_no_more_than_a_hundred_pictures_a_second() {
-        let (mut picture_buffer, begun) = (PreviewBuffer::new(), Instant::now());
-        let mut recorded_now = recorded(&mut picture_buffer, begun, 0..100).len();
+        let (mut preview_buffer, begun) = (PreviewBuffer::new(), Instant::now());
+        let mut recorded_now = recorded(&mut preview_buffer, begun, 0..100).len();
         assert_eq!(recorded_now, 10);
         for t in 0..1_200_000 {
-            picture_buffer.around(t);
+            preview_buffer.around(t);
         }
-        recorded_now = picture_buffer.take_wanted().count() + recorded(&mut picture_buffer, begun, 100..200).len();
+        recorded_now = preview_buffer.take_wanted().count() + recorded(&mut preview_buffer, begun, 100..200).len();
         assert!(recorded_now <= BUFFERED + 100, "{recorded_now}");
-        assert!(picture_buffer.pictures.len() <= BUFFERED && picture_buffer.awaited.len() <= BUFFERED);
-        picture_buffer.clear();
-        assert_eq!(picture_buffer.take_wanted().count(), 0);
+        assert!(preview_buffer.pictures.len() <= BUFFERED && preview_buffer.awaited.len() <= BUFFERED);
+        preview_buffer.clear();
+        assert_eq!(preview_buffer.take_wanted().count(), 0);
     }
 }

@@ -2,7 +2,7 @@
 
 /// Number of datagrams, and the time and promise of the last one.
 #[derive(Debug, Clone, Copy, Default)]
-pub(in crate::wire::v2) struct Taken {
+pub(in crate::wire::v2) struct RunTotals {
     /// Number of datagrams.
     pub(in crate::wire::v2) datagrams: usize,
     /// Number of their bytes, without the lengths that precede them in a stream.
