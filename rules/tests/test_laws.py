@@ -13,6 +13,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 import sound
+import test_border as border
 import test_docstrings as docstrings
 import test_error_names as error_names
 import test_manners as manners
@@ -156,6 +157,12 @@ def test_the_words_of_status_are_those_of_the_readme() -> None:
     table = (ROOT / "README.md").read_text().split("## How a training ended")[1]
     listed = re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
     assert set(listed) - {"status_"} == set(get_args(Status))
+
+
+def test_the_compiled_part_returns_no_json_and_no_long_tuple() -> None:
+    stub = (ROOT / "taxel_rules" / "_rules.pyi").read_text()
+    assert border.of_text(stub) == {"Trained.ended"}
+    assert border.long_tuples(stub) == set()
 
 
 def test_errors_are_taxel_s_own_and_an_interrupt_ends_a_call() -> None:
