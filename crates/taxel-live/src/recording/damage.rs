@@ -79,7 +79,7 @@ pub(crate) fn add_order(causes: &mut BTreeMap<String, u64>, far: u64, overtaken:
     causes.insert(OVERTAKEN.to_owned(), overtaken);
 }
 
-/// The same of both versions, with the jumps of [`wire::Ahead`] and the datagrams of version 1 that came `again`; and the
+/// The same of both versions, with the jumps of [`wire::ClockJumps`] and the datagrams of version 1 that came `again`; and the
 /// number of missing datagrams of version 2, if the board sends it.
 #[must_use]
 pub fn damage(
