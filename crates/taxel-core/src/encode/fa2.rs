@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::blocks::BLOCK;
 use super::channels::Channels;
 use super::encoding::Encoding;
-use super::receptor::{TaxelAfferents, Filter, Firing, Lanes, LowPass};
+use super::receptor::{Filter, Firing, Lanes, LowPass, TaxelAfferents};
 use super::sampled::Sampled;
 use super::stream::Stream;
 use crate::allowed::Range;

@@ -7,7 +7,7 @@ use super::by_stamp::{ByStamp, Measure};
 use super::encoding::Encoding;
 use super::loaded::{Loaded, given};
 use super::local_sums::{LocalSums, SumPair, Values};
-use super::recent::{RecentSamples, PastWindow};
+use super::recent::{PastWindow, RecentSamples};
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, spikes_of_events, spikes_of_frames};
 use super::tare::Tare;

@@ -125,7 +125,13 @@ struct SmoothedDistance<'m>(&'m VanRossumSpatial, SmoothingKernel);
 
 impl VanRossumSpatial {
     /// The distance between two patterns.
-    pub(super) fn between(&self, kernel: &SmoothingKernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
+    pub(super) fn between(
+        &self,
+        kernel: &SmoothingKernel,
+        a: Pattern<'_>,
+        b: Pattern<'_>,
+        stop: Stop<'_>,
+    ) -> Result<f64> {
         Ok(self.normalisation.root(self.square(kernel, a, b, stop)?, self.smoothing.tau))
     }
 

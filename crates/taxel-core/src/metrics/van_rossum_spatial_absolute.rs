@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::distance::{Distance, Pattern, Ready};
 use super::patterns::Patterns;
 use super::van_rossum_absolute::Exposure;
-use super::van_rossum_spatial::{SmoothingState, SmoothingKernel, Smoothing};
+use super::van_rossum_spatial::{Smoothing, SmoothingKernel, SmoothingState};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop};
@@ -61,12 +61,19 @@ impl VanRossumSpatialAbsolute {
     }
 
     /// The distance between two patterns.
-    pub(super) fn between(&self, kernel: &SmoothingKernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
+    pub(super) fn between(
+        &self,
+        kernel: &SmoothingKernel,
+        a: Pattern<'_>,
+        b: Pattern<'_>,
+        stop: Stop<'_>,
+    ) -> Result<f64> {
         let tau = self.smoothing.tau;
         let exposure = Exposure::new(tau, self.window, self.step_ms);
         let mut sum = 0.0;
-        kernel
-            .walk(tau, a, b, SmoothingState::Absolutes, stop, |height, from, to| sum += height * exposure.between(from, to))?;
+        kernel.walk(tau, a, b, SmoothingState::Absolutes, stop, |height, from, to| {
+            sum += height * exposure.between(from, to)
+        })?;
         Ok(sum)
     }
 }

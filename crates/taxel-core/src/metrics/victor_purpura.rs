@@ -49,7 +49,13 @@ impl Ready for &VictorPurpura {
     ///
     /// Train after train, the columns' trains are sorted by length, so that trains processed side by side have similar
     /// lengths.
-    fn fill(&self, matrix: &DistanceMatrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
+    fn fill(
+        &self,
+        matrix: &DistanceMatrix,
+        a: &Patterns<'_>,
+        b: Option<&Patterns<'_>>,
+        work: &mut Work<'_>,
+    ) -> Result<bool> {
         if !self.has_reach() || work.instructions == Instructions::Plain {
             return Ok(false);
         }

@@ -18,7 +18,13 @@ impl Ready for &VanRossum {
     }
 
     /// Fills a matrix with the sums of distances over trains.
-    fn fill(&self, matrix: &DistanceMatrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
+    fn fill(
+        &self,
+        matrix: &DistanceMatrix,
+        a: &Patterns<'_>,
+        b: Option<&Patterns<'_>>,
+        work: &mut Work<'_>,
+    ) -> Result<bool> {
         let others = b.unwrap_or(a);
         let pairs = matrix.pairs();
         for n in 0..a.trains {

@@ -4,7 +4,7 @@
 //! the overlap of the taxels' spatial kernels. For each row and taxel n, the row's whole pattern is stored with the
 //! weights of taxel n; then each column's spikes at n are looked up once.
 
-use super::{SmoothingKernel, SmoothedDistance, VanRossumSpatial};
+use super::{SmoothedDistance, SmoothingKernel, VanRossumSpatial};
 use crate::metrics::distance::{Pattern, Ready};
 use crate::metrics::pairwise::DistanceMatrix;
 use crate::metrics::stored::{Entries, Frame, Query};
@@ -24,7 +24,13 @@ impl Ready for SmoothedDistance<'_> {
     }
 
     /// Fills a matrix by stored exponentials, if that is faster.
-    fn fill(&self, matrix: &DistanceMatrix, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<bool> {
+    fn fill(
+        &self,
+        matrix: &DistanceMatrix,
+        a: &Patterns<'_>,
+        b: Option<&Patterns<'_>>,
+        work: &mut Work<'_>,
+    ) -> Result<bool> {
         let Self(metric, kernel) = self;
         let others = b.unwrap_or(a);
         let spikes = (a.times.len() / a.count.max(1)).max(others.times.len() / others.count.max(1));
@@ -36,7 +42,11 @@ impl Ready for SmoothedDistance<'_> {
         let frame = Frame::around(metric.smoothing.tau, &[a, others], None);
         let Some(frame) = frame.filter(|_| storing < walking) else { return Ok(false) };
         let weights = kernel.common(&active);
-        MatrixState { metric, kernel, frame, active, weights, rows: a, columns: others }.fill(matrix, b.is_none(), work)?;
+        MatrixState { metric, kernel, frame, active, weights, rows: a, columns: others }.fill(
+            matrix,
+            b.is_none(),
+            work,
+        )?;
         Ok(true)
     }
 }
