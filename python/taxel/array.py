@@ -60,7 +60,7 @@ class Places:
         if self.unit is not None:
             text("unit", self.unit, ("mm",))
 
-    def _on(self, array: Array) -> Places:
+    def _placed_on(self, array: Array) -> Places:
         """Return the places in the shape of an array, which must be finite where a taxel exists."""
         there = array._there()
         changed: dict[str, NDArray[np.float64]] = {}
@@ -163,7 +163,7 @@ class Array:
         if self.places is not None:
             if self.pitch_mm is not None:
                 raise ProblemError("pitch_mm and places are both given: give one of them")
-            object.__setattr__(self, "places", instance("places", self.places, Places)._on(self))
+            object.__setattr__(self, "places", instance("places", self.places, Places)._placed_on(self))
         if self.names is not None:
             names = tuple(text("names", entry) for entry in several("names", self.names))
             places = self.rows * self.columns

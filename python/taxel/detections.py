@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import bare, checked_path, column, fields, instance, nth, several, shown, window
-from taxel._base.columns import Columns, frozen, own, own_column
+from taxel._base.columns import Columns, frozen, frozen_column, frozen_copy
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
@@ -158,18 +158,18 @@ class Detections(Columns):
             raise ProblemError(f"label: {error}") from None
         if labels.ndim != 1 or labels.dtype.kind != "U":
             raise refused("label", f" is {shown(label)}: must be a list of texts")
-        self.label: NDArray[np.str_] = own(labels, label)
-        self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
-        self.known: NDArray[np.int64] = own_column("known", known, np.int64, "us")
+        self.label: NDArray[np.str_] = frozen_copy(labels, label)
+        self.t: NDArray[np.int64] = frozen_column("t", t, np.int64, "us")
+        self.known: NDArray[np.int64] = frozen_column("known", known, np.int64, "us")
         slopes = frozen(np.full(len(labels), np.nan)) if slope is None else slope
-        self.slope: NDArray[np.float64] = own_column("slope", slopes, np.float64)
+        self.slope: NDArray[np.float64] = frozen_column("slope", slopes, np.float64)
         self.reported: NDArray[np.int64] | None = (
-            None if reported is None else own_column("reported", reported, np.int64, "us")
+            None if reported is None else frozen_column("reported", reported, np.int64, "us")
         )
         if self.reported is not None and len(self.reported) != len(labels):
             raise refused("reported", f" has {len(self.reported)} entries: must be {len(labels)}, one a detection")
         marks = frozen(np.zeros(len(labels), np.bool_)) if repaired is None else repaired
-        self.repaired: NDArray[np.bool_] = own_column("repaired", marks, np.bool_)
+        self.repaired: NDArray[np.bool_] = frozen_column("repaired", marks, np.bool_)
         _core.check_detections(self._parts())
 
     def __len__(self) -> int:

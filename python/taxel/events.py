@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, fields, instance, nth, rows, shown, window
-from taxel._base.columns import Columns, frozen, own_column
+from taxel._base.columns import Columns, frozen, frozen_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.messages import counted
@@ -104,22 +104,22 @@ class Events(Columns):
         markers: Sequence[tuple[int, bool]] = (),
     ) -> None:
         self.array = instance("array", array, Array)
-        self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
-        self.x: NDArray[np.uint16] = own_column("x", x, np.uint16)
-        self.y: NDArray[np.uint16] = own_column("y", y, np.uint16)
-        self.p: NDArray[np.bool_] = own_column("p", p, np.bool_)
+        self.t: NDArray[np.int64] = frozen_column("t", t, np.int64, "us")
+        self.x: NDArray[np.uint16] = frozen_column("x", x, np.uint16)
+        self.y: NDArray[np.uint16] = frozen_column("y", y, np.uint16)
+        self.p: NDArray[np.bool_] = frozen_column("p", p, np.bool_)
         self.intensity: NDArray[np.uint16] | None = None
         self.present: NDArray[np.bool_] | None = None
         if intensity is not None:
-            self.intensity = own_column("intensity", intensity, np.uint16)
+            self.intensity = frozen_column("intensity", intensity, np.uint16)
             all_of_them = np.ones(len(self.intensity), np.bool_)
-            self.present = frozen(all_of_them) if present is None else own_column("present", present, np.bool_)
+            self.present = frozen(all_of_them) if present is None else frozen_column("present", present, np.bool_)
             if len(self.present) == len(self.intensity) and self.intensity[~self.present].any():
                 # An absent intensity is stored as 0, so that equal events have equal columns.
                 self.intensity = frozen(np.where(self.present, self.intensity, np.uint16(0)))
         elif present is not None:
             raise ProblemError("present without intensity: give both or neither")
-        self.repaired = None if repaired is None else _where_any(own_column("repaired", repaired, np.bool_))
+        self.repaired = None if repaired is None else _where_any(frozen_column("repaired", repaired, np.bool_))
         self.markers = _markers(markers)
         _core.check_events(self._parts())
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import finite, instance, shown, text, whole, window
-from taxel._base.columns import Columns, frozen, own_column, own_numbers
+from taxel._base.columns import Columns, frozen, frozen_column, frozen_numbers
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
@@ -57,11 +57,11 @@ class Frames(Columns):
     """
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
-        self.values: NDArray[np.float32] = own_numbers("values", values, np.float32)
+        self.values: NDArray[np.float32] = frozen_numbers("values", values, np.float32)
         # What is not copied is read-only, a part of other frames or what a reader has checked.
         if not (isinstance(values, np.ndarray) and np.may_share_memory(self.values, values)):
             _refuse_infinite("values", self.values)
-        self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
+        self.t: NDArray[np.int64] = frozen_column("t", t, np.int64, "us")
         if self.values.ndim != 3:
             found = counted(self.values.ndim, "dimension")
             raise refused("values", f" have {found}: must have three (n, rows, columns)")
@@ -131,7 +131,7 @@ class Frames(Columns):
                 f"shorter stretch or a period longer than {period} us"
             )
         t = np.arange(count, dtype=np.int64) * period + first
-        begins = None if held is None else own_numbers("held", held, np.float32)
+        begins = None if held is None else frozen_numbers("held", held, np.float32)
         if begins is not None and begins.shape != array.shape:
             raise refused("held", f" has shape {begins.shape}: must have the array's, {array.shape}")
         if begins is not None:

@@ -40,7 +40,7 @@ fn with_help(raised: fn(String) -> PyErr, Reason { text, argument, hint }: Reaso
     set.err().unwrap_or(error)
 }
 
-/// The line of an error, in which its argument has the name that the reader knows it by.
+/// Composes the line of an error, with the reader's name of its argument, as an option of the command line.
 #[pyfunction]
 fn error_line(text: String, argument: &str, hint: Option<&str>) -> PyResult<String> {
     let hint = reading::from_value(hint.into()).map_err(|unfit| core(unfit.problem("hint")))?;

@@ -36,13 +36,13 @@ struct Bin {
 /// Counts of a taxel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TaxelCounts {
-    /// Touches of its place that are over, by its neighbours.
+    /// Number of ended touches at the taxel, as its neighbours show them.
     pub touches: u32,
-    /// Those in which it did not change.
+    /// Number of these touches in which the taxel did not change.
     pub missed: u32,
-    /// Bins in which it was itself [`TOUCH`] above its rest.
+    /// Number of bins in which the taxel itself was [`TOUCH`] above its rest.
     pub pressed: u32,
-    /// Bins in which it changed.
+    /// Number of bins in which the taxel changed.
     pub changed: u32,
     /// Bins in which it changed by itself.
     pub by_itself: u32,

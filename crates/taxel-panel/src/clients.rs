@@ -51,7 +51,7 @@ impl Clients {
         }
     }
 
-    /// A place for another client, unless `most` are connected.
+    /// Counts another client, unless `most` are connected.
     pub(super) fn admit(&self, most: usize) -> Option<ClientSlot> {
         let before = self.count.fetch_add(1, Ordering::Relaxed);
         let slot = ClientSlot(Arc::clone(&self.count));

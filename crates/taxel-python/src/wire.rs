@@ -344,7 +344,7 @@ impl WireBoard {
         let accepted = accepted.as_ref().map(|accepted| slice("accepted", accepted)).transpose()?;
         let datagrams = self.0.enter(py, |(board, crossed), stop| {
             let mut ticks = Cow::from(given);
-            // One of another length is refused by the board.
+            // The board refuses a frame of another length.
             if let Some(crossed) = crossed
                 && ticks.len() == crossed.taxels()
             {

@@ -104,17 +104,17 @@ def frozen_whole(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
-def own_column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
+def frozen_column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
     """Return a read-only column (see `column`), copied if it shares memory with a caller's writable array."""
-    return own(column(name, values, dtype, unit), values)
+    return frozen_copy(column(name, values, dtype, unit), values)
 
 
-def own_numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
-    """Return a read-only array of any shape (see `numbers`), copied as by `own_column`."""
-    return own(numbers(name, values, dtype, unit), values)
+def frozen_numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
+    """Return a read-only array of any shape (see `numbers`), copied as by `frozen_column`."""
+    return frozen_copy(numbers(name, values, dtype, unit), values)
 
 
-def own(array: NDArray[Any], source: ArrayLike) -> NDArray[Any]:
+def frozen_copy(array: NDArray[Any], source: ArrayLike) -> NDArray[Any]:
     """Return an array made from `source`, read-only; copy it if it shares memory that the caller can change."""
     if isinstance(source, np.ndarray):
         shared = array is source or np.may_share_memory(array, source)

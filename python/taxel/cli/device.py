@@ -143,8 +143,8 @@ def watch(
             now = {"faults": device.faults, "reconnects": device.reconnects}
             if now != before:
                 faults = ", ".join(f"{n} {name}" for name, n in device.faults.items()) or "no faults"
-                again = f"; reconnected {counted(device.reconnects, 'time')}" if device.reconnects else ""
-                say(json.dumps(now) if as_json else faults + again)
+                reconnect_text = f"; reconnected {counted(device.reconnects, 'time')}" if device.reconnects else ""
+                say(json.dumps(now) if as_json else faults + reconnect_text)
                 before = now
             time.sleep(_POLL_S)
 

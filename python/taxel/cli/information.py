@@ -79,10 +79,10 @@ def information(
         encoder,
         assignments(values or []),
         window_ms,
-        _listed("--windows", windows_ms, float_of, "numbers, as 1,2,5"),
-        _listed("--periods", periods_ms, float_of, "numbers, as 1,2,5"),
-        _listed("--taxels", taxels, int_of, "whole numbers, as 10,30"),
-        _listed("--pools", pools, int_of, "whole numbers, as 10,30"),
+        _parse_numbers("--windows", windows_ms, float_of, "numbers, as 1,2,5"),
+        _parse_numbers("--periods", periods_ms, float_of, "numbers, as 1,2,5"),
+        _parse_numbers("--taxels", taxels, int_of, "whole numbers, as 10,30"),
+        _parse_numbers("--pools", pools, int_of, "whole numbers, as 10,30"),
         draws,
         shuffles,
         folds,
@@ -223,7 +223,7 @@ def _interval(estimate: Estimate) -> str:
     return f"{estimate.bits:.2f} of {estimate.most:.2f} bits [{low:.2f} {high:.2f}]"
 
 
-def _listed(option: str, text: str | None, of: Callable[[str], _Number], must: str) -> list[_Number] | None:
+def _parse_numbers(option: str, text: str | None, of: Callable[[str], _Number], must: str) -> list[_Number] | None:
     """Return numbers between commas; None without any."""
     try:
         return None if text is None else [of(cell) for cell in text.split(",")]

@@ -170,8 +170,8 @@ def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cloc
         ages = getattr(part, "ages_ms", None)
         if ages is None:
             return part
-        counts = {count(age) for age in ages} | used | {frames + 1 for frames in used}
-        return copy(part).set_params(ages_ms=[begin_ms(frames) for frames in sorted(counts)])
+        counts = {count(age) for age in ages} | used | {number + 1 for number in used}
+        return copy(part).set_params(ages_ms=[begin_ms(number) for number in sorted(counts)])
 
     neurons = {label: neuron(values) for label, values in recipe.neurons.items()}
     whole = recipe.encoder

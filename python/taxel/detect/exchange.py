@@ -172,7 +172,7 @@ def _read_graph(place: str | os.PathLike[str]) -> NIRGraph:
             raise FormatError(f"{place}: a {type(graph).__name__}; must be a NIRGraph with its metadata")
     except (FormatError, MemoryError, OSError):
         raise
-    except Exception as error:  # nir raises errors of many kinds for a graph that is none
+    except Exception as error:  # nir raises many kinds of errors for what is not a graph
         raise FormatError(
             f"{place}: no NIR graph that can be read: {type(error).__name__} {shown(str(error))}"
         ) from None

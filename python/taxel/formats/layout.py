@@ -170,7 +170,7 @@ class Layout:
         if self.heel:
             text("heel", self.heel, ("top", "bottom"))
         if self.falls is not None and not isinstance(self.falls, bool):
-            # Frames have 32 bits.
+            # Readings are subtracted from it, and values of frames have 32 bits.
             object.__setattr__(self, "falls", finite("falls", self.falls, least=-VALUE, most=VALUE))
         if self.unit is not None and not text("unit", self.unit):
             raise refused("unit", " is '': must say what the readings are in")

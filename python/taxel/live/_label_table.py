@@ -433,7 +433,7 @@ class LabelTables:
     def _write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
         while True:
             try:
-                joined = self._written(table, own, action)
+                joined = self._try_write(table, own, action)
             except OSError as error:
                 if error.errno in _FULL and self._let_go(most=0):
                     continue
@@ -446,7 +446,7 @@ class LabelTables:
                 pass
             return joined
 
-    def _written(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
+    def _try_write(self, table: Path, own: frozenset[str], action: _Action) -> Joined:
         for final in _attempts():
             place, _ = _places(table)
             with locked(place.parent):
@@ -568,7 +568,7 @@ class LabelTables:
         try:
             before, _ = _parsed(file.place, file.own, file.text or b"")
             action = functools.partial(fold, before=before, after=now.rows)
-            self._written(file.table, file.own, action)
+            self._try_write(file.table, file.own, action)
         except (FormatError, ProblemError, OSError):
             return one
         return _Watched(replace(now, rows=()), seen)

@@ -161,7 +161,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 
 
 class Touches(NamedTuple):
-    """Counts of touches of taxels that had a value, and of their neighbours, shape (taxels,); others have none."""
+    """Touches of each taxel that had a value, counted at it and at its neighbours, shape (taxels,)."""
 
     taxels: NDArray[np.uint32]
     """Their indices."""

@@ -197,7 +197,7 @@ def _numeric(rows: Sequence[Sequence[str]], *, texts: bool) -> list[bool]:
 
 
 def _holds_numbers(column: Sequence[str]) -> bool:
-    """Whether a column holds a number, or, below names and units, nothing."""
+    """Return whether a column holds a number somewhere, or is empty below its name and unit."""
     below = column[2:] or column[-1:]
     return any(math.isfinite(_number(cell)) for cell in column) or all(cell in MISSING for cell in below)
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, checked_path, column, floats, instance, nth, number, several, shown, window
-from taxel._base.columns import Columns, frozen, own_column
+from taxel._base.columns import Columns, frozen, frozen_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
@@ -78,9 +78,11 @@ class SpikeTrains(Columns):
         *,
         kind: Kind | None = None,
     ) -> None:
-        self.times: NDArray[np.float64] = own_column("times", times, np.float64, "ms")
-        self.offsets: NDArray[np.int64] = own_column("offsets", offsets, np.int64)
-        self.values: NDArray[np.float32] | None = None if values is None else own_column("values", values, np.float32)
+        self.times: NDArray[np.float64] = frozen_column("times", times, np.float64, "ms")
+        self.offsets: NDArray[np.int64] = frozen_column("offsets", offsets, np.int64)
+        self.values: NDArray[np.float32] | None = (
+            None if values is None else frozen_column("values", values, np.float32)
+        )
         self.kind: Kind = _kind(kind, self.values)
         self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())

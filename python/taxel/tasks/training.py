@@ -18,9 +18,9 @@ from taxel.recording import Recording
 from taxel.spikes import to_ms
 from taxel.tasks.rest import GivenTare, check_tare
 
-#: How many labels without a pair a line names.
+#: Largest number of unpaired labels that a warning names.
 _NAMED = 5
-#: Where to find the file of a plain rule.
+#: How a user gets the file of a plain rule, and uses it.
 _RULE_FILE = "--rule FILE writes it, for taxel detect --readout FILE"
 
 

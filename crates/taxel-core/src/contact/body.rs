@@ -114,14 +114,14 @@ pub enum Move {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Ending {
-    /// A hand catches it at the top of its flight after so many impacts, presses it into the foam and lifts it.
+    /// After some impacts a hand catches the body at the top of its flight, presses it into the foam and lifts it.
     Caught {
-        /// Impacts before the catch, the first one counted.
+        /// Number of impacts before the catch, the first one included.
         after: u32,
         /// What the hand does then.
         press: Press,
     },
-    /// It is not caught; a hand lifts it after a while.
+    /// A hand lifts the body after a while, without a catch.
     LeftToRest {
         /// From the drop to the lift, ms.
         rest_ms: f64,

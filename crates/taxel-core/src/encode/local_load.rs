@@ -103,7 +103,7 @@ impl LocalLoad {
         names
     }
 
-    /// The windows, and the number of quantities whose means over it are wanted.
+    /// The windows, each with the number of quantities that are averaged over it.
     fn windows(&self) -> impl Iterator<Item = ([f64; 2], usize)> {
         let all = OF_REST.len() + OF_MEAN.len() * self.local_ms.len();
         MEANS.into_iter().map(move |window| (window, all)).chain(MEANS_OF_REST.map(|window| (window, OF_REST.len())))
